@@ -1,0 +1,1 @@
+"""MAVLink 1 and 2: frames and the messages that the bridge itself speaks."""

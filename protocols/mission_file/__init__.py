@@ -1,0 +1,1 @@
+"""Mission files as ground stations write them."""

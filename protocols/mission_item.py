@@ -1,0 +1,58 @@
+"""One mission item as a ground station sends it, whatever message or file it came in."""
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Command(IntEnum):
+    """MAV_CMD numbers that mean something to a flight controller of the MultiWii family."""
+
+    NAV_WAYPOINT = 16
+    NAV_LOITER_UNLIM = 17
+    NAV_LOITER_TURNS = 18
+    NAV_LOITER_TIME = 19
+    NAV_RETURN_TO_LAUNCH = 20
+    NAV_LAND = 21
+    NAV_TAKEOFF = 22
+    NAV_ROI = 80
+    DO_SET_ROI_LOCATION = 195
+    DO_SET_ROI_NONE = 197
+    DO_SET_ROI = 201
+
+
+class Frame(IntEnum):
+    """MAV_FRAME numbers that the rules name."""
+
+    GLOBAL = 0
+    MISSION = 2
+    GLOBAL_RELATIVE_ALT = 3
+    GLOBAL_INT = 5
+    GLOBAL_RELATIVE_ALT_INT = 6
+    GLOBAL_TERRAIN_ALT = 10
+    GLOBAL_TERRAIN_ALT_INT = 11
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """An item of a mission list, as sent (any value is possible) or as stored.
+
+    `lat_e7` and `lon_e7` are degrees * 1e7; 0 and None (not a finite number) both mean "missing".
+    `alt_m` is metres above whatever `frame` says. Parameters may be NaN: "not given".
+    """
+
+    seq: int
+    command: int
+    frame: int
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    lat_e7: int | None
+    lon_e7: int | None
+    alt_m: float
+
+
+def degrees_to_e7(degrees: float) -> int | None:
+    """Round degrees to 1e-7 degrees; None if not a finite number (mission-rules.md, "Each item")."""
+    return round(degrees * 1e7) if math.isfinite(degrees) else None

@@ -1,0 +1,1 @@
+"""MultiWii Serial Protocol, version 1."""

@@ -1,0 +1,287 @@
+"""The mission extension's messages, both directions (docs/msp-mission.md is the specification)."""
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from protocols.msp.frame import request
+from protocols.msp.hazards import apply_mask, find_mask, is_clean
+from protocols.wp_record import ListIdentity, WpRecord, pack_records, unpack_records
+
+VERSION = 1
+MAX_RADIUS_CM = 2000
+
+
+class MissionCommand(IntEnum):
+    """MSP command numbers of the extension."""
+
+    INFO = 190
+    BEGIN = 191
+    CHUNK = 192
+    COMMIT = 193
+    ABORT = 194
+    READ = 195
+    RADIUS = 196
+
+
+class Status(IntEnum):
+    """First byte of every reply."""
+
+    OK = 0
+    SAME = 1
+    ARMED = 2
+    BUSY = 3
+    NO_TRANSFER = 4
+    SEQUENCE = 5
+    NO_SPACE = 6
+    RANGE = 7
+    CHECKSUM = 8
+    INCOMPLETE = 9
+    FLASH = 10
+    BAD_REQUEST = 11
+    BAD_RECORD = 12
+
+
+class InfoFlag(IntFlag):
+    """Flags of an INFO reply."""
+
+    ARMED = 1
+    WRITE_PENDING = 2
+    TRANSFER_OPEN = 4
+
+
+_INFO = struct.Struct("<BBBBBBHHIHHHI")
+_PROGRESS = struct.Struct("<BHI")
+_STORED = struct.Struct("<BHI")
+_LIST = struct.Struct("<HI")
+_RADIUS_REPLY = struct.Struct("<BH")
+
+
+@dataclass(frozen=True, slots=True)
+class Info:
+    """What the flight controller says of itself. Radius in cm, time-out in ms."""
+
+    version: int
+    flags: InfoFlag
+    chunk_records: int
+    chunk_window: int
+    read_records: int
+    capacity: int
+    stored: ListIdentity
+    wp_radius_cm: int
+    inter_byte_timeout_ms: int
+    staged: int
+    flash_writes: int
+
+    def encode(self) -> bytes:
+        """Return the reply's payload."""
+        return _INFO.pack(
+            Status.OK,
+            self.version,
+            self.flags,
+            self.chunk_records,
+            self.chunk_window,
+            self.read_records,
+            self.capacity,
+            self.stored.count,
+            self.stored.checksum,
+            self.wp_radius_cm,
+            self.inter_byte_timeout_ms,
+            self.staged,
+            self.flash_writes,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Reply to BEGIN and CHUNK: the next record wanted, and the checksum of those staged before it."""
+
+    status: Status
+    next: int
+    checksum: int
+
+    def encode(self) -> bytes:
+        """Return the reply's payload."""
+        return _PROGRESS.pack(self.status, self.next, self.checksum)
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """Reply to COMMIT: the list that is in flash now."""
+
+    status: Status
+    stored: ListIdentity
+
+    def encode(self) -> bytes:
+        """Return the reply's payload."""
+        return _STORED.pack(self.status, self.stored.count, self.stored.checksum)
+
+
+@dataclass(frozen=True, slots=True)
+class Records:
+    """Reply to READ."""
+
+    status: Status
+    first: int
+    records: Sequence[WpRecord]
+
+    def encode(self) -> bytes:
+        """Return the reply's payload."""
+        return struct.pack("<BH", self.status, self.first) + pack_records(self.records)
+
+
+@dataclass(frozen=True, slots=True)
+class Radius:
+    """Reply to RADIUS: the gps_wp_radius in force, cm."""
+
+    status: Status
+    wp_radius_cm: int
+
+    def encode(self) -> bytes:
+        """Return the reply's payload."""
+        return _RADIUS_REPLY.pack(self.status, self.wp_radius_cm)
+
+
+def _status(value: int) -> Status | None:
+    return Status(value) if value <= max(Status) else None
+
+
+def decode_info(payload: bytes) -> Info | None:
+    """Read an INFO reply; None if it is shorter than version 1 or makes no sense."""
+    if len(payload) < _INFO.size:
+        return None
+    (
+        status,
+        version,
+        flags,
+        chunk_records,
+        chunk_window,
+        read_records,
+        capacity,
+        count,
+        checksum,
+        radius,
+        timeout,
+        staged,
+        writes,
+    ) = _INFO.unpack_from(payload)
+    if status != Status.OK or not (version and chunk_records and chunk_window and read_records):
+        return None
+    return Info(
+        version=version,
+        flags=InfoFlag(flags & 7),
+        chunk_records=chunk_records,
+        chunk_window=chunk_window,
+        read_records=read_records,
+        capacity=capacity,
+        stored=ListIdentity(count, checksum),
+        wp_radius_cm=radius,
+        inter_byte_timeout_ms=timeout,
+        staged=staged,
+        flash_writes=writes,
+    )
+
+
+def decode_progress(payload: bytes) -> Progress | None:
+    """Read the reply to BEGIN or CHUNK."""
+    if len(payload) < _PROGRESS.size:
+        return None
+    status, following, checksum = _PROGRESS.unpack_from(payload)
+    known = _status(status)
+    return None if known is None else Progress(known, following, checksum)
+
+
+def decode_stored(payload: bytes) -> Stored | None:
+    """Read the reply to COMMIT."""
+    if len(payload) < _STORED.size:
+        return None
+    status, count, checksum = _STORED.unpack_from(payload)
+    known = _status(status)
+    return None if known is None else Stored(known, ListIdentity(count, checksum))
+
+
+def decode_records(payload: bytes) -> Records | None:
+    """Read the reply to READ."""
+    if len(payload) < 3:
+        return None
+    known = _status(payload[0])
+    if known is None:
+        return None
+    return Records(known, int.from_bytes(payload[1:3], "little"), unpack_records(payload[3:]))
+
+
+def decode_radius(payload: bytes) -> Radius | None:
+    """Read the reply to RADIUS."""
+    if len(payload) < _RADIUS_REPLY.size:
+        return None
+    status, radius = _RADIUS_REPLY.unpack_from(payload)
+    known = _status(status)
+    return None if known is None else Radius(known, radius)
+
+
+def _masked_request(command: MissionCommand, body: bytes) -> bytes | None:
+    """Encode a request with a masked body; None if its frame would hold a hazard byte with every mask."""
+    size = len(body) + 1
+    mask = find_mask(body, size ^ command)
+    if mask is None:
+        return None
+    frame = request(command, bytes((mask,)) + apply_mask(body, mask))
+    return frame if is_clean(frame) else None
+
+
+def _short_request(command: MissionCommand, body: bytes) -> bytes:
+    frame = _masked_request(command, body)
+    if frame is None:
+        raise AssertionError(f"a {len(body)} byte body always has a mask")
+    return frame
+
+
+def encode_begin(identity: ListIdentity) -> bytes:
+    """Encode BEGIN for a list; an empty one clears what is stored."""
+    return _short_request(MissionCommand.BEGIN, _LIST.pack(identity.count, identity.checksum))
+
+
+def encode_commit(identity: ListIdentity) -> bytes:
+    """Encode COMMIT."""
+    return _short_request(MissionCommand.COMMIT, _LIST.pack(identity.count, identity.checksum))
+
+
+def encode_read(first: int, count: int) -> bytes:
+    """Encode READ."""
+    return _short_request(MissionCommand.READ, struct.pack("<HBB", first, count, 0))
+
+
+def encode_radius(wp_radius_cm: int) -> bytes:
+    """Encode RADIUS, 0..2000 cm."""
+    return _short_request(MissionCommand.RADIUS, struct.pack("<HH", wp_radius_cm, wp_radius_cm ^ 0xFFFF))
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A CHUNK request that is ready to be sent, and which records it carries."""
+
+    first: int
+    count: int
+    frame: bytes
+
+
+def encode_chunk(records: Sequence[WpRecord], first: int, most: int) -> Chunk:
+    """Encode the largest clean CHUNK of at most `most` records from `first` on."""
+    for count in range(min(most, len(records) - first), 0, -1):
+        body = struct.pack("<H", first) + pack_records(records[first : first + count])
+        frame = _masked_request(MissionCommand.CHUNK, body)
+        if frame is not None:
+            return Chunk(first, count, frame)
+    raise AssertionError("a chunk of one record always has a mask")
+
+
+INFO_REQUEST = request(MissionCommand.INFO)
+ABORT_REQUEST = request(MissionCommand.ABORT)
+
+
+def unmask(payload: bytes) -> bytes | None:
+    """Take the mask off a request's payload (the flight controller's side); None if it is not masked form."""
+    if len(payload) % 2 == 0:
+        return None
+    return apply_mask(payload[1:], payload[0])

@@ -1,0 +1,1 @@
+"""The running program: event loop, sockets, serial ports, files, signals, command line."""

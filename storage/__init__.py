@@ -1,0 +1,1 @@
+"""Missions on disk. Knows SQLite and nothing of MAVLink or MSP."""
