@@ -33,6 +33,27 @@ class Frame(IntEnum):
     GLOBAL_TERRAIN_ALT_INT = 11
 
 
+class MissionResult(IntEnum):
+    """MAV_MISSION_RESULT: what a MISSION_ACK says. ERROR is never a final word (mission-rules.md)."""
+
+    ACCEPTED = 0
+    ERROR = 1
+    UNSUPPORTED_FRAME = 2
+    UNSUPPORTED = 3
+    NO_SPACE = 4
+    INVALID = 5
+    INVALID_PARAM1 = 6
+    INVALID_PARAM2 = 7
+    INVALID_PARAM3 = 8
+    INVALID_PARAM4 = 9
+    INVALID_PARAM5_X = 10
+    INVALID_PARAM6_Y = 11
+    INVALID_PARAM7 = 12
+    INVALID_SEQUENCE = 13
+    DENIED = 14
+    OPERATION_CANCELLED = 15
+
+
 @dataclass(frozen=True, slots=True)
 class MissionItem:
     """An item of a mission list, as sent (any value is possible) or as stored.
