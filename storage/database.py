@@ -1,0 +1,165 @@
+"""Open the database file: see that it is whole, make commits durable, bring it to this release's schema.
+
+Damage is looked for at every start, because SD cards rot and lose power. A damaged file is neither repaired
+nor deleted: it is kept aside under a name that `sqlite3` can still open, and a new one takes its place.
+"""
+
+import sqlite3
+import struct
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from importlib import resources
+from pathlib import Path
+
+from storage.store_error import StoreError, explained, primary_code
+
+# SQLite's companions of a database file. The log holds commits that are not in the main file yet.
+_LOG = "-wal"
+_COMPANIONS = (_LOG, "-shm", "-journal")
+
+# The magic number says in which byte order the log's checksums are (https://sqlite.org/fileformat2.html, 4).
+_LOG_HEADER = struct.Struct(">8I")
+_LOG_MAGIC = {0x377F0682: "<6I", 0x377F0683: ">6I"}
+
+# SQLITE_ERROR is "table already exists" and such: the file is not of the schema that it says.
+_DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
+
+
+def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | None]:
+    """Open or make the database; also return where a damaged one was kept, if there was one.
+
+    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's StateLock: nobody
+    else may have a file open that is put aside. StoreError if the file cannot be opened, made or written, or
+    is of a newer release.
+    """
+    failure = f"cannot open the mission store {path}"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{failure}: its directory cannot be made ({error.strerror})") from error
+    with explained(failure), ExitStack() as undo:
+        connection = _connect(path)
+        undo.callback(connection.close)
+        aside = None
+        if not _make_ready(connection, path):
+            # Moved before it is closed: closing would write the log into the damaged file and delete it.
+            aside = _keep_aside(path, now)
+            connection.close()
+            connection = _connect(path)
+            undo.callback(connection.close)
+            _prepare(connection, path)
+        undo.pop_all()
+        return connection, aside
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    # Transactions are begun and ended in our own words (isolation_level). One thread at a time uses the
+    # connection, which the caller promises; it need not be the one that opened it. Only a curious person's
+    # program can hold a lock, and a ground station waits for us meanwhile: hence the short time-out (seconds).
+    connection = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
+    connection.row_factory = sqlite3.Row
+    # A rotten byte in one text must not hide all the other missions.
+    connection.text_factory = lambda raw: raw.decode(errors="replace")
+    return connection
+
+
+def _make_ready(connection: sqlite3.Connection, path: Path) -> bool:
+    """Make the connection ready for use, if every page and the log are sound; tell whether they are."""
+    if _log_was_lost(path):
+        return False
+    try:
+        # Reads every page. integrity_check would also look up every row in every index: slow, and no use to us.
+        (finding,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+        if finding == "ok":
+            _prepare(connection, path)
+    except sqlite3.Error as error:
+        if primary_code(error) in _DAMAGE:
+            return False
+        raise
+    return bool(finding == "ok")
+
+
+def _log_was_lost(path: Path) -> bool:
+    """Tell whether commits were in a log that SQLite would throw away without a word.
+
+    It does so beside an empty main file, and with a log whose header is damaged. A header of zeros, or a part
+    of one, is no damage: the power went before the first commit.
+    """
+    log = path.with_name(path.name + _LOG)
+    try:
+        with log.open("rb") as file:
+            header = file.read(_LOG_HEADER.size)
+        if not any(header):
+            return False
+        if path.stat().st_size == 0:
+            return True
+    except OSError:
+        return False  # no log; or SQLite will say better why it cannot be read
+    if len(header) < _LOG_HEADER.size:
+        return False
+    *words, first_sum, second_sum = _LOG_HEADER.unpack(header)
+    order = _LOG_MAGIC.get(words[0])
+    return order is None or _log_checksum(struct.unpack_from(order, header)) != (first_sum, second_sum)
+
+
+def _log_checksum(words: tuple[int, ...]) -> tuple[int, int]:
+    """SQLite's own checksum over 32-bit words (fileformat2, 4.2)."""
+    first = second = 0
+    for even, odd in zip(words[::2], words[1::2], strict=True):
+        first = (first + even + second) & 0xFFFFFFFF
+        second = (second + odd + first) & 0xFFFFFFFF
+    return first, second
+
+
+def _keep_aside(path: Path, now: float) -> Path:
+    """Rename the file and its companions; return the new name.
+
+    The main file goes last: were it gone first, a power cut here would leave a log that SQLite deletes.
+    """
+    stamp = datetime.fromtimestamp(now, UTC).strftime("%Y%m%d-%H%M%S")
+    aside = path.with_name(f"{path.name}.corrupt-{stamp}")
+    attempt = 1
+    while aside.exists():
+        attempt += 1
+        aside = path.with_name(f"{path.name}.corrupt-{stamp}-{attempt}")
+    try:
+        for suffix in _COMPANIONS:
+            companion = path.with_name(path.name + suffix)
+            if companion.exists():
+                companion.rename(aside.with_name(aside.name + suffix))
+        path.rename(aside)
+    except OSError as error:
+        raise StoreError(
+            f"the mission store {path} is damaged and cannot be kept aside ({error.strerror}); move it away"
+        ) from error
+    return aside
+
+
+def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+    """Make commits durable and bring the file to this release's schema."""
+    connection.execute("PRAGMA journal_mode = WAL")
+    connection.execute("PRAGMA synchronous = FULL")  # NORMAL would lose the last commits in a power cut
+    connection.execute(
+        "BEGIN IMMEDIATE"
+    )  # a file that cannot be written is found now, not when a mission comes
+    connection.execute("ROLLBACK")
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    steps = _schema_steps()
+    if not 0 <= version <= len(steps):
+        raise StoreError(
+            f"the mission store {path} is of a newer naze-bridge (schema {version}, this one knows "
+            f"{len(steps)}); install that release, or move the file away"
+        )
+    for number, sql in enumerate(steps[version:], start=version + 1):
+        try:
+            connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nPRAGMA user_version = {number};\nCOMMIT;")
+        except sqlite3.Error:
+            if connection.in_transaction:
+                connection.execute("ROLLBACK")
+            raise
+
+
+def _schema_steps() -> list[str]:
+    """Return the schema files' text in the order of their numbers; step n makes version n of version n-1."""
+    folder = resources.files("storage") / "schema"
+    return [file.read_text() for file in sorted(folder.iterdir(), key=lambda file: file.name)]

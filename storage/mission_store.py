@@ -1,0 +1,241 @@
+"""Every mission that came in, accepted or not: what was sent, what it became, the craft's answer."""
+
+import builtins
+import json
+import sqlite3
+import zlib
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from storage.database import open_database
+from storage.store_error import StoreError, explained
+
+__all__ = [
+    "PENDING",
+    "VERIFIED",
+    "MissionStore",
+    "MissionSummary",
+    "OpenedStore",
+    "ReceivedMission",
+    "StoreError",
+    "StoredMission",
+    "open_store",
+]
+
+PENDING = "PENDING"  # the outcome until conclude(); for ever, if the daemon died in between
+VERIFIED = "VERIFIED"  # the outcome by which latest_verified() finds a mission
+
+_CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records")  # what crc32 is computed over
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedMission:
+    """A mission list and what the rules made of it.
+
+    The dictionaries hold what JSON can hold, and NaN and infinities. received_at: unix seconds. source: who
+    sent it, e.g. "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED.
+    ack: the MAV_MISSION_ name. stored_items: as the flight controller is to hold them. records: the bytes
+    pushed, `record_count` of them. checksum: their CRC-32. roi_commands: the command number with which each
+    stored region of interest was sent, by its seq.
+    """
+
+    received_at: float
+    source: str
+    items: list[dict[str, Any]]
+    verdict: str
+    ack: str
+    findings: list[dict[str, Any]]
+    stored_items: list[dict[str, Any]]
+    records: bytes
+    record_count: int
+    checksum: int
+    roi_commands: dict[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class MissionSummary:
+    """One line of a list of missions. Times are unix seconds; concluded_at is None while PENDING."""
+
+    number: int
+    received_at: float
+    source: str
+    verdict: str
+    ack: str
+    item_count: int
+    finding_count: int
+    record_count: int
+    checksum: int
+    outcome: str
+    detail: str
+    concluded_at: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class StoredMission:
+    """A mission as it came in, and what became of it."""
+
+    number: int
+    received: ReceivedMission
+    outcome: str
+    detail: str
+    concluded_at: float | None
+
+
+class MissionStore:
+    """The missions of one state directory. One thread at a time; every method may raise StoreError.
+
+    What add() and conclude() have returned from survives a kill and a power cut.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+        self._connection = connection
+        self._path = path
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; nothing is lost without it."""
+        with explained(f"cannot close {self._path}"):
+            self._connection.close()
+
+    def add(self, received: ReceivedMission) -> int:
+        """Store a mission with the outcome PENDING and return its number, which grows with every mission."""
+        contents = (
+            json.dumps(received.items),
+            json.dumps(received.findings),
+            json.dumps(received.stored_items),
+            json.dumps(received.roi_commands),
+            received.records,
+        )
+        with self._transaction("cannot store the mission"):
+            number = self._connection.execute(
+                "INSERT INTO missions (received_at, source, verdict, ack, item_count, finding_count,"
+                " record_count, checksum, outcome, detail) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, '')",
+                (
+                    received.received_at,
+                    _text(received.source),
+                    _text(received.verdict),
+                    _text(received.ack),
+                    len(received.items),
+                    len(received.findings),
+                    received.record_count,
+                    received.checksum,
+                    PENDING,
+                ),
+            ).lastrowid
+            assert number is not None  # noqa: S101 - an INSERT that did not raise has made a row
+            self._connection.execute(
+                "INSERT INTO mission_contents (number, items, findings, stored_items, roi_commands, records,"
+                " crc32) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (number, *contents, _crc32(contents)),
+            )
+        return number
+
+    def conclude(self, number: int, outcome: str, detail: str, at: float) -> None:
+        """Store the flight controller's answer. outcome: VERIFIED, REFUSED, FAILED...; at: unix seconds."""
+        with self._transaction(f"cannot store the outcome of mission {number}"):
+            changed = self._connection.execute(
+                "UPDATE missions SET outcome = ?, detail = ?, concluded_at = ? WHERE number = ?",
+                (_text(outcome), _text(detail), at, number),
+            ).rowcount
+        if not changed:
+            raise StoreError(f"there is no mission {number} in {self._path}")
+
+    def get(self, number: int) -> StoredMission | None:
+        """Return a mission, None if there is none of this number; StoreError too if it rotted on the disk."""
+        with explained(f"cannot read mission {number} from {self._path}"):
+            row = self._connection.execute(
+                "SELECT * FROM missions JOIN mission_contents USING (number) WHERE number = ?",
+                (number,),
+            ).fetchone()
+        if row is None:
+            return None
+        if _crc32(row[column] for column in _CONTENTS) != row["crc32"]:
+            raise StoreError(
+                f"mission {number} in {self._path} was damaged on the disk; the others can still be read"
+            )
+        received = ReceivedMission(
+            received_at=row["received_at"],
+            source=row["source"],
+            items=json.loads(row["items"]),
+            verdict=row["verdict"],
+            ack=row["ack"],
+            findings=json.loads(row["findings"]),
+            stored_items=json.loads(row["stored_items"]),
+            records=row["records"],
+            record_count=row["record_count"],
+            checksum=row["checksum"],
+            roi_commands={int(seq): command for seq, command in json.loads(row["roi_commands"]).items()},
+        )
+        return StoredMission(number, received, row["outcome"], row["detail"], row["concluded_at"])
+
+    def latest_verified(self, count: int, checksum: int) -> StoredMission | None:
+        """Return the youngest mission with these records that the flight controller was seen to hold."""
+        with explained(f"cannot search {self._path}"):
+            row = self._connection.execute(
+                f"SELECT max(number) FROM missions"  # noqa: S608 - a constant; only so is the partial index used
+                f" WHERE record_count = ? AND checksum = ? AND outcome = '{VERIFIED}'",
+                (count, checksum),
+            ).fetchone()
+        return None if row[0] is None else self.get(row[0])
+
+    def list(self, limit: int) -> builtins.list[MissionSummary]:
+        """Return the `limit` youngest missions, youngest first."""
+        with explained(f"cannot list {self._path}"):
+            rows = self._connection.execute(
+                "SELECT number, received_at, source, verdict, ack, item_count, finding_count, record_count,"
+                " checksum, outcome, detail, concluded_at FROM missions ORDER BY number DESC LIMIT ?",
+                (limit,),
+            ).fetchall()
+        return [MissionSummary(*row) for row in rows]
+
+    @contextmanager
+    def _transaction(self, failure: str) -> Iterator[None]:
+        """All or nothing; when it returns, it is on the disk."""
+        with explained(f"{failure} in {self._path}"):
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._connection.execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:  # SQLite itself has rolled back after some errors
+                    self._connection.execute("ROLLBACK")
+                raise
+
+
+@dataclass(frozen=True, slots=True)
+class OpenedStore:
+    """A store ready for use; `set_aside` is where a damaged one was kept: to be said aloud."""
+
+    store: MissionStore
+    set_aside: Path | None
+
+
+def open_store(path: Path, now: float) -> OpenedStore:
+    """Open the store in file `path`, or make it and its directory.
+
+    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's StateLock.
+    StoreError if it cannot be opened or written, or is of a newer release.
+    """
+    connection, set_aside = open_database(path, now)
+    return OpenedStore(MissionStore(connection, path), set_aside)
+
+
+def _text(text: str) -> str:
+    r"""What SQLite can hold: the lone surrogates of a file name that is no UTF-8 become \udcXX."""
+    return text.encode(errors="backslashreplace").decode()
+
+
+def _crc32(contents: Iterable[str | bytes]) -> int:
+    """SQLite notices a damaged page structure, not a changed byte in a mission; this does."""
+    crc = 0
+    for part in contents:
+        crc = zlib.crc32(part if isinstance(part, bytes) else part.encode(), crc)
+    return crc

@@ -1,0 +1,64 @@
+"""One daemon on one state directory."""
+
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+from typing import Self
+
+from storage.store_error import StoreError
+
+_NAME = "lock"
+
+
+class StateLock:
+    """Holds the directory while it is entered; the kernel lets go when the process dies, however it dies.
+
+    The lock file holds the holder's process id. It is never removed: a second process could hold the removed
+    file and a third one a new file.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._descriptor: int | None = None
+
+    def __enter__(self) -> Self:
+        self.acquire()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+    def acquire(self) -> None:
+        """Make the directory if need be and lock it at once; StoreError if another process holds it."""
+        path = self._directory / _NAME
+        try:
+            self._directory.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise StoreError(
+                f"cannot use the state directory {self._directory}: {error.strerror}; "
+                f"name another with --state-dir"
+            ) from error
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = os.read(descriptor, 20).decode(errors="replace").strip()
+            os.close(descriptor)
+            who = f"process {holder}" if holder else "another process"
+            raise StoreError(
+                f"the state directory {self._directory} is in use by {who}; "
+                f"stop that one, or name another directory with --state-dir"
+            ) from error
+        self._descriptor = descriptor
+        with contextlib.suppress(
+            OSError
+        ):  # the number is only for that sentence: a full disk must not stop us
+            os.ftruncate(descriptor, 0)
+            os.write(descriptor, f"{os.getpid()}\n".encode())
+
+    def release(self) -> None:
+        """Let go; nothing happens if it is not held."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
