@@ -1,0 +1,428 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* See naze_mission.h, which is the manual, and docs/msp-mission.md, which is the specification. */
+#include "naze_mission.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define SEAL 0x0000u /* the one value that can be told from every torn or erased state, and that no torn one can pass */
+
+enum { MAGIC_AT = 0, COUNT_AT = 2, SEQUENCE_AT = 4, CHECKSUM_AT = 8, HEADER_CHECKSUM_AT = 12, SEAL_AT = 16, HEADER_SIZE = 18 };
+
+enum { COMMAND_AT = 15, LAST_COMMAND = 7 }; /* in a record */
+
+enum { INFO_SIZE = 24, LIST_SIZE = 7, ABORT_SIZE = 1, READ_SIZE = 3, RADIUS_SIZE = 3 }; /* of replies, READ's without records */
+
+static uint16_t get16(const uint8_t *from)
+{
+    return (uint16_t)(from[0] | (uint16_t)(from[1] << 8));
+}
+
+static uint32_t get32(const uint8_t *from)
+{
+    return get16(from) | (uint32_t)get16(from + 2) << 16;
+}
+
+static void put16(uint8_t *to, uint16_t value)
+{
+    to[0] = (uint8_t)value;
+    to[1] = (uint8_t)(value >> 8);
+}
+
+static void put32(uint8_t *to, uint32_t value)
+{
+    put16(to, (uint16_t)value);
+    put16(to + 2, (uint16_t)(value >> 16));
+}
+
+/* Go on with a CRC-32 of which `checksum` is the value so far (0 of nothing). Half a byte at a time: 64 bytes of table. */
+static uint32_t crc32(uint32_t checksum, const uint8_t *data, uint32_t length)
+{
+    static const uint32_t table[16] = {
+        0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
+        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu,
+    };
+    uint32_t crc = ~checksum;
+    while (length--) {
+        crc ^= *data++;
+        crc = crc >> 4 ^ table[crc & 15u];
+        crc = crc >> 4 ^ table[crc & 15u];
+    }
+    return ~crc;
+}
+
+static bool same(nm_list_t one, nm_list_t other)
+{
+    return one.count == other.count && one.checksum == other.checksum;
+}
+
+/* ---- slots ------------------------------------------------------------------------------------------------------------ */
+
+static uint16_t slot_offset(uint8_t slot)
+{
+    return (uint16_t)(slot * NM_SLOT_SIZE);
+}
+
+static const uint8_t *slot_flash(const nm_t *m, uint8_t slot)
+{
+    return m->board->flash(m->self) + slot_offset(slot);
+}
+
+static uint8_t unused_slot(const nm_t *m)
+{
+    return m->slot == 0 ? 1 : 0;
+}
+
+static uint32_t checksum_in_slot(const nm_t *m, uint8_t slot, uint16_t count)
+{
+    return crc32(0, slot_flash(m, slot) + NM_RECORDS_OFFSET, count * NM_RECORD_SIZE);
+}
+
+static bool slot_valid(const nm_t *m, uint8_t slot)
+{
+    const uint8_t *header = slot_flash(m, slot);
+    return get16(header + MAGIC_AT) == NM_MAGIC && get16(header + SEAL_AT) == SEAL &&
+           get16(header + COUNT_AT) <= NM_CAPACITY &&
+           get32(header + HEADER_CHECKSUM_AT) == crc32(0, header, HEADER_CHECKSUM_AT) &&
+           get32(header + CHECKSUM_AT) == checksum_in_slot(m, slot, get16(header + COUNT_AT));
+}
+
+static void use_slot(nm_t *m, uint8_t slot)
+{
+    const uint8_t *header = slot_flash(m, slot);
+    m->slot = slot;
+    m->sequence = get32(header + SEQUENCE_AT);
+    m->stored.count = get16(header + COUNT_AT);
+    m->stored.checksum = get32(header + CHECKSUM_AT);
+}
+
+/* The header's page goes first, so that no cut can leave an old header above half erased records. */
+static bool erase_slot(const nm_t *m, uint8_t slot)
+{
+    for (uint8_t page = 0; page < NM_SLOT_PAGES; page++) {
+        const uint8_t *bytes = slot_flash(m, slot) + page * NM_PAGE_SIZE;
+        if (!m->board->erase(m->self, (uint8_t)(slot * NM_SLOT_PAGES + page)))
+            return false;
+        for (uint16_t i = 0; i < NM_PAGE_SIZE; i++)
+            if (bytes[i] != 0xFF)
+                return false;
+    }
+    return true;
+}
+
+static bool program(const nm_t *m, uint8_t slot, uint16_t at, const uint8_t *data, uint16_t length)
+{
+    return m->board->program(m->self, (uint16_t)(slot_offset(slot) + at), data, length) &&
+           memcmp(slot_flash(m, slot) + at, data, length) == 0;
+}
+
+/* Make the slot that is not in use, whose records stand, the one that counts. */
+static bool seal_slot(nm_t *m, nm_list_t list)
+{
+    const uint8_t slot = unused_slot(m);
+    uint8_t header[HEADER_SIZE];
+    put16(header + MAGIC_AT, NM_MAGIC);
+    put16(header + COUNT_AT, list.count);
+    put32(header + SEQUENCE_AT, m->sequence + 1);
+    put32(header + CHECKSUM_AT, list.checksum);
+    put32(header + HEADER_CHECKSUM_AT, crc32(0, header, HEADER_CHECKSUM_AT));
+    put16(header + SEAL_AT, SEAL);
+    if (!program(m, slot, 0, header, SEAL_AT))
+        return false;
+    if (!program(m, slot, SEAL_AT, header + SEAL_AT, HEADER_SIZE - SEAL_AT)) {
+        /* A seal that reads wrong now might read right at the next start: take the slot away. */
+        (void)m->board->erase(m->self, (uint8_t)(slot * NM_SLOT_PAGES));
+        return false;
+    }
+    use_slot(m, slot);
+    return true;
+}
+
+/* Is this very list stored, and still what is in flash? */
+static bool is_stored(const nm_t *m, nm_list_t list)
+{
+    return same(list, m->stored) &&
+           (m->slot == NM_SLOTS || checksum_in_slot(m, m->slot, list.count) == list.checksum);
+}
+
+/* ---- commands --------------------------------------------------------------------------------------------------------- */
+
+/* May the stored list or the configuration be changed now? */
+static nm_status_t may_write(const nm_t *m)
+{
+    if (m->board->armed(m->self))
+        return NM_ARMED;
+    return m->board->write_pending(m->self) ? NM_BUSY : NM_OK;
+}
+
+static nm_list_t get_list(const uint8_t *body)
+{
+    nm_list_t list;
+    list.count = get16(body);
+    list.checksum = get32(body + 2);
+    return list;
+}
+
+static nm_status_t begin(nm_t *m, const uint8_t *body)
+{
+    const nm_list_t list = get_list(body);
+    const nm_status_t allowed = may_write(m);
+    if (allowed != NM_OK)
+        return allowed;
+    if (m->open && same(list, m->wanted))
+        return NM_OK;
+    m->open = false;
+    if (list.count > NM_CAPACITY)
+        return NM_NO_SPACE;
+    if (list.count == 0 && list.checksum != 0)
+        return NM_BAD_REQUEST;
+    if (is_stored(m, list))
+        return NM_SAME;
+    if (!erase_slot(m, unused_slot(m)))
+        return NM_FLASH;
+    m->open = true;
+    m->wanted = list;
+    m->staged.count = 0;
+    m->staged.checksum = 0;
+    return NM_OK;
+}
+
+static nm_status_t chunk(nm_t *m, const uint8_t *body, uint8_t length)
+{
+    const uint16_t first = get16(body);
+    const uint8_t *records = body + 2;
+    const uint16_t bytes = (uint16_t)(length - 2u);
+    const uint16_t count = (uint16_t)(bytes / NM_RECORD_SIZE);
+    const uint16_t at = (uint16_t)(NM_RECORDS_OFFSET + m->staged.count * NM_RECORD_SIZE);
+    const nm_status_t allowed = may_write(m);
+    if (allowed != NM_OK)
+        return allowed;
+    if (!m->open)
+        return NM_NO_TRANSFER;
+    if (first != m->staged.count)
+        return first < m->staged.count ? NM_OK : NM_SEQUENCE;
+    if (count > m->wanted.count - m->staged.count)
+        return NM_RANGE;
+    for (uint16_t i = 0; i < count; i++) {
+        if (records[i * NM_RECORD_SIZE + COMMAND_AT] > LAST_COMMAND) {
+            m->open = false;
+            return NM_BAD_RECORD;
+        }
+    }
+    if (!program(m, unused_slot(m), at, records, bytes)) {
+        m->open = false;
+        return NM_FLASH;
+    }
+    m->staged.count = (uint16_t)(m->staged.count + count);
+    m->staged.checksum = crc32(m->staged.checksum, slot_flash(m, unused_slot(m)) + at, bytes);
+    return NM_OK;
+}
+
+static nm_status_t commit(nm_t *m, const uint8_t *body)
+{
+    const nm_list_t list = get_list(body);
+    const nm_status_t allowed = may_write(m);
+    if (allowed != NM_OK)
+        return allowed;
+    if (!m->open)
+        return is_stored(m, list) ? NM_OK : NM_NO_TRANSFER;
+    if (m->staged.count < m->wanted.count)
+        return NM_INCOMPLETE;
+    m->open = false;
+    if (!same(list, m->wanted) || checksum_in_slot(m, unused_slot(m), list.count) != list.checksum)
+        return NM_CHECKSUM;
+    if (!seal_slot(m, list))
+        return NM_FLASH;
+    m->board->list_changed(m->self, nm_records(m), m->stored.count);
+    return NM_OK;
+}
+
+static nm_status_t set_radius(nm_t *m, const uint8_t *body)
+{
+    const uint16_t radius = get16(body);
+    if ((radius ^ get16(body + 2)) != 0xFFFF)
+        return NM_BAD_REQUEST;
+    if (radius > NM_MAX_RADIUS_CM)
+        return NM_RANGE;
+    if (m->board->armed(m->self))
+        return NM_ARMED;
+    if (radius == m->board->radius(m->self))
+        return NM_OK;
+    if (m->board->write_pending(m->self))
+        return NM_BUSY;
+    m->board->set_radius(m->self, radius);
+    return NM_OK;
+}
+
+/* ---- replies ---------------------------------------------------------------------------------------------------------- */
+
+static int reply_list(uint8_t *reply, nm_status_t status, nm_list_t list)
+{
+    reply[0] = (uint8_t)status;
+    put16(reply + 1, list.count);
+    put32(reply + 3, list.checksum);
+    return LIST_SIZE;
+}
+
+static int reply_progress(const nm_t *m, uint8_t *reply, nm_status_t status)
+{
+    const nm_list_t nothing = {0, 0};
+    return reply_list(reply, status, m->open ? m->staged : nothing);
+}
+
+static int reply_stored(const nm_t *m, uint8_t *reply, nm_status_t status)
+{
+    nm_list_t list = m->stored;
+    if (m->slot != NM_SLOTS)
+        list.checksum = checksum_in_slot(m, m->slot, list.count);
+    return reply_list(reply, status, list);
+}
+
+static int reply_info(const nm_t *m, uint8_t *reply)
+{
+    reply[0] = NM_OK;
+    reply[1] = NM_VERSION;
+    reply[2] = (uint8_t)((m->board->armed(m->self) ? 1u : 0u) | (m->board->write_pending(m->self) ? 2u : 0u) |
+                         (m->open ? 4u : 0u));
+    reply[3] = NM_CHUNK_RECORDS;
+    reply[4] = NM_CHUNK_WINDOW;
+    reply[5] = NM_READ_RECORDS;
+    put16(reply + 6, NM_CAPACITY);
+    put16(reply + 8, m->stored.count);
+    put32(reply + 10, m->stored.checksum);
+    put16(reply + 14, m->board->radius(m->self));
+    put16(reply + 16, NM_BYTE_TIMEOUT_MS);
+    put16(reply + 18, m->open ? m->staged.count : 0);
+    put32(reply + 20, m->sequence);
+    return INFO_SIZE;
+}
+
+static int reply_read(const nm_t *m, uint8_t *reply, const uint8_t *body, nm_status_t status)
+{
+    const uint16_t first = get16(body);
+    uint16_t count = body[2];
+    if (status == NM_OK && first >= m->stored.count)
+        status = NM_RANGE;
+    reply[0] = (uint8_t)status;
+    put16(reply + 1, status == NM_OK || status == NM_RANGE ? first : 0);
+    if (status != NM_OK)
+        return READ_SIZE;
+    if (count > NM_READ_RECORDS)
+        count = NM_READ_RECORDS;
+    if (count > m->stored.count - first)
+        count = (uint16_t)(m->stored.count - first);
+    memcpy(reply + READ_SIZE, nm_records(m) + first * NM_RECORD_SIZE, count * NM_RECORD_SIZE);
+    return (int)(READ_SIZE + count * NM_RECORD_SIZE);
+}
+
+static int reply_radius(const nm_t *m, uint8_t *reply, nm_status_t status)
+{
+    reply[0] = (uint8_t)status;
+    put16(reply + 1, m->board->radius(m->self));
+    return RADIUS_SIZE;
+}
+
+/* ---- requests --------------------------------------------------------------------------------------------------------- */
+
+/* Take the mask off, in place. Returns the body's length, or 0 if this is no masked form. */
+static uint8_t unmask(uint8_t *payload, uint8_t size)
+{
+    if (size % 2 == 0)
+        return 0;
+    for (uint8_t i = 1; i < size; i++)
+        payload[i] ^= payload[0];
+    return (uint8_t)(size - 1);
+}
+
+static bool chunk_length(uint8_t length)
+{
+    return length > 2 && (length - 2u) % NM_RECORD_SIZE == 0 && (length - 2u) / NM_RECORD_SIZE <= NM_CHUNK_RECORDS;
+}
+
+int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size)
+{
+    const uint8_t *body = buffer + 1;
+    nm_status_t status = NM_BAD_REQUEST;
+    uint8_t length;
+
+    if (command < NM_INFO || command > NM_RADIUS)
+        return -1;
+    nm_poll(m);
+    length = command == NM_INFO || command == NM_ABORT ? size : unmask(buffer, size);
+
+    switch (command) {
+    case NM_INFO:
+        return reply_info(m, buffer);
+    case NM_BEGIN:
+        if (length == 6)
+            status = begin(m, body);
+        break;
+    case NM_CHUNK:
+        if (chunk_length(length))
+            status = chunk(m, body, length);
+        break;
+    case NM_COMMIT:
+        if (length == 6)
+            status = commit(m, body);
+        break;
+    case NM_READ:
+        return reply_read(m, buffer, body, length == 4 && body[2] && !body[3] ? NM_OK : NM_BAD_REQUEST);
+    case NM_RADIUS:
+        return reply_radius(m, buffer, length == 4 ? set_radius(m, body) : NM_BAD_REQUEST);
+    default: /* ABORT */
+        if (length == 0) {
+            m->open = false;
+            status = NM_OK;
+        }
+        buffer[0] = (uint8_t)status;
+        return ABORT_SIZE;
+    }
+
+    if (status != NM_BAD_REQUEST)
+        m->heard_ms = m->board->millis(m->self); /* after the flash work, which takes its time */
+    return command == NM_COMMIT ? reply_stored(m, buffer, status) : reply_progress(m, buffer, status);
+}
+
+/* ---- the firmware's side ---------------------------------------------------------------------------------------------- */
+
+void nm_start(nm_t *m, const nm_board_t *board, void *self)
+{
+    memset(m, 0, sizeof *m);
+    m->board = board;
+    m->self = self;
+    m->slot = NM_SLOTS;
+    for (uint8_t slot = 0; slot < NM_SLOTS; slot++) {
+        const uint32_t sequence = get32(slot_flash(m, slot) + SEQUENCE_AT);
+        if (slot_valid(m, slot) && (m->slot == NM_SLOTS || (int32_t)(sequence - m->sequence) > 0))
+            use_slot(m, slot);
+    }
+}
+
+void nm_poll(nm_t *m)
+{
+    if (m->open && (m->board->armed(m->self) || m->board->millis(m->self) - m->heard_ms >= NM_IDLE_TIMEOUT_MS))
+        m->open = false;
+}
+
+nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count)
+{
+    const uint16_t bytes = (uint16_t)(count * NM_RECORD_SIZE);
+    nm_list_t list;
+    if (m->board->armed(m->self))
+        return NM_ARMED;
+    if (count > NM_CAPACITY)
+        return NM_NO_SPACE;
+    list.count = count;
+    list.checksum = crc32(0, records, bytes);
+    if (is_stored(m, list))
+        return NM_SAME;
+    m->open = false;
+    if (!erase_slot(m, unused_slot(m)) || !program(m, unused_slot(m), NM_RECORDS_OFFSET, records, bytes) || !seal_slot(m, list))
+        return NM_FLASH;
+    return NM_OK;
+}
+
+const uint8_t *nm_records(const nm_t *m)
+{
+    return m->slot == NM_SLOTS ? NULL : slot_flash(m, m->slot) + NM_RECORDS_OFFSET;
+}

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Mission lists over MSP: the flight controller's side of docs/msp-mission.md, version 1.
+ *
+ * The core takes one MSP command with its payload and gives the reply's payload; it knows nothing of serial ports, of the
+ * firmware around it, or of time beyond a millisecond counter. No heap, no float, no globals: all state is one nm_t of the
+ * caller's (under 50 bytes on a 32 bit target). What it needs from the board comes in through an nm_board_t.
+ *
+ * THE FLASH
+ *   NM_PAGES pages of NM_PAGE_SIZE bytes, two slots of NM_SLOT_PAGES each, written in turn. A slot is a header and, from
+ *   NM_RECORDS_OFFSET on, 16 byte records:
+ *
+ *       0  u16  magic, NM_MAGIC
+ *       2  u16  count of records
+ *       4  u32  sequence: 1 for the first list ever written, then one more for each
+ *       8  u32  CRC-32 of the records
+ *      12  u32  CRC-32 of the 12 bytes before
+ *      16  u16  seal, 0000: programmed last, after all else has been read back
+ *
+ *   A slot counts only if all of this and the CRC over its records is right; of two, the later sequence counts (serial number
+ *   arithmetic). The slot that counts is never touched: BEGIN erases the other one, CHUNK programs its records straight into
+ *   it, COMMIT its header and then the seal. So a power cut at any moment leaves the old list or the new one, whole, and no RAM
+ *   is spent on staging. Every program and erase is verified by reading back.
+ *
+ *   Wear: a list costs one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. A list that is stored
+ *   already is never written again. nm_t.sequence (INFO's last field) counts the writes.
+ *
+ * USE
+ *   nm_start() once, when the flash can be read; nm_poll() in every main loop; nm_handle() for every valid MSP request whose
+ *   command nm_handle() may know; nm_store() wherever the firmware is about to save a list that it got some other way.
+ *   All from one context, never from an interrupt. The core is not reentrant for one nm_t.
+ *
+ * TIME
+ *   BEGIN takes as long as the board's three page erases (STM32F103: 20..40 ms each). A full CHUNK programs 120 half-words
+ *   (52..70 us each: under 9 ms). COMMIT and nm_start() compute CRCs over up to 2,336 bytes. Nothing else touches the flash.
+ *
+ * STACK
+ *   Under 200 bytes below nm_handle() on Cortex-M3, without the board's functions (`make stack` prints it).
+ */
+#ifndef NAZE_MISSION_H
+#define NAZE_MISSION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define NM_VERSION 1u
+
+#define NM_RECORD_SIZE 16u
+#define NM_CAPACITY 146u       /* records in a list: what Harakiri's FloppyDisk holds */
+#define NM_CHUNK_RECORDS 15u   /* most records in one CHUNK */
+#define NM_CHUNK_WINDOW 2u     /* CHUNKs that may be unanswered at once: both fit the 256 byte receive ring while one is programmed */
+#define NM_READ_RECORDS 6u     /* most records in one READ: two replies fit the 255 bytes of the transmit ring */
+#define NM_BYTE_TIMEOUT_MS 50u /* the receiver's inter-byte time-out (INFO reports it, the receiver around the core keeps it) */
+#define NM_IDLE_TIMEOUT_MS 5000u
+#define NM_MAX_RADIUS_CM 2000u
+
+#define NM_PAGE_SIZE 1024u
+#define NM_SLOT_PAGES 3u
+#define NM_SLOT_SIZE (NM_SLOT_PAGES * NM_PAGE_SIZE)
+#define NM_SLOTS 2u
+#define NM_PAGES (NM_SLOTS * NM_SLOT_PAGES)
+#define NM_FLASH_SIZE (NM_PAGES * NM_PAGE_SIZE)
+#define NM_RECORDS_OFFSET 32u
+#define NM_MAGIC 0x4D4Eu /* "NM" */
+
+/* The largest payload either way: a full CHUNK is 1 mask + 2 first + 15 records. nm_handle()'s buffer must hold it. */
+#define NM_BUFFER_SIZE (1u + 2u + NM_CHUNK_RECORDS * NM_RECORD_SIZE)
+
+/* MSP commands. */
+enum {
+    NM_INFO = 190,
+    NM_BEGIN = 191,
+    NM_CHUNK = 192,
+    NM_COMMIT = 193,
+    NM_ABORT = 194,
+    NM_READ = 195,
+    NM_RADIUS = 196
+};
+
+/* First byte of every reply. */
+typedef enum {
+    NM_OK = 0,
+    NM_SAME = 1,
+    NM_ARMED = 2,
+    NM_BUSY = 3,
+    NM_NO_TRANSFER = 4,
+    NM_SEQUENCE = 5,
+    NM_NO_SPACE = 6,
+    NM_RANGE = 7,
+    NM_CHECKSUM = 8,
+    NM_INCOMPLETE = 9,
+    NM_FLASH = 10,
+    NM_BAD_REQUEST = 11,
+    NM_BAD_RECORD = 12
+} nm_status_t;
+
+/* What the core needs of the board. `self` is the pointer given to nm_start(), for the board's own use. */
+typedef struct {
+    /* Erase page 0..NM_PAGES-1 to FF. False if the flash controller reported an error; the core verifies in any case. */
+    bool (*erase)(void *self, uint8_t page);
+    /* Program `length` (even) bytes at the even `offset` 0..NM_FLASH_SIZE-1, half-word by half-word, in ascending order. */
+    bool (*program)(void *self, uint16_t offset, const uint8_t *data, uint16_t length);
+    /* Where NM_FLASH_SIZE bytes of flash can be read. */
+    const uint8_t *(*flash)(void *self);
+    /* A counter of milliseconds that may wrap at 2^32. */
+    uint32_t (*millis)(void *self);
+    bool (*armed)(void *self);
+    /* A write of the configuration is scheduled or running. */
+    bool (*write_pending)(void *self);
+    /* gps_wp_radius, cm. */
+    uint16_t (*radius)(void *self);
+    /* Take over a new gps_wp_radius and see that it is stored with the configuration. Called for changes only. */
+    void (*set_radius)(void *self, uint16_t radius_cm);
+    /* A COMMIT has made another list the stored one: `records` points into the flash. */
+    void (*list_changed)(void *self, const uint8_t *records, uint16_t count);
+} nm_board_t;
+
+/* A list: how many records, and the CRC-32 over their bytes. */
+typedef struct {
+    uint32_t checksum;
+    uint16_t count;
+} nm_list_t;
+
+/* All of the core's state. Fields are for reading only. */
+typedef struct {
+    const nm_board_t *board;
+    void *self;
+    nm_list_t stored;  /* the list in the slot that counts; empty if none does */
+    nm_list_t wanted;  /* the open transfer: what BEGIN announced, */
+    nm_list_t staged;  /* ... what is in the other slot by now, */
+    uint32_t heard_ms; /* ... and when it was last heard of */
+    uint32_t sequence; /* of the slot that counts; 0 if none does */
+    uint8_t slot;      /* the slot that counts: 0, 1, or NM_SLOTS if none does */
+    bool open;         /* a transfer is open */
+} nm_t;
+
+/* Find the newest valid list. Reads flash only. `board` and `self` must live as long as `m` is used. */
+void nm_start(nm_t *m, const nm_board_t *board, void *self);
+
+/* Drop an open transfer if the craft is armed or nothing was heard of it for 5 s. */
+void nm_poll(nm_t *m);
+
+/*
+ * Answer one request. `buffer` holds its payload of `size` bytes and takes the reply's payload; it has room for
+ * NM_BUFFER_SIZE bytes. Returns the reply's length, or -1 if the command is none of this page's (buffer untouched).
+ */
+int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size);
+
+/*
+ * Make `count` records the stored list, the way COMMIT does; an open transfer is dropped. For lists the firmware got without
+ * this extension. Returns NM_OK, NM_SAME (nothing written), NM_ARMED, NM_NO_SPACE or NM_FLASH (the old list is whole).
+ */
+nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count);
+
+/* The stored list's nm_t.stored.count records, in flash. NULL if there has never been a list. */
+const uint8_t *nm_records(const nm_t *m);
+
+#endif

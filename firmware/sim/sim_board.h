@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * A flight controller of memory around the mission core: for the host tests, the emulated Cortex-M3, the fuzzer and, as a
+ * shared library, for Python (tests/firmware/c_core.py).
+ *
+ * Its flash keeps the rules of the STM32F103's: erase works on whole pages and sets every bit; program works on half-words that
+ * must be erased, or writes 0000. Anything else is refused and counted in `violations`. Behind the core's pages lies a page
+ * that stands for the configuration and that nobody may touch.
+ *
+ * The power can be cut at any flash operation (an erase of one page, a program of one half-word). The operation is then left
+ * undone, half done (some bits moved, others not), or done, and everything but the flash is lost.
+ *
+ * Around the core is a byte receiver with the patched firmware's rules (INBUF_SIZE, inter-byte time-out).
+ */
+#ifndef SIM_BOARD_H
+#define SIM_BOARD_H
+
+#include "naze_mission.h"
+
+#include <setjmp.h>
+
+#define SIM_CONFIG_OFFSET NM_FLASH_SIZE
+#define SIM_FLASH_SIZE (NM_FLASH_SIZE + NM_PAGE_SIZE)
+#define SIM_FRAME_SIZE (6u + NM_BUFFER_SIZE)
+
+/* How far the operation got at which the power was cut. */
+typedef enum { SIM_CUT_BEFORE, SIM_CUT_WITHIN, SIM_CUT_AFTER } sim_cut_t;
+
+/* How a flash operation fails: the controller says so, or it says nothing and a bit stays as it was. */
+typedef enum { SIM_FAIL_LOUD, SIM_FAIL_SILENT } sim_fail_t;
+
+typedef struct {
+    nm_t core;
+    uint8_t flash[SIM_FLASH_SIZE];
+
+    uint32_t now_ms;
+    uint16_t radius_cm;
+    bool armed;
+    bool write_pending;
+
+    uint32_t operations; /* flash operations since sim_create() or sim_count() */
+    uint32_t violations; /* of the flash's rules */
+    uint32_t erases[NM_PAGES];
+    uint32_t cut_at; /* cut the power at this operation; 0: never */
+    sim_cut_t cut;
+    uint32_t fail_at; /* let this operation fail; 0: none */
+    sim_fail_t fail;
+    uint32_t random; /* which bits of a half done operation moved */
+
+    uint32_t changes; /* calls of list_changed */
+    uint16_t list_count; /* the list in RAM, as the firmware around the core has it */
+    uint8_t list[NM_CAPACITY * NM_RECORD_SIZE];
+
+    uint8_t frame[SIM_FRAME_SIZE]; /* being received */
+    uint16_t frame_length;
+    uint32_t frame_ms;
+
+    bool powered; /* false after a cut: only sim_power_up() is allowed then */
+    jmp_buf lost;
+} sim_t;
+
+/* A new board, flash as delivered (erased), configuration page filled, powered up. */
+void sim_init(sim_t *s);
+
+/* The same on the heap, for callers in other languages. NULL without memory. */
+sim_t *sim_create(void);
+void sim_destroy(sim_t *s);
+
+/* Reset: everything but the flash (and gps_wp_radius, which stands in the configuration) is forgotten. */
+void sim_power_up(sim_t *s);
+
+/* Count flash operations from 0 again, and cut the power at the `cut_at`th (0: never). */
+void sim_cut_at(sim_t *s, uint32_t cut_at, sim_cut_t cut);
+
+/* Count flash operations from 0 again, and let the `fail_at`th fail (0: none). */
+void sim_fail_at(sim_t *s, uint32_t fail_at, sim_fail_t fail);
+
+/* nm_handle() with `size` bytes of payload in `buffer`; -1: no command of the core's, -2: the power was cut. */
+int sim_request(sim_t *s, uint8_t command, uint8_t *buffer, uint8_t size);
+
+/* nm_store(); -2: the power was cut. */
+int sim_store(sim_t *s, const uint8_t *records, uint16_t count);
+
+/* Let time pass, in steps of at most a second with nm_poll() after each. */
+void sim_advance(sim_t *s, uint32_t milliseconds);
+
+/* Arm or disarm, and run the main loop once. */
+void sim_arm(sim_t *s, bool armed);
+
+/*
+ * Receive a byte. Returns the length of the reply frame that it brought about, written to `reply` (SIM_FRAME_SIZE bytes),
+ * 0 if there is none, -2: the power was cut.
+ */
+int sim_receive(sim_t *s, uint8_t byte, uint8_t *reply);
+
+/* Is the configuration page as sim_init() filled it? */
+bool sim_config_intact(const sim_t *s);
+
+/* For callers who do not see the struct. */
+void sim_set_write_pending(sim_t *s, bool pending);
+uint32_t sim_operations(const sim_t *s);
+uint32_t sim_violations(const sim_t *s);
+uint32_t sim_changes(const sim_t *s);
+uint16_t sim_list(const sim_t *s, uint8_t *records);
+uint8_t *sim_flash(sim_t *s);
+uint32_t sim_flash_size(void);
+
+#endif
