@@ -1,0 +1,66 @@
+"""NOR flash of an STM32F103: erasing sets a page to ones, programming clears bits, power may go meanwhile."""
+
+from service.simulator.options import Faults
+
+PAGE_SIZE = 1024
+ERASED = 0xFF
+
+
+class PowerCutError(Exception):
+    """The supply went away in the middle of a flash operation."""
+
+
+class FlashError(Exception):
+    """An erase or a program did not verify."""
+
+
+class NorFlash:
+    """`memory` is the chip: it outlives power cuts (a bytearray) or even the program (a mapped file)."""
+
+    def __init__(self, memory: memoryview, faults: Faults) -> None:
+        self._memory = memory
+        self._faults = faults
+        self.operations = 0
+        self._busy_seconds = 0.0
+
+    def read(self, offset: int, size: int) -> bytes:
+        """Return `size` bytes."""
+        return bytes(self._memory[offset : offset + size])
+
+    def erase(self, page: int, seconds: float) -> None:
+        """Set a page to ones; FlashError if it did not take."""
+        start = page * PAGE_SIZE
+        # Cut short, an erase leaves bits neither old nor new: here its second half keeps its contents.
+        done = self._begin(PAGE_SIZE, seconds)
+        self._memory[start : start + done] = bytes((ERASED,)) * done
+        self._end(done == PAGE_SIZE)
+
+    def program(self, offset: int, data: bytes, seconds: float) -> None:
+        """Clear bits; FlashError if the result is not `data`, as when the place had not been erased."""
+        done = self._begin(len(data), seconds)
+        for index in range(done):
+            self._memory[offset + index] &= data[index]
+        self._end(self.read(offset, len(data)) == data)
+
+    def take_busy_seconds(self) -> float:
+        """Return how long the chip has held the CPU since the last call."""
+        seconds, self._busy_seconds = self._busy_seconds, 0.0
+        return seconds
+
+    def _begin(self, size: int, seconds: float) -> int:
+        """Count an operation and return how many of its bytes will be done."""
+        self.operations += 1
+        self._busy_seconds += seconds
+        if self._cut() or self._faults.flash_failures > 0:
+            return size // 2
+        return size
+
+    def _end(self, verified: bool) -> None:
+        if self._cut():
+            raise PowerCutError
+        self._faults.flash_failures = max(self._faults.flash_failures - 1, 0)
+        if not verified:
+            raise FlashError
+
+    def _cut(self) -> bool:
+        return self.operations == self._faults.power_cut_at_flash_operation

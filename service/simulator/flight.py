@@ -1,0 +1,65 @@
+"""A plausible flight: sitting on a field while disarmed, circling slowly above it while armed."""
+
+import math
+from dataclasses import dataclass
+
+HOME_LAT_E7 = 473977000
+HOME_LON_E7 = 85456000
+_FIELD_ALTITUDE_M = 488
+_CRUISE_HEIGHT_M = 20.0
+_CIRCLE_RADIUS_M = 25.0
+_CRUISE_SPEED_MS = 2.5
+_CLIMB_SECONDS = 8.0
+_METRES_PER_DEGREE = 111_320.0
+_FULL_BATTERY_V = 12.6
+_EMPTY_BATTERY_V = 10.2
+_IDLE_SAG_VS = 0.0002
+_FLIGHT_SAG_VS = 0.003
+
+
+@dataclass(frozen=True, slots=True)
+class FlightState:
+    """What the sensors say. Angles in degrees, lengths in metres, speeds in metres a second, volts."""
+
+    lat_e7: int
+    lon_e7: int
+    altitude_m: float
+    height_m: float
+    climb_ms: float
+    speed_ms: float
+    course: float
+    roll: float
+    pitch: float
+    heading: float
+    volts: float
+    distance_home_m: float
+    direction_home: float
+    satellites: int = 9
+
+
+def fly(uptime: float, flown: float, armed: bool) -> FlightState:
+    """Return the state `uptime` seconds after boot, of which the craft was armed for `flown`."""
+    # Metres north and east of home on a circle that begins and ends there.
+    angle = flown * _CRUISE_SPEED_MS / _CIRCLE_RADIUS_M
+    north = _CIRCLE_RADIUS_M * math.sin(angle)
+    east = _CIRCLE_RADIUS_M * (1 - math.cos(angle))
+    course = math.degrees(angle) % 360
+    climbed = 1 - math.exp(-flown / _CLIMB_SECONDS)
+    height = _CRUISE_HEIGHT_M * climbed if armed else 0.0
+    degrees_of_longitude = _METRES_PER_DEGREE * math.cos(math.radians(HOME_LAT_E7 / 1e7))
+    sway = 1.0 if armed else 0.1
+    return FlightState(
+        lat_e7=HOME_LAT_E7 + round(north / _METRES_PER_DEGREE * 1e7),
+        lon_e7=HOME_LON_E7 + round(east / degrees_of_longitude * 1e7),
+        altitude_m=_FIELD_ALTITUDE_M + height,
+        height_m=height,
+        climb_ms=_CRUISE_HEIGHT_M / _CLIMB_SECONDS * (1 - climbed) if armed else 0.0,
+        speed_ms=_CRUISE_SPEED_MS if armed else 0.0,
+        course=course,
+        roll=sway * (4.0 + 2.0 * math.sin(uptime * 0.9)),
+        pitch=sway * (-3.0 + 1.5 * math.sin(uptime * 0.7)),
+        heading=course,
+        volts=max(_FULL_BATTERY_V - _IDLE_SAG_VS * uptime - _FLIGHT_SAG_VS * flown, _EMPTY_BATTERY_V),
+        distance_home_m=math.hypot(north, east),
+        direction_home=math.degrees(math.atan2(-east, -north)) % 360 if flown else 0.0,
+    )

@@ -1,0 +1,126 @@
+"""Harakiri's MAVLink 1 stream: what it sends, when, and as whom (baseflight_mavlink.c).
+
+Frames are packed here rather than by pymavlink: the firmware sends them without the fields that MAVLink 2
+added.
+"""
+
+import math
+import struct
+from enum import Enum
+
+from fastcrc.crc16 import mcrf4xx
+
+from protocols.mavlink.dialect import CRC_EXTRA
+from protocols.mavlink.frame import MAGIC_V1
+from service.simulator.flight import FlightState
+
+_SYSID = 1
+_COMPID = 200
+_QUADROTOR = 2
+_ARDUPILOTMEGA = 3
+_MAVLINK_VERSION = 3
+_MODE_STABILIZE_DISARMED = 80
+_MODE_ARMED = 128
+_STATE_STANDBY, _STATE_ACTIVE = 3, 4
+_FIX_3D = 3
+_UNKNOWN = 65535
+_SENSORS = 35843 | 4100 | 8200 | 16416
+_SENSORS_HEALTHY = _SENSORS & 1023
+_RSSI = 230
+
+#: The stream is cut into slots of 10 ms; a message goes out in each slot whose number its divisor divides,
+#: one a slot.
+SLOT_SECONDS = 0.010
+
+
+class Stream(Enum):
+    """A message of the stream: divisor (the first that divides wins), message id, payload layout."""
+
+    SCALED_PRESSURE = (199, 29, "<Iffh")
+    HEARTBEAT = (101, 0, "<IBBBBB")
+    SYS_STATUS = (53, 1, "<IIIHHhHHHHHHb")
+    GPS_RAW_INT = (47, 24, "<QiiiHHHHBB")
+    RC_CHANNELS_RAW = (43, 35, "<IHHHHHHHHBB")
+    VFR_HUD = (11, 74, "<ffffhH")
+    ATTITUDE = (3, 30, "<Iffffff")
+
+
+class MavlinkSchedule:
+    """Decides which message is due. `only_heartbeat`: the firmware is in AUTOSENSE."""
+
+    def __init__(self) -> None:
+        self._slot = 0
+        self._time = 0.0
+
+    def resume(self, now: float) -> None:
+        """Go on from `now`, after a time in which the firmware did not come here."""
+        self._time = now
+
+    def next_due(self, only_heartbeat: bool) -> float:
+        """Tell when the next message is due."""
+        ahead = 1
+        while self._message(self._slot + ahead, only_heartbeat) is None:
+            ahead += 1
+        return self._time + ahead * SLOT_SECONDS
+
+    def take_due(self, now: float, only_heartbeat: bool) -> list[Stream]:
+        """Return the messages that are due by `now`."""
+        due = []
+        while self._time + SLOT_SECONDS <= now + 1e-9:
+            self._time += SLOT_SECONDS
+            self._slot = (self._slot + 1) & 0xFFFF
+            if message := self._message(self._slot, only_heartbeat):
+                due.append(message)
+        return due
+
+    @staticmethod
+    def _message(slot: int, only_heartbeat: bool) -> Stream | None:
+        if only_heartbeat:
+            return None if slot % Stream.HEARTBEAT.value[0] else Stream.HEARTBEAT
+        return next((message for message in Stream if slot % message.value[0] == 0), None)
+
+
+class MavlinkSender:
+    """Packs frames with a running sequence number."""
+
+    def __init__(self) -> None:
+        self._seq = 0
+
+    def pack(self, message: Stream, flight: FlightState, armed: bool, uptime: float) -> bytes:
+        """Encode a message of this moment; `uptime` in seconds."""
+        _, msgid, layout = message.value
+        payload = struct.pack(layout, *_fields(message, flight, armed, round(uptime * 1000)))
+        body = bytes((len(payload), self._seq, _SYSID, _COMPID, msgid)) + payload
+        self._seq = (self._seq + 1) & 0xFF
+        return bytes((MAGIC_V1,)) + body + struct.pack("<H", mcrf4xx(body + bytes((CRC_EXTRA[msgid],))))
+
+
+def _fields(message: Stream, flight: FlightState, armed: bool, uptime_ms: int) -> tuple[float, ...]:
+    """Return a message's fields in the order of the wire."""
+    heading = round(flight.heading) % 360
+    throttle = 45 if armed else 0
+    match message:
+        case Stream.SCALED_PRESSURE:
+            return uptime_ms, 1013.25 - flight.altitude_m * 0.12, 0.0, 3200
+        case Stream.HEARTBEAT:
+            mode = _MODE_STABILIZE_DISARMED | (_MODE_ARMED if armed else 0)
+            state = _STATE_ACTIVE if armed else _STATE_STANDBY
+            return 0, _QUADROTOR, _ARDUPILOTMEGA, mode, state, _MAVLINK_VERSION
+        case Stream.SYS_STATUS:
+            millivolts = round(flight.volts * 10) * 100
+            sensors = (_SENSORS, _SENSORS, _SENSORS_HEALTHY)
+            return *sensors, 0, millivolts, -1, 0, 0, 0, 0, 0, 0, -1
+        case Stream.GPS_RAW_INT:
+            position = (flight.lat_e7, flight.lon_e7, round(flight.altitude_m) * 1000)
+            course = round(flight.course * 100) % 36000
+            motion = (round(flight.speed_ms * 100), course)
+            return uptime_ms * 1000, *position, _UNKNOWN, _UNKNOWN, *motion, _FIX_3D, flight.satellites
+        case Stream.RC_CHANNELS_RAW:
+            sticks = (1500, 1500, 1450 if armed else 1000, 1500, 2000 if armed else 1000, 1500, 1500, 1500)
+            return uptime_ms, *sticks, 0, _RSSI
+        case Stream.VFR_HUD:
+            return 0.0, flight.speed_ms, flight.height_m, flight.climb_ms, heading, throttle
+        case Stream.ATTITUDE:
+            # The firmware's pitch is nose-down positive, and it sends no rates.
+            angles = (math.radians(flight.roll), -math.radians(flight.pitch), math.radians(flight.heading))
+            return uptime_ms, *angles, 0.0, 0.0, 0.0

@@ -1,0 +1,220 @@
+"""The flight controller's side of the mission extension: requests in, replies out (docs/msp-mission.md)."""
+
+import struct
+from dataclasses import dataclass
+
+from protocols.msp.mission import (
+    MAX_RADIUS_CM,
+    VERSION,
+    Info,
+    InfoFlag,
+    MissionCommand,
+    Progress,
+    Radius,
+    Status,
+    Stored,
+    unmask,
+)
+from protocols.wp_record import RECORD_SIZE, ListIdentity, WpCommand
+from service.simulator.flash import FlashError
+from service.simulator.mission_slots import MissionSlots
+from service.simulator.options import Faults, SimOptions
+
+_LIST = struct.Struct("<HI")
+_READ = struct.Struct("<HBB")
+_RADIUS = struct.Struct("<HH")
+
+
+@dataclass(slots=True)
+class Board:
+    """What the mission commands see and change of the rest of the firmware."""
+
+    armed: bool
+    wp_radius_cm: int
+    config_write_due: float | None = None
+
+
+@dataclass(slots=True)
+class _Transfer:
+    """A list that is being staged. `touched`: when its last request came, seconds."""
+
+    identity: ListIdentity
+    touched: float
+    next: int = 0
+
+
+class MissionCommands:
+    """State of the extension since boot: an open transfer, or none."""
+
+    def __init__(self, slots: MissionSlots, board: Board, options: SimOptions, faults: Faults) -> None:
+        self._slots = slots
+        self._board = board
+        self._options = options
+        self._faults = faults
+        self._transfer: _Transfer | None = None
+
+    def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
+        """Return the reply's payload; None if the command is none of the extension's. PowerCutError."""
+        if self._transfer and now - self._transfer.touched > self._options.transfer_timeout_ms / 1000:
+            self._transfer = None
+        if self._board.armed:
+            self._transfer = None
+        body = unmask(payload)
+        match command:
+            case MissionCommand.INFO:
+                return self._info().encode()
+            case MissionCommand.BEGIN:
+                return self._begin(body, now).encode()
+            case MissionCommand.CHUNK:
+                return self._chunk(body, now).encode()
+            case MissionCommand.COMMIT:
+                return Stored(self._commit(body, now), self._slots.stored).encode()
+            case MissionCommand.ABORT:
+                return bytes((self._abort(payload),))
+            case MissionCommand.READ:
+                return self._read(body)
+            case MissionCommand.RADIUS:
+                return Radius(self._radius(body, now), self._board.wp_radius_cm).encode()
+        return None
+
+    @property
+    def _write_pending(self) -> bool:
+        return self._board.config_write_due is not None or self._faults.busy
+
+    def _info(self) -> Info:
+        flags = InfoFlag(0)
+        if self._board.armed:
+            flags |= InfoFlag.ARMED
+        if self._write_pending:
+            flags |= InfoFlag.WRITE_PENDING
+        if self._transfer:
+            flags |= InfoFlag.TRANSFER_OPEN
+        options = self._options
+        return Info(
+            version=VERSION,
+            flags=flags,
+            chunk_records=options.chunk_records,
+            chunk_window=options.chunk_window,
+            read_records=options.read_records,
+            capacity=options.capacity,
+            stored=self._slots.stored,
+            wp_radius_cm=self._board.wp_radius_cm,
+            inter_byte_timeout_ms=options.inter_byte_timeout_ms,
+            staged=self._transfer.next if self._transfer else 0,
+            flash_writes=self._slots.writes,
+        )
+
+    def _refusal(self) -> Status | None:
+        if self._board.armed:
+            return Status.ARMED
+        return Status.BUSY if self._write_pending else None
+
+    def _progress(self, transfer: _Transfer) -> Progress:
+        return Progress(Status.OK, transfer.next, self._slots.staged_checksum(transfer.next))
+
+    def _begin(self, body: bytes | None, now: float) -> Progress:
+        if body is None or len(body) != _LIST.size:
+            return Progress(Status.BAD_REQUEST, 0, 0)
+        if refusal := self._refusal():
+            return Progress(refusal, 0, 0)
+        identity = ListIdentity(*_LIST.unpack(body))
+        if self._transfer and self._transfer.identity == identity:
+            self._transfer.touched = now
+            return self._progress(self._transfer)
+        self._transfer = None
+        if identity.count > self._options.capacity:
+            return Progress(Status.NO_SPACE, 0, 0)
+        if identity == self._slots.stored:
+            return Progress(Status.SAME, identity.count, identity.checksum)
+        try:
+            self._slots.prepare()
+        except FlashError:
+            return Progress(Status.FLASH, 0, 0)
+        self._transfer = _Transfer(identity, now)
+        return self._progress(self._transfer)
+
+    def _chunk(self, body: bytes | None, now: float) -> Progress:
+        count, rest = divmod(len(body) - 2 if body else 0, RECORD_SIZE)
+        if not body or rest or not 1 <= count <= self._options.chunk_records:
+            return Progress(Status.BAD_REQUEST, 0, 0)
+        if refusal := self._refusal():
+            return Progress(refusal, 0, 0)
+        transfer = self._transfer
+        if transfer is None:
+            return Progress(Status.NO_TRANSFER, 0, 0)
+        transfer.touched = now
+        first = int.from_bytes(body[:2], "little")
+        standing = self._progress(transfer)
+        if first > transfer.next:
+            return Progress(Status.SEQUENCE, standing.next, standing.checksum)
+        if first < transfer.next:
+            return standing
+        if first + count > transfer.identity.count:
+            return Progress(Status.BAD_REQUEST, standing.next, standing.checksum)
+        records = [body[at : at + RECORD_SIZE] for at in range(2, len(body), RECORD_SIZE)]
+        if any(record[-1] > max(WpCommand) for record in records):
+            self._transfer = None
+            return Progress(Status.BAD_RECORD, 0, 0)
+        try:
+            for record in records:
+                self._slots.stage(transfer.next, record)
+                transfer.next += 1
+        except FlashError:
+            self._transfer = None
+            return Progress(Status.FLASH, 0, 0)
+        return self._progress(transfer)
+
+    def _commit(self, body: bytes | None, now: float) -> Status:
+        if body is None or len(body) != _LIST.size:
+            return Status.BAD_REQUEST
+        identity = ListIdentity(*_LIST.unpack(body))
+        if self._transfer is None and identity == self._slots.stored:
+            return Status.OK
+        if refusal := self._refusal():
+            return refusal
+        transfer = self._transfer
+        if transfer is None:
+            return Status.NO_TRANSFER
+        transfer.touched = now
+        if transfer.next < transfer.identity.count:
+            return Status.INCOMPLETE
+        self._transfer = None
+        staged = ListIdentity(transfer.next, self._slots.staged_checksum(transfer.next))
+        if not identity == transfer.identity == staged:
+            return Status.CHECKSUM
+        try:
+            self._slots.commit(identity)
+        except FlashError:
+            return Status.FLASH
+        return Status.OK
+
+    def _abort(self, payload: bytes) -> Status:
+        if payload:
+            return Status.BAD_REQUEST
+        self._transfer = None
+        return Status.OK
+
+    def _read(self, body: bytes | None) -> bytes:
+        status, first, records = Status.BAD_REQUEST, 0, b""
+        if body is not None and len(body) == _READ.size:
+            first, count, zero = _READ.unpack(body)
+            if zero == 0 and 1 <= count <= self._options.read_records:
+                status = Status.RANGE
+                if first < self._slots.stored.count:
+                    status, records = Status.OK, self._slots.read(first, count)
+        return struct.pack("<BH", status, first) + records
+
+    def _radius(self, body: bytes | None, now: float) -> Status:
+        if body is None or len(body) != _RADIUS.size:
+            return Status.BAD_REQUEST
+        value, inverse = _RADIUS.unpack(body)
+        if value ^ inverse != 0xFFFF:
+            return Status.BAD_REQUEST
+        if value > MAX_RADIUS_CM:
+            return Status.RANGE
+        if self._board.armed:
+            return Status.ARMED
+        if value != self._board.wp_radius_cm:
+            self._board.wp_radius_cm = value
+            self._board.config_write_due = now + self._options.config_write_delay_ms / 1000
+        return Status.OK

@@ -1,0 +1,115 @@
+"""Two flash slots for the mission, of which the newest valid one counts, and the configuration's page.
+
+A slot is the records' space and then a header, programmed last and with its magic number last of all: until
+then the other slot is the list. Staging needs no RAM.
+"""
+
+import struct
+import zlib
+
+from protocols.wp_record import RECORD_SIZE, ListIdentity
+from service.simulator.flash import PAGE_SIZE, NorFlash
+from service.simulator.options import SimOptions
+
+_HEADER = struct.Struct("<HHIII")
+_MAGIC = 0x4C50574E
+_CONFIG = struct.Struct("<HH")
+_SLOTS = 2
+
+
+def slot_pages(capacity: int) -> int:
+    """Return how many pages a slot of `capacity` records takes."""
+    return -(-(capacity * RECORD_SIZE + _HEADER.size) // PAGE_SIZE)
+
+
+def flash_size(options: SimOptions) -> int:
+    """Return the size of the flash that the options ask for, bytes."""
+    return (_SLOTS * slot_pages(options.capacity) + 1) * PAGE_SIZE
+
+
+class MissionSlots:
+    """The stored list, and the one that is being staged in the other slot."""
+
+    def __init__(self, flash: NorFlash, options: SimOptions) -> None:
+        self._flash = flash
+        self._pages = slot_pages(options.capacity)
+        self._capacity = options.capacity
+        self._erase_seconds = options.flash_erase_ms / 1000 / self._pages
+        self._program_seconds = options.record_program_ms / 1000
+        self._active = 0
+        self.stored = ListIdentity(0, 0)
+        self.writes = 0
+        self.load()
+
+    def load(self) -> None:
+        """Find the newest valid slot, as at boot."""
+        self.stored, self.writes = ListIdentity(0, 0), 0
+        for slot in range(_SLOTS):
+            count, _, checksum, writes, magic = _HEADER.unpack(
+                self._flash.read(self._header(slot), _HEADER.size)
+            )
+            if magic == _MAGIC and count <= self._capacity and writes > self.writes:
+                identity = ListIdentity(count, checksum)
+                if self._checksum(slot, count) == checksum:
+                    self._active, self.stored, self.writes = slot, identity, writes
+
+    def read(self, first: int, count: int) -> bytes:
+        """Return the bytes of stored records, fewer at the list's end."""
+        count = min(count, self.stored.count - first)
+        return self._flash.read(self._record(self._active, first), count * RECORD_SIZE)
+
+    def prepare(self) -> None:
+        """Erase the slot that is not in use. FlashError, PowerCutError."""
+        first = self._unused * self._pages
+        for page in range(first, first + self._pages):
+            self._flash.erase(page, self._erase_seconds)
+
+    def stage(self, index: int, record: bytes) -> None:
+        """Program one record into the unused slot. FlashError, PowerCutError."""
+        self._flash.program(self._record(self._unused, index), record, self._program_seconds)
+
+    def staged_checksum(self, count: int) -> int:
+        """Compute the checksum of the first `count` staged records from what is in flash."""
+        return self._checksum(self._unused, count)
+
+    def commit(self, identity: ListIdentity) -> None:
+        """Make the staged list the stored one. FlashError, PowerCutError."""
+        header = _HEADER.pack(identity.count, 0, identity.checksum, self.writes + 1, _MAGIC)
+        self._flash.program(self._header(self._unused), header, self._program_seconds)
+        self._active = self._unused
+        self.stored = identity
+        self.writes += 1
+
+    @property
+    def _unused(self) -> int:
+        return 1 - self._active
+
+    def _record(self, slot: int, index: int) -> int:
+        return slot * self._pages * PAGE_SIZE + index * RECORD_SIZE
+
+    def _header(self, slot: int) -> int:
+        return self._record(slot, self._capacity)
+
+    def _checksum(self, slot: int, count: int) -> int:
+        return zlib.crc32(self._flash.read(self._record(slot, 0), count * RECORD_SIZE))
+
+
+class StoredConfig:
+    """The one setting that matters here. A power cut while it is written loses it, as in Harakiri."""
+
+    def __init__(self, flash: NorFlash, options: SimOptions) -> None:
+        self._flash = flash
+        self._page = _SLOTS * slot_pages(options.capacity)
+        self._default_cm = options.wp_radius_cm
+        self._seconds = options.config_write_ms / 1000 / 2
+
+    def load(self) -> int:
+        """Return gps_wp_radius, cm; the default if the page is not valid."""
+        value, inverse = _CONFIG.unpack(self._flash.read(self._page * PAGE_SIZE, _CONFIG.size))
+        return int(value) if value ^ inverse == 0xFFFF else self._default_cm
+
+    def save(self, wp_radius_cm: int) -> None:
+        """Write gps_wp_radius. FlashError, PowerCutError."""
+        self._flash.erase(self._page, self._seconds)
+        data = _CONFIG.pack(wp_radius_cm, wp_radius_cm ^ 0xFFFF)
+        self._flash.program(self._page * PAGE_SIZE, data, self._seconds)

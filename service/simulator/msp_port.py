@@ -1,0 +1,215 @@
+"""Harakiri's MSP: the receiver that works byte by byte, and the answers to its commands (serial.c)."""
+
+import struct
+from collections.abc import Callable
+from enum import IntEnum
+
+from protocols.msp.frame import Direction, MspFrame
+from service.simulator.flight import HOME_LAT_E7, HOME_LON_E7, FlightState
+
+_STOCK_BUFFER = 64
+_VERSION = 211
+_QUADX = 3
+_MSP_VERSION = 0
+_CAPABILITY = 0x8000_0000
+_CYCLE_TIME_US = 3000
+_SENSORS = 0b1111  # accelerometer, barometer, magnetometer, GPS
+_ANGLE_BIT, _ARM_BIT = 0, 5
+_BOXES = (
+    "ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO", "PASSTHRU",
+    "HEADFREE", "BEEPER", "HEADADJ", "OSD SW", "GTUNE",
+)  # fmt: skip
+_PIDS = ("ROLL", "PITCH", "YAW", "ALT", "Pos", "PosR", "NavR", "LEVEL", "MAG", "VEL")
+_STICKS_DISARMED = (1500, 1500, 1500, 1000, 1000, 1500, 1500, 1500)
+_STICKS_ARMED = (1500, 1500, 1500, 1450, 2000, 1500, 1500, 1500)
+_RSSI = 230
+_HOME, _HOLD = 0, 16
+_MALFORMED_WP_SIZE = 12
+
+
+class Msp(IntEnum):
+    """Harakiri's commands."""
+
+    IDENT = 100
+    STATUS = 101
+    RAW_IMU = 102
+    SERVO = 103
+    MOTOR = 104
+    RC = 105
+    RAW_GPS = 106
+    COMP_GPS = 107
+    ATTITUDE = 108
+    ALTITUDE = 109
+    BAT = 110
+    RC_TUNING = 111
+    PID = 112
+    BOX = 113
+    MISC = 114
+    MOTOR_PINS = 115
+    BOXNAMES = 116
+    PIDNAMES = 117
+    WP = 118
+    SET_RAW_RC = 200
+    SET_RAW_GPS = 201
+    SET_PID = 202
+    SET_BOX = 203
+    SET_RC_TUNING = 204
+    ACC_CALIBRATION = 205
+    MAG_CALIBRATION = 206
+    SET_MISC = 207
+    RESET_CONF = 208
+    EEPROM_WRITE = 250
+    DEBUG = 254
+
+
+_SETTERS = {Msp.SET_PID: Msp.PID, Msp.SET_BOX: Msp.BOX, Msp.SET_RC_TUNING: Msp.RC_TUNING}
+_ACKNOWLEDGED = frozenset(
+    (
+        Msp.SET_RAW_RC,
+        Msp.SET_RAW_GPS,
+        Msp.ACC_CALIBRATION,
+        Msp.MAG_CALIBRATION,
+        Msp.SET_MISC,
+        Msp.RESET_CONF,
+        Msp.EEPROM_WRITE,
+    )
+)
+
+
+class MspReceiver:
+    """Finds requests as the firmware does: it trusts a header's size and never looks back.
+
+    `buffer_size`: the largest payload; a larger size byte is refused. The stock firmware takes 64 and has
+    no time-out: after a cut frame it swallows the next one's bytes until its count is full.
+    """
+
+    def __init__(self, buffer_size: int = _STOCK_BUFFER) -> None:
+        self._buffer = bytearray(buffer_size)
+        self._state = 0
+        self._size = 0
+        self._checksum = 0
+        self._offset = 0
+        self._command = 0
+
+    @property
+    def in_frame(self) -> bool:
+        """Tell whether a frame has begun."""
+        return self._state != 0
+
+    def forget(self) -> None:
+        """Drop a frame that has begun (the patched firmware's inter-byte time-out)."""
+        self._state = 0
+
+    def push(self, byte: int) -> tuple[int, bytes] | None:
+        """Take a byte; return command and payload when it completes a request whose checksum is right."""
+        match self._state:
+            case 0 | 1 | 2:
+                self._state = self._state + 1 if byte == b"$M<"[self._state] else 0
+            case 3:
+                self._state = 0 if byte > len(self._buffer) else 4
+                self._size = self._checksum = byte
+                self._offset = 0
+            case 4:
+                self._state = 5
+                self._command = byte
+                self._checksum ^= byte
+            case _ if self._offset < self._size:
+                self._buffer[self._offset] = byte
+                self._offset += 1
+                self._checksum ^= byte
+            case _:
+                self._state = 0
+                if self._checksum == byte:
+                    return self._command, bytes(self._buffer[: self._size])
+        return None
+
+
+class MspAnswers:
+    """Answers to the stock commands. `state` gives the flight of this moment and whether it is armed."""
+
+    def __init__(self, state: Callable[[], tuple[FlightState, bool]]) -> None:
+        self._state = state
+        self._settings = {
+            Msp.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
+            Msp.PID: bytes((40, 30, 23)) * len(_PIDS),
+            Msp.BOX: bytes(2 * len(_BOXES)),
+        }
+
+    def answer(self, command: int, payload: bytes) -> bytes:
+        """Return the whole reply frame."""
+        if command == Msp.WP:
+            return self._waypoint(payload)
+        if command in _SETTERS:
+            setting = _SETTERS[Msp(command)]
+            if len(payload) == len(self._settings[setting]):
+                self._settings[setting] = payload
+            return reply(command)
+        if command in _ACKNOWLEDGED:
+            return reply(command)
+        answer = self._read(command)
+        return MspFrame(Direction.ERROR, command).encode() if answer is None else reply(command, answer)
+
+    def _read(self, command: int) -> bytes | None:
+        flight, armed = self._state()
+        match command:
+            case Msp.IDENT:
+                return struct.pack("<BBBI", _VERSION, _QUADX, _MSP_VERSION, _CAPABILITY)
+            case Msp.STATUS:
+                flags = 1 << _ANGLE_BIT | armed << _ARM_BIT
+                return struct.pack("<HHHIB", _CYCLE_TIME_US, 0, _SENSORS, flags, 0)
+            case Msp.RAW_IMU:
+                return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
+            case Msp.SERVO:
+                return struct.pack("<8h", *(1500,) * 8)
+            case Msp.MOTOR:
+                return struct.pack("<8h", *(1450 if armed else 1000,) * 4, *(0,) * 4)
+            case Msp.RC:
+                return struct.pack("<8H", *(_STICKS_ARMED if armed else _STICKS_DISARMED))
+            case Msp.RAW_GPS:
+                position = (
+                    flight.lat_e7,
+                    flight.lon_e7,
+                    round(flight.altitude_m),
+                    round(flight.speed_ms * 100),
+                )
+                return struct.pack("<BBiiHH", 1, flight.satellites, *position)
+            case Msp.COMP_GPS:
+                direction = round((flight.direction_home + 180) % 360 - 180)
+                return struct.pack("<HhB", round(flight.distance_home_m), direction, 1)
+            case Msp.ATTITUDE:
+                heading = round((flight.heading + 180) % 360 - 180)
+                return struct.pack("<4h", round(flight.roll * 10), round(flight.pitch * 10), heading, 0)
+            case Msp.ALTITUDE:
+                return struct.pack("<ih", round(flight.height_m * 100), round(flight.climb_ms * 100))
+            case Msp.BAT:
+                return struct.pack("<BHH", round(flight.volts * 10), 0, _RSSI << 2)
+            case Msp.RC_TUNING | Msp.PID | Msp.BOX:
+                return self._settings[Msp(command)]
+            case Msp.MISC:
+                return bytes(2)
+            case Msp.MOTOR_PINS:
+                return bytes(range(1, 9))
+            case Msp.BOXNAMES:
+                return "".join(f"{name};" for name in _BOXES).encode()
+            case Msp.PIDNAMES:
+                return "".join(f"{name};" for name in _PIDS).encode()
+            case Msp.DEBUG:
+                return bytes(8)
+        return None
+
+    def _waypoint(self, payload: bytes) -> bytes:
+        flight, _ = self._state()
+        match payload[0] if payload else _HOME:
+            case 0:
+                number, lat, lon = _HOME, HOME_LAT_E7, HOME_LON_E7
+            case 16:
+                number, lat, lon = _HOLD, flight.lat_e7, flight.lon_e7
+            case _:
+                # The firmware announces 12 bytes, sends none, and closes with the checksum.
+                return b"$M>" + bytes((_MALFORMED_WP_SIZE, Msp.WP, _MALFORMED_WP_SIZE ^ Msp.WP))
+        return reply(Msp.WP, struct.pack("<BiiHB", number, lat, lon, 0, 0))
+
+
+def reply(command: int, payload: bytes = b"") -> bytes:
+    """Encode a reply frame."""
+    return MspFrame(Direction.REPLY, command, payload).encode()

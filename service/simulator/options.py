@@ -1,0 +1,77 @@
+"""What a simulated Naze can be made to be, and what it has counted."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class TelemetryProtocol(IntEnum):
+    """The CLI's `tele_prot`: what the UART speaks while the craft is armed."""
+
+    MSP = 0
+    FRSKY_9600 = 1
+    MAVLINK = 2
+    MAVLINK_57600 = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimOptions:
+    """A board and its firmware; the defaults are Harakiri's own."""
+
+    seed: int = 0
+    baud: int = 115200
+    looptime_ms: float = 3.0
+    boot_ms: float = 2000.0
+    tele_prot: TelemetryProtocol = TelemetryProtocol.MSP
+
+    # The mission extension (docs/msp-mission.md).
+    chunk_records: int = 15
+    chunk_window: int = 2
+    read_records: int = 6
+    capacity: int = 146
+    inter_byte_timeout_ms: int = 50
+    transfer_timeout_ms: int = 5000
+    wp_radius_cm: int = 200
+
+    # What the CPU does nothing else for.
+    flash_erase_ms: float = 100.0
+    record_program_ms: float = 0.45
+    config_write_ms: float = 150.0
+    config_write_delay_ms: float = 1000.0
+
+
+@dataclass(slots=True, kw_only=True)
+class Faults:
+    """Switches that may be turned at any moment.
+
+    Rates are probabilities a bit and a byte, in both directions. `armed` is the pilot's wish: the firmware
+    refuses it while a configuration write is scheduled. Flash operations (page erases, 16-byte programs)
+    count from 1.
+    """
+
+    bit_error_rate: float = 0.0
+    lost_byte_rate: float = 0.0
+    hang: bool = False
+    armed: bool = False
+    busy: bool = False
+    extension: bool = True
+    power_cut_at_flash_operation: int = 0
+    flash_failures: int = 0
+
+
+@dataclass(slots=True)
+class Counters:
+    """What happened to the board since it was made.
+
+    hazard_runs: three equal hazard bytes in a row on the RX pin, acted on or not.
+    rx_overflows, tx_overflows: how often a ring was lapped. max_outstanding_reply_bytes: of the 255 that
+    the TX ring holds.
+    flash_writes: mission lists made valid.
+    """
+
+    hazard_runs: int = 0
+    rx_overflows: int = 0
+    tx_overflows: int = 0
+    max_outstanding_reply_bytes: int = 0
+    cli_entered: bool = False
+    resets: int = 0
+    flash_writes: int = 0

@@ -1,0 +1,42 @@
+"""A simulated Naze within the daemon's process, behind one end of a socket pair (`--fc sim:`)."""
+
+import asyncio
+import socket
+
+from service.simulator.naze import SimulatedNaze
+from service.simulator.pump import Pump
+
+
+class SimLink:
+    """Connects a SimulatedNaze with whoever holds the socket that `start` returns. Speeds always match."""
+
+    def __init__(self, naze: SimulatedNaze, loop: asyncio.AbstractEventLoop) -> None:
+        self._naze = naze
+        self._loop = loop
+        self._near: socket.socket | None = None
+        self._pump: Pump | None = None
+
+    async def start(self) -> socket.socket:
+        """Supply the board as if two seconds ago, so that it has booted; return the non-blocking far end.
+
+        The far end is the caller's to close. Call again after `stop` for the port's return.
+        """
+        self._near, far = socket.socketpair()
+        self._near.setblocking(False)
+        far.setblocking(False)
+        self._naze.power_on(self._loop.time() - self._naze.options.boot_ms / 1000)
+        self._pump = Pump(self._naze, self._near.fileno(), self._loop, on_hangup=self.stop)
+        self._pump.start()
+        return far
+
+    def stop(self) -> None:
+        """Pull the plug: the far end reads end-of-file. The board keeps its power and its state."""
+        if self._pump and self._near:
+            self._pump.stop()
+            self._near.close()
+            self._pump = self._near = None
+
+    def poke(self) -> None:
+        """Make a fault that was just switched count at once."""
+        if self._pump:
+            self._pump.poke()

@@ -1,0 +1,84 @@
+"""Moves bytes between a simulated Naze and a file descriptor, at the right times of an asyncio loop."""
+
+import asyncio
+import contextlib
+import os
+from collections.abc import Callable
+
+from service.simulator.line import garble
+from service.simulator.naze import SimulatedNaze
+
+_READ_SIZE = 4096
+# A fault that was switched meanwhile is noticed after this long at the latest.
+_LONGEST_SLEEP = 0.25
+
+
+class Pump:
+    """Owns nothing but its timer and reader: `fd` is non-blocking and stays the caller's.
+
+    `far_baud` tells the speed that the other end has set; without it both ends always agree. `on_hangup` is
+    called when the other end has gone.
+    """
+
+    def __init__(
+        self,
+        naze: SimulatedNaze,
+        fd: int,
+        loop: asyncio.AbstractEventLoop,
+        *,
+        far_baud: Callable[[], int] | None = None,
+        on_hangup: Callable[[], None] | None = None,
+    ) -> None:
+        self._naze = naze
+        self._fd = fd
+        self._loop = loop
+        self._far_baud = far_baud
+        self._on_hangup = on_hangup
+        self._timer: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        """Begin to move bytes."""
+        self._loop.add_reader(self._fd, self._on_readable)
+        self.poke()
+
+    def stop(self) -> None:
+        """Stop; the descriptor may be closed then."""
+        self._loop.remove_reader(self._fd)
+        if self._timer:
+            self._timer.cancel()
+            self._timer = None
+
+    def poke(self) -> None:
+        """Collect what the board has sent by now and sleep until it has more."""
+        if self._timer:
+            self._timer.cancel()
+        now = self._loop.time()
+        self._send(self._naze.advance(now))
+        wakeup = min(self._naze.next_wakeup(now), now + _LONGEST_SLEEP)
+        self._timer = self._loop.call_at(wakeup, self.poke)
+
+    def _send(self, data: bytes) -> None:
+        if not data:
+            return
+        if self._far_baud:
+            data = garble(data, self._naze.baud, self._far_baud())
+        # Nobody reads: as on a real wire, what is not taken is gone.
+        with contextlib.suppress(BlockingIOError, BrokenPipeError, ConnectionResetError):
+            os.write(self._fd, data)
+
+    def _on_readable(self) -> None:
+        try:
+            data = os.read(self._fd, _READ_SIZE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self.stop()
+            if self._on_hangup:
+                self._on_hangup()
+            return
+        if self._far_baud:
+            data = garble(data, self._far_baud(), self._naze.baud)
+        self._naze.receive(data, self._loop.time())
+        self.poke()

@@ -1,0 +1,149 @@
+"""USART1 of the board: two wires at the baud rate, and a 256-byte ring behind each (drv_uart.c)."""
+
+from collections import deque
+
+from service.simulator.options import Counters
+
+RING_SIZE = 256
+_BITS_PER_BYTE = 10
+# Times are seconds as floats: a byte that ends exactly now has ended.
+_EPSILON_BYTES = 1e-3
+# How long a finished frame may wait for the next one, so that a reader is not woken for each.
+_GATHER_SECONDS = 0.002
+
+
+class Uart:
+    """Bytes on their way in (`receive` to `read`) and out (`write` to `transmitted`)."""
+
+    def __init__(self, baud: int, counters: Counters) -> None:
+        self.baud = baud
+        self._counters = counters
+        self._byte_time = _BITS_PER_BYTE / baud
+        # Incoming: what is still on the wire, as (time the first start bit begins, bytes).
+        self._wire: deque[tuple[float, bytes]] = deque()
+        self._wire_free_at = 0.0
+        self._unread = bytearray()
+        # Outgoing: the ring, the DMA's running transfer of it, and where each written burst ends.
+        self._ring = bytearray(RING_SIZE)
+        self._head = 0
+        self._tail = 0
+        self._dma_left = 0
+        self._dma_at = 0
+        self._dma_time = 0.0
+        self._sent = bytearray()
+        self._burst_ends: deque[float] = deque()
+
+    def set_baud(self, baud: int) -> None:
+        """Initialise the UART anew, as the firmware does on arming: what is in the rings is lost."""
+        self.baud = baud
+        self._byte_time = _BITS_PER_BYTE / baud
+        self._unread.clear()
+        self._dma_left = 0
+        self._head = self._tail
+        self._burst_ends.clear()
+
+    def power_off(self) -> None:
+        """Forget everything that is under way."""
+        self.set_baud(self.baud)
+        self._wire.clear()
+        self._wire_free_at = 0.0
+        self._sent.clear()
+
+    # -- incoming --------------------------------------------------------------------------------------------
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Put bytes on the RX wire, behind those that are on it already."""
+        start = max(now, self._wire_free_at)
+        self._wire.append((start, data))
+        self._wire_free_at = start + len(data) * self._byte_time
+
+    def next_arrival(self) -> float | None:
+        """Tell when the next byte to read is there; the past if it is in the ring."""
+        if self._unread:
+            return 0.0
+        return self._wire[0][0] + self._byte_time if self._wire else None
+
+    def discard_unread(self, now: float) -> None:
+        """Drop what arrived until `now` (the receiver was not running)."""
+        self._arrive(now)
+        self._unread.clear()
+
+    def read(self, now: float) -> int | None:
+        """Return the next unread byte; None when there is none."""
+        self._arrive(now)
+        return self._unread.pop(0) if self._unread else None
+
+    def _arrive(self, now: float) -> None:
+        while self._wire:
+            start, data = self._wire[0]
+            count = min(int((now - start) / self._byte_time + _EPSILON_BYTES), len(data))
+            if count <= 0:
+                break
+            self._unread += data[:count]
+            if count == len(data):
+                self._wire.popleft()
+            else:
+                self._wire[0] = (start + count * self._byte_time, data[count:])
+        if len(self._unread) >= RING_SIZE:
+            # The DMA has lapped the reader, who sees only the distance between the two positions.
+            self._counters.rx_overflows += 1
+            del self._unread[: len(self._unread) - len(self._unread) % RING_SIZE]
+
+    # -- outgoing --------------------------------------------------------------------------------------------
+
+    def write(self, data: bytes, now: float) -> None:
+        """Put bytes into the TX ring, which nothing keeps from overwriting what has not been sent."""
+        self._transmit(now)
+        outstanding = self._outstanding() + len(data)
+        counters = self._counters
+        counters.max_outstanding_reply_bytes = max(counters.max_outstanding_reply_bytes, outstanding)
+        if outstanding >= RING_SIZE:
+            counters.tx_overflows += 1
+        for byte in data:
+            self._ring[self._head] = byte
+            self._head = (self._head + 1) % RING_SIZE
+            if not self._dma_left:
+                self._dma_time = now
+                self._start_dma()
+        self._burst_ends.append(self._dma_time + self._outstanding() * self._byte_time)
+
+    def transmitted(self, now: float) -> bytes:
+        """Return the bytes that have left the TX pin since the last call."""
+        self._transmit(now)
+        while self._burst_ends and self._burst_ends[0] <= now:
+            self._burst_ends.popleft()
+        sent = bytes(self._sent)
+        self._sent.clear()
+        return sent
+
+    def next_departure(self) -> float | None:
+        """Tell when it is worth calling `transmitted`: at the end of a burst, or of one soon after it."""
+        if not self._burst_ends:
+            return None
+        latest = self._burst_ends[0] + _GATHER_SECONDS
+        return max(end for end in self._burst_ends if end <= latest)
+
+    def _outstanding(self) -> int:
+        return self._dma_left + (self._head - self._tail) % RING_SIZE
+
+    def _start_dma(self) -> None:
+        """Send up to the head, or to the ring's end first (uartTxDMA)."""
+        self._dma_at = self._tail
+        if self._head > self._tail:
+            self._dma_left = self._head - self._tail
+            self._tail = self._head
+        else:
+            self._dma_left = RING_SIZE - self._tail
+            self._tail = 0
+
+    def _transmit(self, now: float) -> None:
+        while self._dma_left:
+            count = min(int((now - self._dma_time) / self._byte_time + _EPSILON_BYTES), self._dma_left)
+            if count <= 0:
+                return
+            self._sent += self._ring[self._dma_at : self._dma_at + count]
+            self._dma_at += count
+            self._dma_left -= count
+            self._dma_time += count * self._byte_time
+            if not self._dma_left and self._head != self._tail:
+                self._start_dma()
