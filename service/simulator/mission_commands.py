@@ -22,6 +22,7 @@ from service.simulator.options import Faults, SimOptions
 
 _LIST = struct.Struct("<HI")
 _READ = struct.Struct("<HBB")
+_RECORDS_HEADER = struct.Struct("<BH")
 _RADIUS = struct.Struct("<HH")
 
 
@@ -64,9 +65,9 @@ class MissionCommands:
             case MissionCommand.INFO:
                 return self._info().encode()
             case MissionCommand.BEGIN:
-                return self._begin(body, now).encode()
+                return self._progress(self._begin(body, now)).encode()
             case MissionCommand.CHUNK:
-                return self._chunk(body, now).encode()
+                return self._progress(self._chunk(body, now)).encode()
             case MissionCommand.COMMIT:
                 return Stored(self._commit(body, now), self._slots.stored).encode()
             case MissionCommand.ABORT:
@@ -109,72 +110,71 @@ class MissionCommands:
             return Status.ARMED
         return Status.BUSY if self._write_pending else None
 
-    def _progress(self, transfer: _Transfer) -> Progress:
-        return Progress(Status.OK, transfer.next, self._slots.staged_checksum(transfer.next))
+    def _progress(self, status: Status) -> Progress:
+        """Where the transfer stands, whatever the status; zeros without one."""
+        staged = self._transfer.next if self._transfer else 0
+        return Progress(status, staged, self._slots.staged_checksum(staged))
 
-    def _begin(self, body: bytes | None, now: float) -> Progress:
+    def _begin(self, body: bytes | None, now: float) -> Status:
         if body is None or len(body) != _LIST.size:
-            return Progress(Status.BAD_REQUEST, 0, 0)
+            return Status.BAD_REQUEST
         if refusal := self._refusal():
-            return Progress(refusal, 0, 0)
+            return refusal
         identity = ListIdentity(*_LIST.unpack(body))
         if self._transfer and self._transfer.identity == identity:
             self._transfer.touched = now
-            return self._progress(self._transfer)
+            return Status.OK
         self._transfer = None
         if identity.count > self._options.capacity:
-            return Progress(Status.NO_SPACE, 0, 0)
+            return Status.NO_SPACE
+        if identity.count == 0 and identity.checksum:
+            return Status.BAD_REQUEST
         if identity == self._slots.stored:
-            return Progress(Status.SAME, identity.count, identity.checksum)
+            return Status.SAME
         try:
             self._slots.prepare()
         except FlashError:
-            return Progress(Status.FLASH, 0, 0)
+            return Status.FLASH
         self._transfer = _Transfer(identity, now)
-        return self._progress(self._transfer)
+        return Status.OK
 
-    def _chunk(self, body: bytes | None, now: float) -> Progress:
+    def _chunk(self, body: bytes | None, now: float) -> Status:
         count, rest = divmod(len(body) - 2 if body else 0, RECORD_SIZE)
         if not body or rest or not 1 <= count <= self._options.chunk_records:
-            return Progress(Status.BAD_REQUEST, 0, 0)
+            return Status.BAD_REQUEST
         if refusal := self._refusal():
-            return Progress(refusal, 0, 0)
+            return refusal
         transfer = self._transfer
         if transfer is None:
-            return Progress(Status.NO_TRANSFER, 0, 0)
+            return Status.NO_TRANSFER
         transfer.touched = now
         first = int.from_bytes(body[:2], "little")
-        standing = self._progress(transfer)
-        if first > transfer.next:
-            return Progress(Status.SEQUENCE, standing.next, standing.checksum)
-        if first < transfer.next:
-            return standing
+        if first != transfer.next:
+            return Status.OK if first < transfer.next else Status.SEQUENCE
         if first + count > transfer.identity.count:
-            return Progress(Status.BAD_REQUEST, standing.next, standing.checksum)
+            return Status.RANGE
         records = [body[at : at + RECORD_SIZE] for at in range(2, len(body), RECORD_SIZE)]
         if any(record[-1] > max(WpCommand) for record in records):
             self._transfer = None
-            return Progress(Status.BAD_RECORD, 0, 0)
+            return Status.BAD_RECORD
         try:
             for record in records:
                 self._slots.stage(transfer.next, record)
                 transfer.next += 1
         except FlashError:
             self._transfer = None
-            return Progress(Status.FLASH, 0, 0)
-        return self._progress(transfer)
+            return Status.FLASH
+        return Status.OK
 
     def _commit(self, body: bytes | None, now: float) -> Status:
         if body is None or len(body) != _LIST.size:
             return Status.BAD_REQUEST
-        identity = ListIdentity(*_LIST.unpack(body))
-        if self._transfer is None and identity == self._slots.stored:
-            return Status.OK
         if refusal := self._refusal():
             return refusal
+        identity = ListIdentity(*_LIST.unpack(body))
         transfer = self._transfer
         if transfer is None:
-            return Status.NO_TRANSFER
+            return Status.OK if identity == self._slots.stored else Status.NO_TRANSFER
         transfer.touched = now
         if transfer.next < transfer.identity.count:
             return Status.INCOMPLETE
@@ -195,14 +195,16 @@ class MissionCommands:
         return Status.OK
 
     def _read(self, body: bytes | None) -> bytes:
-        status, first, records = Status.BAD_REQUEST, 0, b""
-        if body is not None and len(body) == _READ.size:
-            first, count, zero = _READ.unpack(body)
-            if zero == 0 and 1 <= count <= self._options.read_records:
-                status = Status.RANGE
-                if first < self._slots.stored.count:
-                    status, records = Status.OK, self._slots.read(first, count)
-        return struct.pack("<BH", status, first) + records
+        if body is None or len(body) != _READ.size:
+            return _RECORDS_HEADER.pack(Status.BAD_REQUEST, 0)
+        first, count, zero = _READ.unpack(body)
+        if zero or not count:
+            return _RECORDS_HEADER.pack(Status.BAD_REQUEST, 0)
+        if first >= self._slots.stored.count:
+            return _RECORDS_HEADER.pack(Status.RANGE, first)
+        return _RECORDS_HEADER.pack(Status.OK, first) + self._slots.read(
+            first, min(count, self._options.read_records)
+        )
 
     def _radius(self, body: bytes | None, now: float) -> Status:
         if body is None or len(body) != _RADIUS.size:
@@ -214,7 +216,10 @@ class MissionCommands:
             return Status.RANGE
         if self._board.armed:
             return Status.ARMED
-        if value != self._board.wp_radius_cm:
-            self._board.wp_radius_cm = value
-            self._board.config_write_due = now + self._options.config_write_delay_ms / 1000
+        if value == self._board.wp_radius_cm:
+            return Status.OK
+        if self._write_pending:
+            return Status.BUSY
+        self._board.wp_radius_cm = value
+        self._board.config_write_due = now + self._options.config_write_delay_ms / 1000
         return Status.OK

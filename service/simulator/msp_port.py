@@ -27,7 +27,7 @@ _HOME, _HOLD = 0, 16
 _MALFORMED_WP_SIZE = 12
 
 
-class Msp(IntEnum):
+class HarakiriCommand(IntEnum):
     """Harakiri's commands."""
 
     IDENT = 100
@@ -62,16 +62,20 @@ class Msp(IntEnum):
     DEBUG = 254
 
 
-_SETTERS = {Msp.SET_PID: Msp.PID, Msp.SET_BOX: Msp.BOX, Msp.SET_RC_TUNING: Msp.RC_TUNING}
+_SETTERS = {
+    HarakiriCommand.SET_PID: HarakiriCommand.PID,
+    HarakiriCommand.SET_BOX: HarakiriCommand.BOX,
+    HarakiriCommand.SET_RC_TUNING: HarakiriCommand.RC_TUNING,
+}
 _ACKNOWLEDGED = frozenset(
     (
-        Msp.SET_RAW_RC,
-        Msp.SET_RAW_GPS,
-        Msp.ACC_CALIBRATION,
-        Msp.MAG_CALIBRATION,
-        Msp.SET_MISC,
-        Msp.RESET_CONF,
-        Msp.EEPROM_WRITE,
+        HarakiriCommand.SET_RAW_RC,
+        HarakiriCommand.SET_RAW_GPS,
+        HarakiriCommand.ACC_CALIBRATION,
+        HarakiriCommand.MAG_CALIBRATION,
+        HarakiriCommand.SET_MISC,
+        HarakiriCommand.RESET_CONF,
+        HarakiriCommand.EEPROM_WRITE,
     )
 )
 
@@ -130,17 +134,17 @@ class MspAnswers:
     def __init__(self, state: Callable[[], tuple[FlightState, bool]]) -> None:
         self._state = state
         self._settings = {
-            Msp.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
-            Msp.PID: bytes((40, 30, 23)) * len(_PIDS),
-            Msp.BOX: bytes(2 * len(_BOXES)),
+            HarakiriCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
+            HarakiriCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
+            HarakiriCommand.BOX: bytes(2 * len(_BOXES)),
         }
 
     def answer(self, command: int, payload: bytes) -> bytes:
         """Return the whole reply frame."""
-        if command == Msp.WP:
+        if command == HarakiriCommand.WP:
             return self._waypoint(payload)
         if command in _SETTERS:
-            setting = _SETTERS[Msp(command)]
+            setting = _SETTERS[HarakiriCommand(command)]
             if len(payload) == len(self._settings[setting]):
                 self._settings[setting] = payload
             return reply(command)
@@ -152,20 +156,20 @@ class MspAnswers:
     def _read(self, command: int) -> bytes | None:
         flight, armed = self._state()
         match command:
-            case Msp.IDENT:
+            case HarakiriCommand.IDENT:
                 return struct.pack("<BBBI", _VERSION, _QUADX, _MSP_VERSION, _CAPABILITY)
-            case Msp.STATUS:
+            case HarakiriCommand.STATUS:
                 flags = 1 << _ANGLE_BIT | armed << _ARM_BIT
                 return struct.pack("<HHHIB", _CYCLE_TIME_US, 0, _SENSORS, flags, 0)
-            case Msp.RAW_IMU:
+            case HarakiriCommand.RAW_IMU:
                 return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
-            case Msp.SERVO:
+            case HarakiriCommand.SERVO:
                 return struct.pack("<8h", *(1500,) * 8)
-            case Msp.MOTOR:
+            case HarakiriCommand.MOTOR:
                 return struct.pack("<8h", *(1450 if armed else 1000,) * 4, *(0,) * 4)
-            case Msp.RC:
+            case HarakiriCommand.RC:
                 return struct.pack("<8H", *(_STICKS_ARMED if armed else _STICKS_DISARMED))
-            case Msp.RAW_GPS:
+            case HarakiriCommand.RAW_GPS:
                 position = (
                     flight.lat_e7,
                     flight.lon_e7,
@@ -173,27 +177,27 @@ class MspAnswers:
                     round(flight.speed_ms * 100),
                 )
                 return struct.pack("<BBiiHH", 1, flight.satellites, *position)
-            case Msp.COMP_GPS:
+            case HarakiriCommand.COMP_GPS:
                 direction = round((flight.direction_home + 180) % 360 - 180)
                 return struct.pack("<HhB", round(flight.distance_home_m), direction, 1)
-            case Msp.ATTITUDE:
+            case HarakiriCommand.ATTITUDE:
                 heading = round((flight.heading + 180) % 360 - 180)
                 return struct.pack("<4h", round(flight.roll * 10), round(flight.pitch * 10), heading, 0)
-            case Msp.ALTITUDE:
+            case HarakiriCommand.ALTITUDE:
                 return struct.pack("<ih", round(flight.height_m * 100), round(flight.climb_ms * 100))
-            case Msp.BAT:
+            case HarakiriCommand.BAT:
                 return struct.pack("<BHH", round(flight.volts * 10), 0, _RSSI << 2)
-            case Msp.RC_TUNING | Msp.PID | Msp.BOX:
-                return self._settings[Msp(command)]
-            case Msp.MISC:
+            case HarakiriCommand.RC_TUNING | HarakiriCommand.PID | HarakiriCommand.BOX:
+                return self._settings[HarakiriCommand(command)]
+            case HarakiriCommand.MISC:
                 return bytes(2)
-            case Msp.MOTOR_PINS:
+            case HarakiriCommand.MOTOR_PINS:
                 return bytes(range(1, 9))
-            case Msp.BOXNAMES:
+            case HarakiriCommand.BOXNAMES:
                 return "".join(f"{name};" for name in _BOXES).encode()
-            case Msp.PIDNAMES:
+            case HarakiriCommand.PIDNAMES:
                 return "".join(f"{name};" for name in _PIDS).encode()
-            case Msp.DEBUG:
+            case HarakiriCommand.DEBUG:
                 return bytes(8)
         return None
 
@@ -206,8 +210,10 @@ class MspAnswers:
                 number, lat, lon = _HOLD, flight.lat_e7, flight.lon_e7
             case _:
                 # The firmware announces 12 bytes, sends none, and closes with the checksum.
-                return b"$M>" + bytes((_MALFORMED_WP_SIZE, Msp.WP, _MALFORMED_WP_SIZE ^ Msp.WP))
-        return reply(Msp.WP, struct.pack("<BiiHB", number, lat, lon, 0, 0))
+                return b"$M>" + bytes(
+                    (_MALFORMED_WP_SIZE, HarakiriCommand.WP, _MALFORMED_WP_SIZE ^ HarakiriCommand.WP)
+                )
+        return reply(HarakiriCommand.WP, struct.pack("<BiiHB", number, lat, lon, 0, 0))
 
 
 def reply(command: int, payload: bytes = b"") -> bytes:

@@ -18,7 +18,7 @@ from service.simulator.flight import FlightState, fly
 from service.simulator.mavlink_port import MavlinkSchedule, MavlinkSender
 from service.simulator.mission_commands import Board, MissionCommands
 from service.simulator.mission_slots import MissionSlots, StoredConfig, flash_size
-from service.simulator.msp_port import Msp, MspAnswers, MspReceiver, reply
+from service.simulator.msp_port import HarakiriCommand, MspAnswers, MspReceiver, reply
 from service.simulator.options import Counters, Faults, SimOptions, TelemetryProtocol
 from service.simulator.uart import Uart
 
@@ -375,7 +375,7 @@ class SimulatedNaze:
             frame = reply(command, answer)
             self.counters.flash_writes = self._slots.writes
         else:
-            if command == Msp.EEPROM_WRITE:
+            if command == HarakiriCommand.EEPROM_WRITE:
                 self._write_config()
             frame = self._answers.answer(command, payload)
         self._stall()
