@@ -57,6 +57,9 @@ _STORED = struct.Struct("<BHI")
 _LIST = struct.Struct("<HI")
 _RADIUS_REPLY = struct.Struct("<BH")
 
+#: Payload size of an INFO reply of version 1.
+INFO_SIZE = _INFO.size
+
 
 @dataclass(frozen=True, slots=True)
 class Info:

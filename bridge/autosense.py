@@ -1,0 +1,188 @@
+"""Finds out what speaks on a serial port, and at which speed. Sans-IO.
+
+The other side (harakiri.md, "Protocol switching"): a disarmed Harakiri sends MAVLink heartbeats until it is spoken
+to, and answers either protocol; armed, it may speak MAVLink only. So both are listened for, but MSP is asked for and
+preferred.
+
+Each visit to a speed runs through the phases below. Evidence is two matching MSP answers to our own questions, or a
+heartbeat whose every field is plausible: noise does not produce either (tests/bridge/test_autosense_noise.py).
+Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives other bytes than we send;
+tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from bridge.msp_link import RESYNC
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.msp.commands import Msp
+from protocols.msp.frame import Direction, MspFrame, MspParser, request
+
+PROBE = request(Msp.IDENT)
+
+#: Tried in this order; 115200 is Harakiri's default and comes back in between, for a board that was still booting.
+SPEEDS = (115200, 57600, 38400, 115200, 19200, 9600, 115200, 4800, 2400, 1200)
+#: At these a MAVLink heartbeat a second is waited for; elsewhere only an answer to a probe.
+_HEARTBEAT_SPEEDS = (115200, 57600)
+_FULL_VISIT_S = 1.1
+_SHORT_VISIT_S = 0.65
+_LISTEN_S = 0.2
+_PROBE_INTERVAL_S = 0.2
+_CONFIRM_S = 0.3
+#: How long MSP may still answer after MAVLink was heard.
+_MSP_CHANCE_S = 0.45
+
+
+class Phase(Enum):
+    """Where a visit to one speed stands."""
+
+    LISTEN = auto()  # nothing is sent
+    PROBE = auto()  # IDENT is asked, listening goes on
+    CONFIRM = auto()  # one MSP answer was heard; a second, equal one is wanted
+    FOUND = auto()
+
+
+class Spoken(Enum):
+    """What a flight controller speaks."""
+
+    MSP = "MSP"
+    MAVLINK = "MAVLink"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The verdict, and the evidence in words. `speed` is None where the line has none."""
+
+    spoken: Spoken
+    speed: int | None
+    why: str
+
+
+def visit_order(known: int | None, speeds: Sequence[int | None]) -> Iterator[int | None]:
+    """Yield speeds for ever; the last good one takes every other turn: a rebooting board comes back to it."""
+    while True:
+        for speed in speeds:
+            if known is not None:
+                yield known
+            if speed != known:
+                yield speed
+
+
+class Autosense:
+    """One search. Call `start`, then feed bytes and time until `found` is set.
+
+    `speed` is what the port must be set to; `take_output` what must be written to it.
+    """
+
+    def __init__(self, speeds: Sequence[int | None], known: int | None = None) -> None:
+        self._order = visit_order(known, speeds)
+        self.speed = next(self._order)
+        self.phase = Phase.LISTEN
+        self.found: Found | None = None
+        self._output: list[bytes] = []
+        self._begin_visit(0.0)
+
+    def start(self, now: float) -> None:
+        """Begin with the first speed."""
+        self._begin_visit(now)
+
+    def take_output(self) -> list[bytes]:
+        """Return what is to be written, in order."""
+        output, self._output = self._output, []
+        return output
+
+    def next_deadline(self) -> float | None:
+        """Return when `tick` has something to do."""
+        return None if self.found else min(self._phase_ends, self._visit_ends)
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that were read at the present `speed`."""
+        for msp_frame in self._msp.feed(data):
+            self._msp_frame(msp_frame, now)
+        for mavlink_frame in self._mavlink.feed(data):
+            self._mavlink_frame(mavlink_frame, now)
+
+    def tick(self, now: float) -> None:
+        """Move on when a phase or a visit is over."""
+        if self.found:
+            return
+        if now >= self._visit_ends:
+            if self._heartbeat is not None:
+                sender = f"system {self._heartbeat.sysid} component {self._heartbeat.compid}"
+                self._conclude(Spoken.MAVLINK, f"heartbeat of {sender}, no answer to {self._probes} MSP probes")
+            else:
+                self._next_visit(now)
+        elif now >= self._phase_ends:
+            self._answer = None
+            self.phase = Phase.PROBE
+            self._probe(now)
+
+    def _next_visit(self, now: float) -> None:
+        self.speed = next(self._order)
+        self._begin_visit(now)
+
+    def _begin_visit(self, now: float) -> None:
+        self.phase = Phase.LISTEN
+        self._msp = MspParser()
+        self._mavlink = MavlinkSplitter()
+        self._answer: MspFrame | None = None
+        self._heartbeat: MavlinkFrame | None = None
+        self._last_mavlink: MavlinkFrame | None = None
+        self._probes = 0
+        full = self.speed is None or self.speed in _HEARTBEAT_SPEEDS
+        self._phase_ends = now + _LISTEN_S
+        self._visit_ends = now + (_FULL_VISIT_S if full else _SHORT_VISIT_S)
+
+    def _probe(self, now: float) -> None:
+        # Each second probe also fills a parser that was left in mid-frame.
+        frame = PROBE if self._probes % 2 == 0 else RESYNC
+        self._probes += 1
+        self._output.append(frame)
+        # At 1200 baud the exchange itself takes longer than the interval.
+        line_s = (len(frame) + 13) * 10 / self.speed if self.speed else 0.0
+        self._phase_ends = now + _PROBE_INTERVAL_S + line_s
+        self._visit_ends = max(self._visit_ends, self._phase_ends) if self._probes == 1 else self._visit_ends
+
+    def _msp_frame(self, frame: MspFrame, now: float) -> None:
+        if self.found or frame.command != Msp.IDENT or frame.direction is Direction.REQUEST:
+            return
+        if self._answer == frame:
+            self._conclude(Spoken.MSP, f"two equal answers to IDENT ({frame.direction.name.lower()})")
+            return
+        self._answer = frame
+        self.phase = Phase.CONFIRM
+        self._output.append(PROBE)
+        line_s = 19 * 10 / self.speed if self.speed else 0.0
+        self._phase_ends = now + _CONFIRM_S + line_s
+        self._visit_ends = max(self._visit_ends, self._phase_ends)
+
+    def _mavlink_frame(self, frame: MavlinkFrame, now: float) -> None:
+        before, self._last_mavlink = self._last_mavlink, frame
+        if self.found or self._heartbeat is not None:
+            return
+        follows = (
+            before is not None
+            and (before.sysid, before.compid) == (frame.sysid, frame.compid)
+            and frame.seq == (before.seq + 1) % 256
+        )
+        if follows or _is_plausible_heartbeat(frame):
+            self._heartbeat = frame
+            if self.phase is Phase.LISTEN:
+                self._phase_ends = now
+            self._visit_ends = now + _MSP_CHANCE_S
+
+    def _conclude(self, spoken: Spoken, why: str) -> None:
+        self.phase = Phase.FOUND
+        self.found = Found(spoken, self.speed, why)
+
+
+def _is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
+    """Check the fields that have few legal values: type, autopilot, MAVLink version."""
+    if frame.msgid != 0:
+        return False
+    payload = frame.raw[6:-2] if frame.version == 1 else frame.raw[10:19]
+    if len(payload) < 9:
+        return False
+    vehicle_type, autopilot, version = payload[4], payload[5], payload[8]
+    return version == 3 and vehicle_type <= 45 and autopilot <= 20 and frame.sysid != 0

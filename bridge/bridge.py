@@ -1,0 +1,413 @@
+"""The bridge as a whole: one flight controller on one side, ground stations on the other. Sans-IO.
+
+The service feeds bytes, time and the store's answers in, and afterwards takes what is to be sent, stored and said.
+A byte's way from the UART:
+    fc_received -> FcSession -> MspLink -> VehicleState -> vehicle_messages -> take_datagrams
+A mission item's way to the flight controller, and back for the proof:
+    gcs_received -> MissionUploads -> MissionCheck -> MissionDesk.deliver -> HarakiriMissions.push -> MspLink
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from bridge import vehicle_messages
+from bridge.commands import Commands
+from bridge.fc_session import FcSession
+from bridge.flight_controller import FlightController
+from bridge.harakiri import HarakiriMissions
+from bridge.journal import Journal
+from bridge.mission_check import check_list
+from bridge.mission_desk import Delivery, HeldMission, MissionDesk, Refusal
+from bridge.mission_dialect import MissionDialect, StoreReport
+from bridge.mission_download import MissionDownloads
+from bridge.mission_log import ArrivedMission
+from bridge.mission_upload import MissionUploads
+from bridge.parameters import Parameters
+from bridge.procedure import Procedure, StoreEffect
+from bridge.runner import Runner
+from bridge.station import Peer, Severity, Station
+from bridge.stations import Stations
+from protocols.mavlink.codec import MavlinkDecoder, MavlinkEncoder
+from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.ftp import refuse
+from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
+from protocols.mission_item import MissionItem
+
+_HEARTBEAT_INTERVAL_S = 1.0
+_TEXT_SIZE = 50
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeConfig:
+    """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed."""
+
+    speeds: Sequence[int | None]
+    sysid: int = 1
+    compid: int = 1
+    takeoff_max_m: int = 15
+
+
+class Bridge:
+    """Implements `Post` for its own parts."""
+
+    def __init__(self, config: BridgeConfig, journal: Journal, now: float) -> None:
+        self._config = config
+        self._journal = journal
+        self._started_at = now
+        self._stations = Stations()
+        self._default_peers: set[Peer] = set()
+        self._splitters: dict[Peer, MavlinkSplitter] = {}
+        self._decoder = MavlinkDecoder()
+        self._encoder = MavlinkEncoder(config.sysid, config.compid)
+        self._datagrams: list[tuple[Peer, bytes]] = []
+        self._store_effects: list[StoreEffect] = []
+        self._heartbeat_due = now
+        self._now = now
+        self._was_armed = False
+
+        self.runner = Runner(self._store_effects.append)
+        self.session = FcSession(config.speeds, self.runner, journal, self._controller_changed)
+        self.desk = MissionDesk()
+        self._uploads = MissionUploads(self.desk, self.runner, self, journal, self._home)
+        self._downloads = MissionDownloads(self.desk, self.runner, self, self._is_armed, self._home)
+        self._parameters = Parameters(self.desk, self.runner, self, config.sysid)
+        self._commands = Commands(self, self._on_demand(), self._banner)
+        self._handlers = self._make_handlers()
+
+    # The flight controller's side.
+
+    @property
+    def speed(self) -> int | None:
+        """Return what the port must be set to, baud."""
+        return self.session.speed
+
+    def fc_opened(self, now: float) -> None:
+        """Take note that the port is open."""
+        self._now = now
+        self.session.opened(now)
+
+    def fc_closed(self, now: float, why: str) -> None:
+        """Take note that the port is gone."""
+        self._now = now
+        self.session.closed(now, why)
+
+    def fc_received(self, data: bytes, now: float) -> None:
+        """Take bytes from the port."""
+        self._now = now
+        self.session.received(data, now)
+        armed = bool(self.session.vehicle.armed)
+        if armed and not self._was_armed:
+            self._uploads.armed(now)
+        if armed != self._was_armed:
+            self._journal("info", "vehicle.armed" if armed else "vehicle.disarmed")
+        self._was_armed = armed
+
+    def take_fc_output(self) -> list[bytes]:
+        """Return what is to be written to the port at the present `speed`."""
+        return self.session.take_output()
+
+    # The ground stations' side.
+
+    def add_default_peer(self, peer: Peer) -> None:
+        """Send to `peer` before it was heard: a fixed or a broadcast address."""
+        self._default_peers.add(peer)
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        """Stop that."""
+        self._default_peers.discard(peer)
+
+    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
+        """Take bytes from a ground station. A datagram holds whole frames only."""
+        self._now = now
+        splitter = self._splitters.get(peer)
+        if splitter is None:
+            splitter = MavlinkSplitter()
+            if not datagram:
+                self._splitters[peer] = splitter
+        frames = splitter.feed(data)
+        if datagram:
+            frames += splitter.reset()
+        for frame in frames:
+            if frame.sysid == self._config.sysid:
+                continue
+            if self._stations.heard(peer, frame.version, now):
+                self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
+            handler = self._handlers.get(frame.msgid)
+            if handler is None:
+                continue
+            message = self._decoder.decode(frame)
+            if message is not None and self._is_for_us(message):
+                handler(Station(peer, frame.sysid, frame.compid), message)
+
+    def gcs_gone(self, peer: Peer) -> None:
+        """A ground station's connection is closed."""
+        self._stations.gone(peer)
+        self._splitters.pop(peer, None)
+
+    def is_heard(self, peer: Peer) -> bool:
+        """Tell whether a valid frame has come from `peer` lately."""
+        return peer in self._stations.peers()
+
+    def peers(self) -> list[Peer]:
+        """Return the ground stations that are there."""
+        return self._stations.peers()
+
+    def take_datagrams(self) -> list[tuple[Peer, bytes]]:
+        """Return what is to be sent to ground stations, in order, one frame each."""
+        datagrams, self._datagrams = self._datagrams, []
+        return datagrams
+
+    def to(self, station: Station, message: Message) -> None:
+        """Send a message to one ground station."""
+        version = self._stations.version(station.peer)
+        self._datagrams.append((station.peer, self._encoder.encode(message, version)))
+
+    def say(self, severity: Severity, text: str) -> None:
+        """Show a text on every ground station, in pieces that fit STATUSTEXT."""
+        self._journal("debug", "gcs.text", text=text)
+        for piece in split_text(text):
+            self._broadcast(messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace")))
+
+    # The store.
+
+    def take_store_effects(self) -> list[StoreEffect]:
+        """Return what is to be done in the store; each is answered by `store_answered`."""
+        effects = self._store_effects[:]
+        self._store_effects.clear()
+        return effects
+
+    def store_answered(self, answer: object, now: float) -> None:
+        """Take the store's answer."""
+        self._now = now
+        self.runner.store_answered(answer, now)
+
+    # The command line's side.
+
+    def push_locally(
+        self,
+        items: Sequence[MissionItem],
+        source: str,
+        on_progress: Callable[[int], None],
+        on_done: Callable[[Delivery | Refusal, ArrivedMission | None], None],
+        now: float,
+    ) -> None:
+        """Do what an upload by a ground station does, with a list that is all there. No items: clear."""
+        self._now = now
+        owner = object()
+        refusal = self.desk.acquire(owner)
+        if refusal is not None:
+            on_done(refusal, None)
+            return
+        arrived: list[ArrivedMission] = []
+
+        def procedure() -> Procedure[Delivery | Refusal]:
+            report: StoreReport | Refusal = yield from self.desk.preflight()
+            if isinstance(report, Refusal):
+                return report
+            verdict = check_list(items, report.profile, self._home())
+            arrived.append(ArrivedMission(source, tuple(items), verdict))
+            return (yield from self.desk.deliver(arrived[0], on_progress))
+
+        def done(result: Delivery | Refusal, _at: float) -> None:
+            self.desk.release(owner)
+            if arrived and isinstance(result, Delivery):
+                self.say(Severity.NOTICE, f"{source}: {result.text}")
+            on_done(result, arrived[0] if arrived else None)
+
+        self.runner.start(procedure(), done, now)
+
+    def pull_locally(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
+        """Read what the flight controller holds."""
+        self._now = now
+        self.runner.start(self.desk.read_back(), lambda held, _at: on_done(held), now)
+
+    # Time.
+
+    def tick(self, now: float) -> None:
+        """Do what is due."""
+        self._now = now
+        self.session.tick(now)
+        self.runner.tick(now)
+        self._uploads.tick(now)
+        if now >= self._heartbeat_due:
+            self._heartbeat_due = max(self._heartbeat_due + _HEARTBEAT_INTERVAL_S, now)
+            self._every_second(now)
+
+    def next_deadline(self) -> float:
+        """Return when `tick` has something to do."""
+        deadlines = (
+            self.session.next_deadline(),
+            self.runner.next_deadline(),
+            self._uploads.next_deadline(),
+            self._heartbeat_due,
+        )
+        return min(deadline for deadline in deadlines if deadline is not None)
+
+    def _every_second(self, now: float) -> None:
+        for peer in self._stations.expire(now):
+            self._splitters.pop(peer, None)
+            self._journal("info", "gcs.silent", peer=str(peer))
+        vehicle = self.session.vehicle
+        heartbeat = vehicle_messages.heartbeat(vehicle, linked=self.session.controller is not None)
+        self._broadcast(heartbeat)
+        self._introduce(heartbeat)
+        boot_ms = self._boot_ms()
+        for message in (
+            vehicle_messages.sys_status(vehicle),
+            vehicle_messages.attitude(vehicle, boot_ms),
+            vehicle_messages.gps_raw_int(vehicle, boot_ms),
+            vehicle_messages.global_position_int(vehicle, boot_ms),
+            self._mission_current(),
+        ):
+            if message is not None:
+                self._broadcast(message)
+
+    def _introduce(self, heartbeat: Message) -> None:
+        """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.
+
+        A ground station of MAVLink 1 only would not see the vehicle otherwise; Mission Planner speaks MAVLink 1
+        until it has seen MAVLink 2.
+        """
+        for peer in self._everyone():
+            if not self.is_heard(peer):
+                self._datagrams.append((peer, self._encoder.encode(heartbeat, 1)))
+            elif self._stations.version(peer) == 1:
+                self._datagrams.append((peer, self._encoder.encode(heartbeat, 2)))
+
+    def _broadcast(self, message: Message) -> None:
+        frames: dict[int, bytes] = {}
+        for peer in self._everyone():
+            version = self._stations.version(peer)
+            if version not in frames:
+                frames[version] = self._encoder.encode(message, version)
+            self._datagrams.append((peer, frames[version]))
+
+    def _everyone(self) -> list[Peer]:
+        heard = self._stations.peers()
+        return heard + [peer for peer in self._default_peers if peer not in heard]
+
+    def _is_for_us(self, message: Message) -> bool:
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in (0, self._config.sysid) and component in (0, self._config.compid)
+
+    def _controller_changed(self, controller: FlightController | None, now: float) -> None:
+        dialect: MissionDialect | None = None
+        if controller is not None and controller.info is not None:
+            dialect = HarakiriMissions(controller.info, self._config.takeoff_max_m)
+        self.desk.controller_changed(controller, dialect)
+        if controller is None:
+            self._uploads.link_lost(now)
+            self.say(Severity.WARNING, "Flight controller lost")
+        else:
+            self.say(Severity.INFO, f"Found {controller.name}")
+
+    def _home(self) -> tuple[int, int] | None:
+        return self.session.vehicle.home_or_position()
+
+    def _is_armed(self) -> bool | None:
+        return self.session.vehicle.armed
+
+    def _boot_ms(self) -> int:
+        return int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
+
+    def _banner(self) -> str:
+        controller = self.session.controller
+        return f"naze-bridge: {controller.name if controller else 'no flight controller'}"
+
+    def _mission_current(self) -> Message:
+        held = self.desk.held
+        return vehicle_messages.mission_current(0 if held is None else held.identity.count)
+
+    def _on_demand(self) -> dict[int, Callable[[], Message | None]]:
+        return {
+            messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION: vehicle_messages.autopilot_version,
+            messages.MAVLINK_MSG_ID_PROTOCOL_VERSION: vehicle_messages.protocol_version,
+            messages.MAVLINK_MSG_ID_HOME_POSITION: lambda: vehicle_messages.home_position(self._home()),
+            messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+            messages.MAVLINK_MSG_ID_SYS_STATUS: lambda: vehicle_messages.sys_status(self.session.vehicle),
+        }
+
+    def _make_handlers(self) -> dict[int, Callable[[Station, Message], None]]:
+        """Which message is whose business."""
+        uploads, downloads, parameters, commands = (
+            self._uploads,
+            self._downloads,
+            self._parameters,
+            self._commands,
+        )
+        m = messages
+        return {
+            m.MAVLINK_MSG_ID_MISSION_COUNT: self._mission_count,
+            m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg: uploads.item(
+                s, item_from_float_message(msg), msg.mission_type, self._now
+            ),
+            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg: uploads.item(
+                s, item_from_int_message(msg), msg.mission_type, self._now
+            ),
+            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg: uploads.ack(s, msg.type, self._now),
+            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
+            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _: uploads.partial_list(s, self._now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, msg: downloads.request_list(
+                s, msg.mission_type, self._now
+            ),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg: downloads.request(
+                s, msg.seq, msg.mission_type, self._now, as_int=False
+            ),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg: downloads.request(
+                s, msg.seq, msg.mission_type, self._now, as_int=True
+            ),
+            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda _s, _msg: self.say(
+                Severity.ERROR, "The current waypoint cannot be set"
+            ),
+            m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg: commands.take(s, msg.command, msg.param1),
+            m.MAVLINK_MSG_ID_COMMAND_INT: lambda s, msg: commands.take(s, msg.command, msg.param1),
+            m.MAVLINK_MSG_ID_SET_MODE: lambda _s, _msg: commands.refuse_mode(),
+            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _: self.to(s, vehicle_messages.autopilot_version()),
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _: parameters.send_all(s),
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg: parameters.send_one(s, msg.param_id, msg.param_index),
+            m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg: parameters.set(s, msg.param_id, msg.param_value, self._now),
+            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._ftp,
+            m.MAVLINK_MSG_ID_PING: self._ping,
+            m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
+        }
+
+    def _mission_count(self, station: Station, message: Message) -> None:
+        self._downloads.forget(station)
+        self._uploads.count(station, message.count, message.mission_type, self._now)
+
+    def _mission_clear(self, station: Station, message: Message) -> None:
+        self._downloads.forget(station)
+        self._uploads.clear_all(station, message.mission_type, self._now)
+
+    def _ftp(self, station: Station, message: Message) -> None:
+        answer = refuse(message.payload)
+        if answer is not None:
+            self.to(
+                station,
+                messages.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer),
+            )
+
+    def _ping(self, station: Station, message: Message) -> None:
+        # A PING with targets is the answer to somebody's question.
+        if message.target_system == 0:
+            self.to(
+                station,
+                messages.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid),
+            )
+
+    def _timesync(self, station: Station, message: Message) -> None:
+        if message.tc1 == 0:
+            self.to(station, messages.MAVLink_timesync_message(int(self._now * 1e9), message.ts1))
+
+
+def split_text(text: str) -> list[str]:
+    """Split at spaces into pieces of at most 50 characters."""
+    pieces: list[str] = []
+    while len(text) > _TEXT_SIZE:
+        cut = text.rfind(" ", 1, _TEXT_SIZE + 1)
+        cut = cut if cut > 0 else _TEXT_SIZE
+        pieces.append(text[:cut])
+        text = text[cut:].lstrip()
+    return [*pieces, text]

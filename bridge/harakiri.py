@@ -1,0 +1,249 @@
+"""Harakiri with the mission extension: docs/msp-mission.md, the companion's side."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from bridge.mission_check import RuleProfile
+from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.procedure import LinkLost, Procedure, ask, pause, receive, send
+from protocols.msp import mission as ext
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Status
+from protocols.wp_record import RECORD_SIZE, ListIdentity, WpRecord, identify
+
+_SHORT_REPLY_SIZE = 7
+#: A read asks for no more than this, so that two replies fit the flight controller's send ring.
+_READ_RECORDS = 6
+_READS_IN_FLIGHT = 2
+_BUSY_PATIENCE_S = 1.0
+_BUSY_INTERVAL_S = 0.1
+#: How often one push may begin anew (reset, damaged line, flash error) before it is given up.
+_MAX_BEGINS = 3
+#: Unanswered requests in a row after which the flight controller counts as gone.
+_MAX_SILENCE = 5
+
+_FAILURES = {
+    Status.ARMED: PushFailure.ARMED,
+    Status.BUSY: PushFailure.BUSY,
+    Status.NO_SPACE: PushFailure.NO_SPACE,
+    Status.RANGE: PushFailure.REFUSED,
+    Status.BAD_REQUEST: PushFailure.REFUSED,
+    Status.BAD_RECORD: PushFailure.REFUSED,
+    Status.FLASH: PushFailure.FLASH,
+}
+#: Statuses after which the same list is begun again: the line or the board had a fault that may pass.
+_BEGIN_AGAIN = {Status.NO_TRANSFER, Status.CHECKSUM, Status.FLASH, Status.BAD_RECORD}
+
+
+class _Retry(Exception):
+    """Begin the transfer again."""
+
+    def __init__(self, failure: PushFailure) -> None:
+        super().__init__(failure.value)
+        self.failure = failure
+
+
+class _GiveUp(Exception):
+    """End the push."""
+
+    def __init__(self, failure: PushFailure) -> None:
+        super().__init__(failure.value)
+        self.failure = failure
+
+
+class HarakiriMissions:
+    """The mission store of one Harakiri. `takeoff_max_m` is the upper limit of the rules' take-off height."""
+
+    def __init__(self, info: Info, takeoff_max_m: int) -> None:
+        self.info = info
+        self._takeoff_max_m = takeoff_max_m
+
+    @property
+    def wp_radius_cm(self) -> int:
+        """gps_wp_radius as last heard, cm."""
+        return self.info.wp_radius_cm
+
+    def report(self) -> Procedure[StoreReport | None]:
+        """Ask the flight controller for its state; None if it does not answer."""
+        info = yield from self._read_info()
+        if info is None:
+            return None
+        self.info = info
+        if info.flags & InfoFlag.ARMED:
+            state = StoreState.ARMED
+        elif info.flags & InfoFlag.WRITE_PENDING:
+            state = StoreState.BUSY
+        else:
+            state = StoreState.READY
+        profile = RuleProfile(info.capacity, info.wp_radius_cm, self._takeoff_max_m)
+        return StoreReport(state, profile, info.stored)
+
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult]:
+        """Put the list there: BEGIN, CHUNKs in a window, COMMIT; proven by the checksum over the flash."""
+        wanted = identify(records)
+        failure = PushFailure.NO_ANSWER
+        committing = False
+        try:
+            for _ in range(_MAX_BEGINS):
+                committing = False
+                try:
+                    begun = yield from self._begin(wanted)
+                    if begun.status is Status.SAME:
+                        unchanged = yield from self._is_stored(records)
+                        if unchanged:
+                            return PushResult(None, unchanged=True)
+                        continue
+                    yield from self._send_chunks(records, begun, progress)
+                    committing = True
+                    yield from self._commit(wanted)
+                    return PushResult(None)
+                except _Retry as retry:
+                    failure = retry.failure
+                    yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1)
+        except _GiveUp as end:
+            failure = end.failure
+        except LinkLost:
+            failure = PushFailure.NO_ANSWER
+        if committing and failure is PushFailure.NO_ANSWER:
+            failure = PushFailure.UNCERTAIN
+        return PushResult(failure)
+
+    def pull(self) -> Procedure[tuple[WpRecord, ...] | None]:
+        """Read the whole list and compare its checksum; once more if the list changed meanwhile."""
+        for _ in range(2):
+            info = yield from self._read_info()
+            if info is None:
+                return None
+            self.info = info
+            records = yield from self._read(info)
+            if records is not None and identify(records) == info.stored:
+                return records
+        return None
+
+    def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
+        """Set gps_wp_radius, 0..2000 cm."""
+        frame = ext.encode_radius(wp_radius_cm)
+        reply = yield from ask(frame, MissionCommand.RADIUS, 3)
+        answer = None if reply is None else ext.decode_radius(reply.payload)
+        if answer is None:
+            return None
+        self.info = replace(self.info, wp_radius_cm=answer.wp_radius_cm)
+        return answer.wp_radius_cm
+
+    def _read_info(self) -> Procedure[Info | None]:
+        reply = yield from ask(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
+        return None if reply is None else ext.decode_info(reply.payload)
+
+    def _begin(self, wanted: ListIdentity) -> Procedure[Progress]:
+        waited_s = 0.0
+        while True:
+            reply = yield from ask(ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, exclusive=True)
+            answer = None if reply is None else ext.decode_progress(reply.payload)
+            if answer is None:
+                raise _GiveUp(PushFailure.NO_ANSWER)
+            if answer.status is Status.BUSY and waited_s < _BUSY_PATIENCE_S:
+                yield from pause(_BUSY_INTERVAL_S)
+                waited_s += _BUSY_INTERVAL_S
+                continue
+            if answer.status not in (Status.OK, Status.SAME):
+                raise _error(answer.status)
+            return answer
+
+    def _send_chunks(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Procedure[None]:
+        """Keep the window full; after a loss go back to the first record that the flight controller lacks."""
+        total = len(records)
+        acked = self._confirmed(records, begun)
+        sent = acked
+        in_flight: list[int] = []  # first record of each unanswered chunk
+        most = self.info.chunk_records
+        silence = 0
+        while acked < total:
+            while sent < total and len(in_flight) < self.info.chunk_window:
+                chunk = ext.encode_chunk(records, sent, most)
+                yield from send(chunk.frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
+                in_flight.append(sent)
+                sent += chunk.count
+            reply = yield from receive(MissionCommand.CHUNK)
+            answer = None if reply is None else ext.decode_progress(reply.payload)
+            if answer is None:
+                silence += 1
+                if silence > _MAX_SILENCE:
+                    raise _GiveUp(PushFailure.NO_ANSWER)
+                in_flight.clear()
+                sent = acked
+                # A line that loses frames loses long ones most.
+                most = max(most // 2, 1)
+                continue
+            silence = 0
+            if in_flight:
+                in_flight.pop(0)
+            if answer.status not in (Status.OK, Status.SEQUENCE):
+                raise _error(answer.status)
+            confirmed = self._confirmed(records, answer)
+            if confirmed > acked:
+                acked = confirmed
+                progress(acked)
+            if answer.status is Status.SEQUENCE:
+                # A chunk before this one was lost: go back to it without waiting for its time-out.
+                in_flight.clear()
+                sent = acked
+                most = max(most // 2, 1)
+
+    def _commit(self, wanted: ListIdentity) -> Procedure[None]:
+        reply = yield from ask(ext.encode_commit(wanted), MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=True)
+        answer = None if reply is None else ext.decode_stored(reply.payload)
+        if answer is None:
+            raise _GiveUp(PushFailure.NO_ANSWER)
+        if answer.status is Status.INCOMPLETE:
+            raise _Retry(PushFailure.NO_ANSWER)
+        if answer.status is not Status.OK:
+            raise _error(answer.status)
+        if answer.stored != wanted:
+            raise _Retry(PushFailure.FLASH)
+
+    def _is_stored(self, records: Sequence[WpRecord]) -> Procedure[bool]:
+        """Compare record by record: "the same list" is a claim by checksum only."""
+        held = yield from self.pull()
+        return held == tuple(records)
+
+    def _read(self, info: Info) -> Procedure[tuple[WpRecord, ...] | None]:
+        """Read all records, two requests in flight, each asked again until it is there."""
+        step = min(info.read_records, _READ_RECORDS)
+        total = info.stored.count
+        missing = list(range(0, total, step))
+        parts: dict[int, Sequence[WpRecord]] = {}
+        silence = 0
+        in_flight = 0
+        waiting: list[int] = list(missing)
+        while len(parts) < len(missing):
+            while waiting and in_flight < _READS_IN_FLIGHT:
+                first = waiting.pop(0)
+                frame = ext.encode_read(first, step)
+                yield from send(frame, MissionCommand.READ, 3 + step * RECORD_SIZE)
+                in_flight += 1
+            reply = yield from receive(MissionCommand.READ)
+            answer = None if reply is None else ext.decode_records(reply.payload)
+            if answer is None:
+                silence += 1
+                if silence > _MAX_SILENCE:
+                    return None
+                in_flight = 0
+                waiting = [first for first in missing if first not in parts]
+                continue
+            in_flight = max(in_flight - 1, 0)
+            if answer.status is not Status.OK:
+                return None
+            silence = 0
+            if len(answer.records) == min(step, total - answer.first):
+                parts[answer.first] = answer.records
+        return tuple(record for first in missing for record in parts[first])
+
+    def _confirmed(self, records: Sequence[WpRecord], answer: Progress) -> int:
+        """Return how many records the flight controller has right; begin again if it has other ones."""
+        if answer.next > len(records) or identify(records[: answer.next]).checksum != answer.checksum:
+            raise _Retry(PushFailure.NO_ANSWER)
+        return answer.next
+
+
+def _error(status: Status) -> _Retry | _GiveUp:
+    failure = _FAILURES.get(status, PushFailure.REFUSED)
+    return _Retry(failure) if status in _BEGIN_AGAIN else _GiveUp(failure)

@@ -1,0 +1,172 @@
+"""What every way to a mission shares: one transfer at a time, the checks before, the delivery, the reading back.
+
+Mission Planner over UDP (bridge.mission_upload, bridge.mission_download) and the command line go through this one desk.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from bridge.flight_controller import FlightController, Kind
+from bridge.mission_check import Result, items_from_records
+from bridge.mission_dialect import MissionDialect, PushFailure, StoreReport, StoreState
+from bridge.mission_log import ArrivedMission, Conclusion, Outcome
+from bridge.procedure import LinkLost, Procedure, conclude, pause, recall, save
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.wp_record import ListIdentity, WpRecord, identify
+
+#: mission-rules.md, "a flash write is still running": wait for it up to 1 s.
+_BUSY_PATIENCE_S = 1.0
+_BUSY_INTERVAL_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why nothing is done, as the ground station hears it."""
+
+    ack: MissionResult
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """How a mission ended. `number` is its number in the store, None if it could not be stored."""
+
+    ack: MissionResult
+    text: str
+    number: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class HeldMission:
+    """The list that the flight controller holds, as it was read from there."""
+
+    identity: ListIdentity
+    records: tuple[WpRecord, ...]
+    items: tuple[MissionItem, ...]
+
+
+_REASONS: dict[Kind, Refusal] = {
+    Kind.HARAKIRI: Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
+    Kind.OTHER_MSP: Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions"),
+    Kind.MAVLINK: Refusal(MissionResult.DENIED, "Flight controller is in MAVLink mode"),
+}
+_NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
+ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")
+_BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
+_OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
+
+
+class MissionDesk:
+    """Holds the lock of the one transfer, the dialect of the present flight controller, and the list it holds."""
+
+    def __init__(self) -> None:
+        self._dialect: MissionDialect | None = None
+        self._refusal = _NO_LINK
+        self._owner: object | None = None
+        self.held: HeldMission | None = None
+
+    def controller_changed(self, controller: FlightController | None, dialect: MissionDialect | None) -> None:
+        """Work with another flight controller, or with none."""
+        self._dialect = dialect
+        self._refusal = _NO_LINK if controller is None else _REASONS.get(controller.kind, _NO_LINK)
+        self.held = None
+
+    @property
+    def dialect(self) -> MissionDialect | None:
+        """How the present flight controller stores missions; None if it does not."""
+        return self._dialect
+
+    def acquire(self, owner: object) -> Refusal | None:
+        """Take the lock of the one transfer, or say why not."""
+        if self._owner is not None and self._owner != owner:
+            return _OCCUPIED
+        self._owner = owner
+        return None
+
+    def release(self, owner: object) -> None:
+        """Give the lock back."""
+        if self._owner == owner:
+            self._owner = None
+
+    def preflight(self) -> Procedure[StoreReport | Refusal]:
+        """Ask the flight controller whether it would take a list now."""
+        waited_s = 0.0
+        try:
+            while True:
+                if self._dialect is None:
+                    return self._refusal
+                report = yield from self._dialect.report()
+                if report is None:
+                    return _NO_LINK
+                if report.state is StoreState.READY:
+                    return report
+                if report.state is StoreState.ARMED:
+                    return ARMED
+                if waited_s >= _BUSY_PATIENCE_S:
+                    return _BUSY
+                yield from pause(_BUSY_INTERVAL_S)
+                waited_s += _BUSY_INTERVAL_S
+        except LinkLost:
+            return _NO_LINK
+
+    def deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Procedure[Delivery]:
+        """Store the mission, bring it to the flight controller if the rules let it, store how that ended."""
+        number = yield from save(arrived)
+        verdict = arrived.verdict
+        if verdict.result is Result.REJECTED:
+            reason = verdict.findings[-1].text() if verdict.findings else "Mission rejected"
+            cancelled = verdict.ack is MissionResult.OPERATION_CANCELLED
+            outcome = Outcome.CANCELLED if cancelled else Outcome.REJECTED
+            return (yield from self._conclude(number, outcome, verdict.ack, reason))
+        dialect = self._dialect
+        if dialect is None:
+            return (yield from self._conclude(number, Outcome.FAILED, self._refusal.ack, self._refusal.text))
+        result = yield from dialect.push(verdict.records, progress)
+        if result.failure is not None:
+            return (
+                yield from self._conclude(
+                    number,
+                    Outcome.FAILED,
+                    _ACKS.get(result.failure, MissionResult.DENIED),
+                    result.failure.value,
+                )
+            )
+        self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
+        if verdict.result is Result.CLEARED:
+            text = "Mission on the flight controller cleared"
+        else:
+            text = f"Mission verified: {len(verdict.records)} records"
+        if result.unchanged:
+            text += ", unchanged"
+        return (yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text))
+
+    def read_back(self) -> Procedure[HeldMission | Refusal]:
+        """Return what the flight controller holds; a copy answers only while it has the same checksum."""
+        try:
+            if self._dialect is None:
+                return self._refusal
+            report = yield from self._dialect.report()
+            if report is None:
+                return _NO_LINK
+            if self.held is not None and self.held.identity == report.stored:
+                return self.held
+            records = yield from self._dialect.pull()
+            if records is None:
+                return _NO_LINK
+            identity = identify(records)
+            roi_commands: Mapping[int, int] = yield from recall(identity)
+            self.held = HeldMission(identity, records, tuple(items_from_records(records, roi_commands)))
+        except LinkLost:
+            return _NO_LINK
+        return self.held
+
+    def _conclude(self, number: int | None, outcome: Outcome, ack: MissionResult, text: str) -> Procedure[Delivery]:
+        if number is not None and not (yield from conclude(number, Conclusion(outcome, text))):
+            number = None
+        return Delivery(ack, text, number)
+
+
+_ACKS = {
+    PushFailure.NO_SPACE: MissionResult.NO_SPACE,
+    PushFailure.REFUSED: MissionResult.INVALID,
+}

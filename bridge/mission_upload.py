@@ -1,0 +1,343 @@
+"""A ground station writes a mission: the vehicle's side of MAVLink's upload (mission-rules.md, clients.md).
+
+One transfer at a time. Mission Planner eats its own packets and takes any ack to MISSION_COUNT as "go on"; what is odd
+below is so because of that, and clients.md says which of its habits it answers.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from bridge.journal import Journal
+from bridge.mission_check import Finding, MissionCheck, Result, RuleProfile, Verdict, check_count, check_list
+from bridge.mission_desk import ARMED, Delivery, MissionDesk, Refusal
+from bridge.mission_dialect import StoreReport
+from bridge.mission_log import ArrivedMission
+from bridge.runner import Runner
+from bridge.station import Post, Severity, Station
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionItem, MissionResult
+
+MISSION_TYPE_MISSION = 0
+MISSION_TYPE_ALL = 255
+_FIRST_PATIENCE_S = 0.25
+_MAX_PATIENCE_S = 1.5
+_GIVE_UP_S = 5.0
+#: How long a refusal or a final ack is repeated to items that still come: Mission Planner sends its last item for 5 s.
+_MEMORY_S = 10.0
+
+
+class Phase(Enum):
+    """A transfer's life. It begins with MISSION_COUNT and ends with the final MISSION_ACK."""
+
+    ASKING = "asking the flight controller whether it would take a list"
+    RECEIVING = "items come in"
+    DELIVERING = "stored, pushed and verified"
+
+
+@dataclass(slots=True)
+class _Transfer:
+    station: Station
+    count: int
+    phase: Phase = Phase.ASKING
+    check: MissionCheck | None = None
+    items: dict[int, MissionItem] = field(default_factory=dict)
+    checked: int = 0  # items 0..checked-1 are there and have been checked
+    progress_at: float = 0.0
+    requested_at: float = 0.0
+    request_due: float = 0.0
+    patience_s: float = _FIRST_PATIENCE_S
+    round_trip_s: float | None = None
+    repeated: bool = False  # the present request went out more than once: its answer measures nothing
+
+
+@dataclass(frozen=True, slots=True)
+class _Answered:
+    """The last final answer to a ground station, for the items that it repeats."""
+
+    ack: MissionResult
+    count: int
+    until: float
+    refused: bool
+
+
+class MissionUploads:
+    """All ground stations' uploads and clears. Time is passed in; messages go out through `post`."""
+
+    def __init__(
+        self,
+        desk: MissionDesk,
+        runner: Runner,
+        post: Post,
+        journal: Journal,
+        fallback_home: Callable[[], tuple[int, int] | None],
+    ) -> None:
+        self._desk = desk
+        self._runner = runner
+        self._post = post
+        self._journal = journal
+        self._fallback_home = fallback_home
+        self._transfer: _Transfer | None = None
+        self._answered: dict[Station, _Answered] = {}
+        self._queued: tuple[Station, int] | None = None
+
+    @property
+    def phase(self) -> Phase | None:
+        """Where the present transfer stands; None if there is none."""
+        return None if self._transfer is None else self._transfer.phase
+
+    def count(self, station: Station, count: int, mission_type: int, now: float) -> None:
+        """MISSION_COUNT: a transfer is announced."""
+        if mission_type != MISSION_TYPE_MISSION:
+            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
+            return
+        present = self._transfer
+        if present is not None and present.station == station:
+            if present.phase is Phase.DELIVERING:
+                # The list before is being written: what is proven first, then the new one.
+                self._queued = (station, count)
+                return
+            if count == 0:
+                # Mission Planner's Cancel button. The pilot did not ask to lose the mission that is in the craft.
+                self._cancel(now, "cancelled by the ground station")
+                return
+            if count == present.count and not present.items:
+                if present.phase is Phase.RECEIVING:
+                    self._request(present, now)
+                return
+            self._end(now)
+        self._answered.pop(station, None)
+        refusal = self._desk.acquire(station)
+        if refusal is not None:
+            self._refuse(station, count, refusal, now)
+            return
+        if count == 0:
+            self._deliver(_Transfer(station, 0), check_list((), RuleProfile()), (), now)
+            return
+        transfer = _Transfer(station, count)
+        self._transfer = transfer
+        self._runner.start(self._desk.preflight(), lambda answer, at: self._asked(transfer, answer, at), now)
+
+    def clear_all(self, station: Station, mission_type: int, now: float) -> None:
+        """MISSION_CLEAR_ALL."""
+        if mission_type not in (MISSION_TYPE_MISSION, MISSION_TYPE_ALL):
+            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
+            return
+        present = self._transfer
+        if present is not None and present.station == station and present.phase is not Phase.DELIVERING:
+            self._end(now)
+        self.count(station, 0, MISSION_TYPE_MISSION, now)
+
+    def item(self, station: Station, item: MissionItem, mission_type: int, now: float) -> None:
+        """MISSION_ITEM or MISSION_ITEM_INT."""
+        if mission_type != MISSION_TYPE_MISSION:
+            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
+            return
+        transfer = self._transfer
+        if transfer is None or transfer.station != station:
+            self._late_item(station, item.seq, now)
+            return
+        if transfer.phase is not Phase.RECEIVING:
+            # Its answer is on the way: the final ack, or nothing.
+            return
+        if item.seq >= transfer.count:
+            self._post.say(Severity.ERROR, f"WP {item.seq} is beyond the {transfer.count} items that were announced")
+            self._ack(station, MissionResult.INVALID_SEQUENCE)
+            return
+        assert transfer.check is not None
+        if item.seq not in transfer.items:
+            self._measure(transfer, item.seq, now)
+            transfer.items[item.seq] = item
+            transfer.progress_at = now
+            while transfer.checked in transfer.items:
+                rejection = transfer.check.take(transfer.items[transfer.checked])
+                if rejection is not None:
+                    self._reject(transfer, now)
+                    return
+                transfer.checked += 1
+        if transfer.checked < transfer.count:
+            self._request(transfer, now)
+            return
+        items = tuple(transfer.items[seq] for seq in range(transfer.count))
+        self._deliver(transfer, transfer.check.finish(), items, now)
+
+    def partial_list(self, station: Station, now: float) -> None:
+        """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
+        answered = self._recent(station, now)
+        if answered is not None and answered.refused:
+            self._ack(station, answered.ack)
+            return
+        self._post.say(Severity.ERROR, "A mission can only be written as a whole")
+        self._ack(station, MissionResult.UNSUPPORTED)
+
+    def ack(self, station: Station, result: int, now: float) -> None:
+        """MISSION_ACK from a ground station: an error cancels its transfer."""
+        transfer = self._transfer
+        if transfer is None or transfer.station != station or result == MissionResult.ACCEPTED:
+            return
+        if transfer.phase is not Phase.DELIVERING:
+            self._cancel(now, f"cancelled by the ground station (result {result})")
+
+    def armed(self, now: float) -> None:
+        """The craft was armed: a transfer that is not yet with the flight controller ends."""
+        transfer = self._transfer
+        if transfer is not None and transfer.phase is not Phase.DELIVERING:
+            self._abandon(transfer, ARMED, now)
+
+    def link_lost(self, now: float) -> None:
+        """The flight controller is gone: so is the reason to go on receiving."""
+        transfer = self._transfer
+        if transfer is not None and transfer.phase is Phase.RECEIVING:
+            refusal = Refusal(MissionResult.DENIED, "Flight controller lost during the upload")
+            self._abandon(transfer, refusal, now)
+
+    def tick(self, now: float) -> None:
+        """Repeat a request, or give a silent ground station up."""
+        transfer = self._transfer
+        if transfer is None or transfer.phase is not Phase.RECEIVING:
+            return
+        if now - transfer.progress_at >= _GIVE_UP_S:
+            self._cancel(now, f"no item came for {_GIVE_UP_S:.0f} s")
+        elif now >= transfer.request_due:
+            transfer.patience_s = min(transfer.patience_s * 2, _MAX_PATIENCE_S)
+            self._request(transfer, now)
+
+    def next_deadline(self) -> float | None:
+        """Return when `tick` has something to do."""
+        transfer = self._transfer
+        if transfer is None or transfer.phase is not Phase.RECEIVING:
+            return None
+        return min(transfer.request_due, transfer.progress_at + _GIVE_UP_S)
+
+    def _asked(self, transfer: _Transfer, answer: StoreReport | Refusal, now: float) -> None:
+        if self._transfer is not transfer:
+            return
+        if isinstance(answer, Refusal):
+            self._abandon(transfer, answer, now)
+            return
+        rejection = check_count(transfer.count, answer.profile)
+        if rejection is not None:
+            self._abandon(transfer, Refusal(rejection.ack, rejection.finding.text()), now)
+            return
+        transfer.check = MissionCheck(answer.profile, transfer.count, self._fallback_home())
+        transfer.phase = Phase.RECEIVING
+        transfer.progress_at = now
+        self._journal("info", "mission.upload_started", station=str(transfer.station), count=transfer.count)
+        self._request(transfer, now)
+
+    def _request(self, transfer: _Transfer, now: float) -> None:
+        """Ask for the lowest missing item; id 40, the only one that Mission Planner understands in both modes."""
+        transfer.repeated = transfer.requested_at > transfer.progress_at
+        transfer.requested_at = now
+        transfer.request_due = now + transfer.patience_s
+        station = transfer.station
+        self._post.to(
+            station,
+            messages.MAVLink_mission_request_message(
+                station.sysid, station.compid, transfer.checked, MISSION_TYPE_MISSION
+            ),
+        )
+
+    def _measure(self, transfer: _Transfer, seq: int, now: float) -> None:
+        """Adapt the patience to the round trip; an answer to a repeated request tells nothing."""
+        if seq != transfer.checked or transfer.repeated:
+            return
+        measured = now - transfer.requested_at
+        old = measured if transfer.round_trip_s is None else transfer.round_trip_s
+        transfer.round_trip_s = old * 7 / 8 + measured / 8
+        transfer.patience_s = min(max(2 * transfer.round_trip_s, _FIRST_PATIENCE_S), _MAX_PATIENCE_S)
+
+    def _late_item(self, station: Station, seq: int, now: float) -> None:
+        answered = self._recent(station, now)
+        if answered is None:
+            return
+        if answered.refused or seq == answered.count - 1:
+            self._ack(station, answered.ack)
+
+    def _recent(self, station: Station, now: float) -> _Answered | None:
+        answered = self._answered.get(station)
+        if answered is not None and now > answered.until:
+            del self._answered[station]
+            return None
+        return answered
+
+    def _reject(self, transfer: _Transfer, now: float) -> None:
+        assert transfer.check is not None
+        items = tuple(transfer.items[seq] for seq in sorted(transfer.items))
+        self._deliver(transfer, transfer.check.finish(), items, now)
+
+    def _deliver(self, transfer: _Transfer, verdict: Verdict, items: tuple[MissionItem, ...], now: float) -> None:
+        self._transfer = transfer
+        transfer.phase = Phase.DELIVERING
+        self._tell(verdict.findings)
+        arrived = ArrivedMission(str(transfer.station), items, verdict)
+        self._runner.start(
+            self._desk.deliver(arrived, _ignore),
+            lambda delivery, at: self._delivered(transfer, delivery, at),
+            now,
+        )
+
+    def _tell(self, findings: tuple[Finding, ...]) -> None:
+        for finding in findings:
+            self._post.say(Severity.NOTICE, finding.text())
+
+    def _delivered(self, transfer: _Transfer, delivery: Delivery, now: float) -> None:
+        accepted = delivery.ack is MissionResult.ACCEPTED
+        self._post.say(Severity.INFO if accepted else Severity.ERROR, delivery.text)
+        if delivery.number is None:
+            self._post.say(Severity.WARNING, "The mission could not be stored on the Pi")
+        self._answer(transfer.station, transfer.count, delivery.ack, now)
+        self._journal(
+            "info" if accepted else "warning",
+            "mission.upload_ended",
+            station=str(transfer.station),
+            mission=delivery.number,
+            ack=delivery.ack.name,
+            detail=delivery.text,
+        )
+        self._end(now)
+
+    def _cancel(self, now: float, why: str) -> None:
+        assert self._transfer is not None
+        refusal = Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}; old mission kept")
+        self._abandon(self._transfer, refusal, now)
+
+    def _abandon(self, transfer: _Transfer, refusal: Refusal, now: float) -> None:
+        """End a transfer before it was delivered; what came of it is stored all the same."""
+        if transfer.items:
+            items = tuple(transfer.items[seq] for seq in sorted(transfer.items))
+            finding = Finding(None, "list", len(items), None, refusal.text)
+            verdict = Verdict(Result.REJECTED, refusal.ack, (), (), (finding,), {})
+            arrived = ArrivedMission(str(transfer.station), items, verdict)
+            self._runner.start(self._desk.deliver(arrived, _ignore), lambda _delivery, _at: None, now)
+        self._end(now)
+        self._refuse(transfer.station, transfer.count, refusal, now)
+
+    def _refuse(self, station: Station, count: int, refusal: Refusal, now: float) -> None:
+        self._post.say(Severity.ERROR, refusal.text)
+        self._answer(station, count, refusal.ack, now)
+        self._journal("warning", "mission.refused", station=str(station), ack=refusal.ack.name, why=refusal.text)
+
+    def _answer(self, station: Station, count: int, ack: MissionResult, now: float) -> None:
+        refused = ack is not MissionResult.ACCEPTED
+        self._answered[station] = _Answered(ack, count, now + _MEMORY_S, refused)
+        self._ack(station, ack)
+
+    def _ack(self, station: Station, ack: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
+        self._post.to(
+            station,
+            messages.MAVLink_mission_ack_message(station.sysid, station.compid, ack, mission_type),
+        )
+
+    def _end(self, now: float) -> None:
+        """Forget the transfer and free the desk."""
+        if self._transfer is not None:
+            self._desk.release(self._transfer.station)
+            self._transfer = None
+        if self._queued is not None:
+            (station, count), self._queued = self._queued, None
+            self.count(station, count, MISSION_TYPE_MISSION, now)
+
+
+def _ignore(_records: int) -> None:
+    """Progress matters to nobody here: MAVLink has no message for it."""

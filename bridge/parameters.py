@@ -1,0 +1,74 @@
+"""The short list of parameters that ground stations need to see (https://mavlink.io/en/services/parameter.html)."""
+
+import math
+
+from bridge.mission_desk import MissionDesk
+from bridge.runner import Runner
+from bridge.station import Post, Severity, Station
+from protocols.mavlink.dialect import Message, messages
+from protocols.msp.mission import MAX_RADIUS_CM
+
+_REAL32 = 9
+#: Mission Planner's name for the radius in its plan screen; the unit that goes with this name is cm.
+WP_RADIUS = "WPNAV_RADIUS"
+SYSID = "SYSID_THISMAV"
+
+
+class Parameters:
+    """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET. Values are REAL32."""
+
+    def __init__(self, desk: MissionDesk, runner: Runner, post: Post, sysid: int) -> None:
+        self._desk = desk
+        self._runner = runner
+        self._post = post
+        self._sysid = sysid
+
+    def send_all(self, station: Station) -> None:
+        """PARAM_REQUEST_LIST."""
+        for name in self._values():
+            self._send(station, name)
+
+    def send_one(self, station: Station, name: str, index: int) -> None:
+        """PARAM_REQUEST_READ: by index, or by name where index is -1."""
+        names = list(self._values())
+        if index >= 0:
+            name = names[index] if index < len(names) else ""
+        self._send(station, name)
+
+    def set(self, station: Station, name: str, value: float, now: float) -> None:
+        """PARAM_SET: answered by the value that is in force then, as the protocol wants."""
+        dialect = self._desk.dialect
+        if name != WP_RADIUS or dialect is None or value == dialect.wp_radius_cm:
+            # An equal value is not written: the board's whole configuration would be erased for it.
+            self._send(station, name)
+            return
+        if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
+            self._post.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm")
+            self._send(station, name)
+            return
+
+        def done(radius_cm: int | None, _at: float) -> None:
+            if radius_cm is None:
+                self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer")
+            elif radius_cm != int(value):
+                self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: disarm first")
+            self._send(station, name)
+
+        self._runner.start(dialect.set_wp_radius(int(value)), done, now)
+
+    def _values(self) -> dict[str, float]:
+        values = {SYSID: float(self._sysid)}
+        if self._desk.dialect is not None:
+            values[WP_RADIUS] = float(self._desk.dialect.wp_radius_cm)
+        return values
+
+    def _send(self, station: Station, name: str) -> None:
+        values = self._values()
+        if name in values:
+            self._post.to(station, self._message(values, name))
+
+    @staticmethod
+    def _message(values: dict[str, float], name: str) -> Message:
+        return messages.MAVLink_param_value_message(
+            name.encode(), values[name], _REAL32, len(values), list(values).index(name)
+        )

@@ -1,0 +1,119 @@
+"""Procedures: conversations with the flight controller and the store, written top to bottom without any I/O.
+
+A procedure is a generator. It yields one effect at a time and is sent the effect's answer; `bridge.runner.Runner`
+carries the effects out. When the link to the flight controller goes down, LinkLost is raised at the `yield`.
+"""
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from bridge.mission_log import ArrivedMission, Conclusion
+from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
+from protocols.wp_record import ListIdentity
+
+
+class LinkLost(Exception):
+    """The flight controller is not reachable (any more)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Send a request frame. `reply_size` is the whole reply's size in bytes, for the bound on outstanding replies.
+
+    While an `exclusive` request is unanswered nothing else is sent: the flight controller may be writing flash.
+    """
+
+    frame: bytes
+    command: int
+    reply_size: int
+    exclusive: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Receive:
+    """Wait for the next reply to one of `commands`. Answer: the frame, or None on time-out."""
+
+    commands: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Wait. Answer: None."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Save:
+    """Store a mission that came in. Answer: its number, or None if it could not be stored."""
+
+    mission: ArrivedMission
+
+
+@dataclass(frozen=True, slots=True)
+class Conclude:
+    """Store what became of mission `number`. Answer: whether that worked."""
+
+    number: int
+    conclusion: Conclusion
+
+
+@dataclass(frozen=True, slots=True)
+class Recall:
+    """Look up how the ROIs of a stored list were sent. Answer: record number -> MAV_CMD number."""
+
+    identity: ListIdentity
+
+
+Effect = Send | Receive | Pause | Save | Conclude | Recall
+StoreEffect = Save | Conclude | Recall
+
+T = TypeVar("T")
+Procedure = Generator[Effect, Any, T]
+
+
+def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = False) -> Procedure[None]:
+    """Send a request whose reply has `reply_payload` payload bytes."""
+    yield Send(frame, command, reply_payload + FRAME_OVERHEAD, exclusive)
+
+
+def receive(*commands: int) -> Procedure[MspFrame | None]:
+    """Wait for a reply to one of `commands`; None on time-out."""
+    answer: MspFrame | None = yield Receive(frozenset(commands))
+    return answer
+
+
+def ask(
+    frame: bytes, command: int, reply_payload: int, *, tries: int = 3, exclusive: bool = False
+) -> Procedure[MspFrame | None]:
+    """Send a request and wait for its reply, repeating it; None if no try was answered."""
+    for _ in range(tries):
+        yield from send(frame, command, reply_payload, exclusive=exclusive)
+        reply = yield from receive(command)
+        if reply is not None:
+            return reply
+    return None
+
+
+def pause(seconds: float) -> Procedure[None]:
+    """Wait."""
+    yield Pause(seconds)
+
+
+def save(mission: ArrivedMission) -> Procedure[int | None]:
+    """Store a mission that came in; its number, or None if the store failed."""
+    number: int | None = yield Save(mission)
+    return number
+
+
+def conclude(number: int, conclusion: Conclusion) -> Procedure[bool]:
+    """Store what became of a mission; whether that worked."""
+    done: bool = yield Conclude(number, conclusion)
+    return done
+
+
+def recall(identity: ListIdentity) -> Procedure[Mapping[int, int]]:
+    """Return the ROI commands, by record number, with which the list was sent; empty if unknown."""
+    commands: Mapping[int, int] = yield Recall(identity)
+    return commands

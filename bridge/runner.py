@@ -1,0 +1,116 @@
+"""Carries out procedures, one at a time: two conversations about missions never mix on the wire."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from bridge.msp_link import MspLink
+from bridge.procedure import Conclude, LinkLost, Pause, Procedure, Recall, Receive, Save, Send, StoreEffect
+from protocols.msp.frame import MspFrame
+
+
+class Runner:
+    """Runs procedures in the order in which they were started. Time is passed in.
+
+    `on_store` is called with each effect that is meant for the store; its answer comes back by `store_answered`.
+    """
+
+    def __init__(self, on_store: Callable[[StoreEffect], None]) -> None:
+        self._on_store = on_store
+        self._link: MspLink | None = None
+        self._queue: deque[tuple[Procedure[Any], Callable[[Any, float], None]]] = deque()
+        self._current: tuple[Procedure[Any], Callable[[Any, float], None]] | None = None
+        self._awaited: Receive | Pause | StoreEffect | None = None
+        self._deadline: float | None = None
+        self._busy = False
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a procedure is under way."""
+        return self._current is not None
+
+    def start(self, procedure: Procedure[Any], on_done: Callable[[Any, float], None], now: float) -> None:
+        """Queue a procedure; `on_done` gets its result (None if LinkLost ended it) and the time."""
+        self._queue.append((procedure, on_done))
+        self._begin_next(now)
+
+    def link_up(self, link: MspLink) -> None:
+        """Use this link from now on."""
+        self._link = link
+
+    def link_down(self, now: float) -> None:
+        """Tell the running procedure that its partner is gone."""
+        self._link = None
+        if isinstance(self._awaited, Receive | Pause):
+            self._advance(LinkLost("the flight controller's port is gone"), now)
+
+    def received(self, frame: MspFrame, now: float) -> None:
+        """Take a reply from the flight controller; the running procedure gets it if it waits for it."""
+        if isinstance(self._awaited, Receive) and frame.command in self._awaited.commands:
+            self._advance(frame, now)
+
+    def store_answered(self, answer: object, now: float) -> None:
+        """Take the store's answer to the effect that was handed out last."""
+        if isinstance(self._awaited, Save | Conclude | Recall):
+            self._advance(answer, now)
+
+    def tick(self, now: float) -> None:
+        """End waits whose time is over."""
+        if self._deadline is None or now < self._deadline:
+            return
+        if isinstance(self._awaited, Receive) and self._link is not None:
+            # The link may have sent the request later than it was handed over, or heard others meanwhile.
+            deadline = self._link.reply_deadline(self._awaited.commands, now)
+            if now < deadline:
+                self._deadline = deadline
+                return
+        self._advance(None, now)
+
+    def next_deadline(self) -> float | None:
+        """Return when `tick` has something to do."""
+        return self._deadline
+
+    def _begin_next(self, now: float) -> None:
+        if self._current is None and self._queue and not self._busy:
+            self._current = self._queue.popleft()
+            self._advance(None, now)
+
+    def _advance(self, answer: object, now: float) -> None:
+        """Run the current procedure up to its next wait."""
+        assert self._current is not None
+        procedure, on_done = self._current
+        self._awaited = None
+        self._deadline = None
+        try:
+            while True:
+                lost = isinstance(answer, LinkLost)
+                effect = procedure.throw(answer) if lost else procedure.send(answer)
+                answer = None
+                if isinstance(effect, Send | Receive) and self._link is None:
+                    answer = LinkLost("there is no link to the flight controller")
+                elif isinstance(effect, Send):
+                    assert self._link is not None
+                    self._link.send(effect, now)
+                elif isinstance(effect, Receive):
+                    assert self._link is not None
+                    self._awaited = effect
+                    self._deadline = self._link.reply_deadline(effect.commands, now)
+                    return
+                elif isinstance(effect, Pause):
+                    self._awaited = effect
+                    self._deadline = now + effect.seconds
+                    return
+                else:
+                    self._awaited = effect
+                    self._on_store(effect)
+                    return
+        except StopIteration as stop:
+            result = stop.value
+        except LinkLost:
+            result = None
+        self._current = None
+        # What on_done starts is run after it has returned, so that it sees a consistent state.
+        self._busy = True
+        on_done(result, now)
+        self._busy = False
+        self._begin_next(now)

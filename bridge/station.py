@@ -1,0 +1,50 @@
+"""Ground stations, and how the bridge speaks to them."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+from protocols.mavlink.dialect import Message
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """The other end of a link: a UDP address or a TCP connection. `key` is the service's own handle."""
+
+    link: str
+    key: Hashable
+
+    def __str__(self) -> str:
+        return f"{self.link} {self.key}"
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A ground station: who speaks (sysid, compid), and from where."""
+
+    peer: Peer
+    sysid: int
+    compid: int
+
+    def __str__(self) -> str:
+        return f"{self.peer} sysid {self.sysid} compid {self.compid}"
+
+
+class Severity(IntEnum):
+    """MAV_SEVERITY."""
+
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+
+
+class Post(Protocol):
+    """Sends messages to ground stations."""
+
+    def to(self, station: Station, message: Message) -> None:
+        """Send to one ground station."""
+
+    def say(self, severity: Severity, text: str) -> None:
+        """Show a text on every ground station (STATUSTEXT)."""

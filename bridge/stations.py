@@ -1,0 +1,51 @@
+"""Which ground stations are there, and in which MAVLink version each is spoken to."""
+
+from dataclasses import dataclass
+
+from bridge.station import Peer
+
+#: A UDP peer that is silent for so long has left; its TCP kind is ended by its connection.
+EXPIRY_S = 60.0
+
+
+@dataclass(slots=True)
+class _Known:
+    version: int
+    heard_at: float
+
+
+class Stations:
+    """The peers that were heard. A peer is answered in the version that it speaks; MAVLink 2 once it showed it."""
+
+    def __init__(self) -> None:
+        self._known: dict[Peer, _Known] = {}
+
+    def heard(self, peer: Peer, version: int, now: float) -> bool:
+        """Note a frame from `peer`; True if the peer is new."""
+        known = self._known.get(peer)
+        if known is None:
+            self._known[peer] = _Known(version, now)
+            return True
+        known.heard_at = now
+        known.version = max(known.version, version)
+        return False
+
+    def version(self, peer: Peer) -> int:
+        """Return the MAVLink version in which to answer."""
+        known = self._known.get(peer)
+        return 2 if known is None else known.version
+
+    def gone(self, peer: Peer) -> None:
+        """The peer's connection is closed."""
+        self._known.pop(peer, None)
+
+    def expire(self, now: float) -> list[Peer]:
+        """Forget peers that fell silent, and return them."""
+        silent = [peer for peer, known in self._known.items() if now - known.heard_at > EXPIRY_S]
+        for peer in silent:
+            del self._known[peer]
+        return silent
+
+    def peers(self) -> list[Peer]:
+        """Return all peers that are there."""
+        return list(self._known)

@@ -1,0 +1,22 @@
+"""The MAVLink dialect: pymavlink's generated message classes, and the facts that framing needs from them.
+
+ardupilotmega is the dialect because ground stations take the vehicle for an ArduCopter: they ask it
+AUTOPILOT_VERSION_REQUEST, for instance.
+"""
+
+import os
+
+# pymavlink reads this at import time; its v20 classes can still pack MAVLink 1 frames.
+os.environ.setdefault("MAVLINK20", "1")
+
+from typing import Any, TypeAlias
+
+from pymavlink.dialects.v20 import ardupilotmega as messages
+
+#: CRC_EXTRA by message id, for every message of the dialect.
+CRC_EXTRA: dict[int, int] = {msgid: cls.crc_extra for msgid, cls in messages.mavlink_map.items()}
+
+#: A decoded or not yet packed message; pymavlink's classes carry no types of their own.
+Message: TypeAlias = Any
+
+__all__ = ["CRC_EXTRA", "Message", "messages"]

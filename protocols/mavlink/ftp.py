@@ -1,0 +1,21 @@
+"""MAVLink FTP is not offered; a request is refused at once so that nobody waits (https://mavlink.io/en/services/ftp.html)."""
+
+import struct
+from collections.abc import Sequence
+
+_HEADER = struct.Struct("<HBBBBBBI")
+_PAYLOAD_SIZE = 251
+_NAK = 129
+_UNKNOWN_COMMAND = 7
+
+
+def refuse(payload: Sequence[int]) -> list[int] | None:
+    """Return the payload of the refusal of a request's payload; None if that is no request."""
+    request = bytes(payload)
+    if len(request) < _HEADER.size:
+        return None
+    seq, session, opcode, *_ = _HEADER.unpack_from(request)
+    if opcode >= _NAK - 1:
+        return None
+    header = _HEADER.pack((seq + 1) & 0xFFFF, session, _NAK, 1, opcode, 0, 0, 0)
+    return list((header + bytes((_UNKNOWN_COMMAND,))).ljust(_PAYLOAD_SIZE, b"\0"))

@@ -1,0 +1,38 @@
+"""MissionItem to and from MISSION_ITEM and MISSION_ITEM_INT (https://mavlink.io/en/services/mission.html)."""
+
+from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import MissionItem, degrees_to_e7
+
+
+def item_from_float_message(message: Message) -> MissionItem:
+    """Read MISSION_ITEM: its coordinates are float degrees."""
+    return _item(message, degrees_to_e7(message.x), degrees_to_e7(message.y))
+
+
+def item_from_int_message(message: Message) -> MissionItem:
+    """Read MISSION_ITEM_INT: its coordinates are taken to the bit."""
+    return _item(message, message.x, message.y)
+
+
+def _item(message: Message, lat_e7: int | None, lon_e7: int | None) -> MissionItem:
+    return MissionItem(
+        seq=message.seq,
+        command=message.command,
+        frame=message.frame,
+        p1=message.param1,
+        p2=message.param2,
+        p3=message.param3,
+        p4=message.param4,
+        lat_e7=lat_e7,
+        lon_e7=lon_e7,
+        alt_m=message.z,
+    )
+
+
+def item_message(item: MissionItem, sysid: int, compid: int, *, as_int: bool) -> Message:
+    """Make the message for one item, addressed to a ground station."""
+    lat_e7, lon_e7 = item.lat_e7 or 0, item.lon_e7 or 0
+    make = messages.MAVLink_mission_item_int_message if as_int else messages.MAVLink_mission_item_message
+    x, y = (lat_e7, lon_e7) if as_int else (lat_e7 / 1e7, lon_e7 / 1e7)
+    params = (item.p1, item.p2, item.p3, item.p4)
+    return make(sysid, compid, item.seq, item.frame, item.command, 0, 1, *params, x, y, item.alt_m, 0)
