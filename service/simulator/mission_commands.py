@@ -202,9 +202,7 @@ class MissionCommands:
             return _RECORDS_HEADER.pack(Status.BAD_REQUEST, 0)
         if first >= self._slots.stored.count:
             return _RECORDS_HEADER.pack(Status.RANGE, first)
-        return _RECORDS_HEADER.pack(Status.OK, first) + self._slots.read(
-            first, min(count, self._options.read_records)
-        )
+        return _RECORDS_HEADER.pack(Status.OK, first) + self._slots.read(first, min(count, self._options.read_records))
 
     def _radius(self, body: bytes | None, now: float) -> Status:
         if body is None or len(body) != _RADIUS.size:

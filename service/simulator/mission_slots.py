@@ -45,9 +45,7 @@ class MissionSlots:
         """Find the newest valid slot, as at boot."""
         self.stored, self.writes = ListIdentity(0, 0), 0
         for slot in range(_SLOTS):
-            count, _, checksum, writes, magic = _HEADER.unpack(
-                self._flash.read(self._header(slot), _HEADER.size)
-            )
+            count, _, checksum, writes, magic = _HEADER.unpack(self._flash.read(self._header(slot), _HEADER.size))
             if magic == _MAGIC and count <= self._capacity and writes > self.writes:
                 identity = ListIdentity(count, checksum)
                 if self._checksum(slot, count) == checksum:

@@ -210,9 +210,7 @@ class MspAnswers:
                 number, lat, lon = _HOLD, flight.lat_e7, flight.lon_e7
             case _:
                 # The firmware announces 12 bytes, sends none, and closes with the checksum.
-                return b"$M>" + bytes(
-                    (_MALFORMED_WP_SIZE, HarakiriCommand.WP, _MALFORMED_WP_SIZE ^ HarakiriCommand.WP)
-                )
+                return b"$M>" + bytes((_MALFORMED_WP_SIZE, HarakiriCommand.WP, _MALFORMED_WP_SIZE ^ HarakiriCommand.WP))
         return reply(HarakiriCommand.WP, struct.pack("<BiiHB", number, lat, lon, 0, 0))
 
 

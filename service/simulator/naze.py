@@ -130,6 +130,10 @@ class SimulatedNaze:
             self._clock = now
             self._boot()
 
+    def power_on_booted(self, now: float) -> None:
+        """Supply the board as if long enough ago that it has booted by `now`."""
+        self.power_on(now - self.options.boot_ms / 1000)
+
     def power_off(self, now: float) -> None:
         """Cut the supply: RAM and everything under way is lost, flash stays as it is."""
         self._run_until(now)

@@ -17,14 +17,14 @@ class SimLink:
         self._pump: Pump | None = None
 
     async def start(self) -> socket.socket:
-        """Supply the board as if two seconds ago, so that it has booted; return the non-blocking far end.
+        """Supply the board, booted, and return the non-blocking far end, which is the caller's to close.
 
-        The far end is the caller's to close. Call again after `stop` for the port's return.
+        Call again after `stop` for the port's return: the board goes on as it was.
         """
         self._near, far = socket.socketpair()
         self._near.setblocking(False)
         far.setblocking(False)
-        self._naze.power_on(self._loop.time() - self._naze.options.boot_ms / 1000)
+        self._naze.power_on_booted(self._loop.time())
         self._pump = Pump(self._naze, self._near.fileno(), self._loop, on_hangup=self.stop)
         self._pump.start()
         return far

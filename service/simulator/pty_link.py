@@ -1,0 +1,73 @@
+"""A simulated Naze on a pseudo-terminal that looks like a serial port, speed included."""
+
+import asyncio
+import os
+import re
+import termios
+import tty
+from pathlib import Path
+
+from service.simulator.naze import SimulatedNaze
+from service.simulator.pump import Pump
+
+_BAUD_BY_CODE = {getattr(termios, name): int(name[1:]) for name in dir(termios) if re.fullmatch(r"B\d+", name)}
+_CODE_BY_BAUD = {baud: code for code, baud in _BAUD_BY_CODE.items()}
+_INPUT_SPEED, _OUTPUT_SPEED = 4, 5
+
+
+class PtyLink:
+    """The board's USB plug: `path` is a symbolic link to the terminal while it is plugged in.
+
+    A client that has set another speed than the board's gets and gives what a wire would make of it.
+    """
+
+    def __init__(self, naze: SimulatedNaze, path: Path, loop: asyncio.AbstractEventLoop) -> None:
+        self._naze = naze
+        self._path = path
+        self._loop = loop
+        self._pump: Pump | None = None
+        self._near = self._far = -1
+
+    def plug(self) -> None:
+        """Make the terminal and the link. OSError if `path` is in the way or cannot be made."""
+        if self._pump:
+            return
+        if self._path.is_symlink():
+            self._path.unlink()
+        self._near, self._far = os.openpty()
+        tty.setraw(self._far)
+        self._set_speed(self._naze.baud)
+        os.set_blocking(self._near, False)
+        try:
+            self._path.symlink_to(os.ttyname(self._far))
+        except OSError:
+            self._close()
+            raise
+        # Our own copy of the far end stays open: the terminal keeps its settings between two clients.
+        self._pump = Pump(self._naze, self._near, self._loop, far_baud=self._far_baud)
+        self._pump.start()
+
+    def unplug(self) -> None:
+        """Take the terminal away: a client that has it open sees it hung up. The board keeps its power."""
+        if self._pump:
+            self._pump.stop()
+            self._pump = None
+            self._path.unlink(missing_ok=True)
+            self._close()
+
+    def poke(self) -> None:
+        """Make a fault that was just switched count at once."""
+        if self._pump:
+            self._pump.poke()
+
+    def _close(self) -> None:
+        os.close(self._near)
+        os.close(self._far)
+
+    def _set_speed(self, baud: int) -> None:
+        attributes = termios.tcgetattr(self._far)
+        attributes[_INPUT_SPEED] = attributes[_OUTPUT_SPEED] = _CODE_BY_BAUD[baud]
+        termios.tcsetattr(self._far, termios.TCSANOW, attributes)
+
+    def _far_baud(self) -> int:
+        return _BAUD_BY_CODE.get(termios.tcgetattr(self._near)[_OUTPUT_SPEED], 0)
