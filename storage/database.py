@@ -6,12 +6,12 @@ nor deleted: it is kept aside under a name that `sqlite3` can still open, and a 
 
 import sqlite3
 import struct
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 
-from storage.store_error import StoreError, explained, primary_code
+from storage.store_error import FAILURES, StoreError, explained, primary_code
 
 # SQLite's companions of a database file. The log holds commits that are not in the main file yet.
 _LOG = "-wal"
@@ -55,7 +55,7 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
 def _connect(path: Path) -> sqlite3.Connection:
     # Transactions are begun and ended in our own words (isolation_level). One thread at a time uses the
     # connection, which the caller promises; it need not be the one that opened it. Only a curious person's
-    # program can hold a lock, and a ground station waits for us meanwhile: hence the short time-out (seconds).
+    # program can hold a lock, and a ground station waits meanwhile: hence the short time-out (seconds).
     connection = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
     connection.row_factory = sqlite3.Row
     # A rotten byte in one text must not hide all the other missions.
@@ -64,19 +64,20 @@ def _connect(path: Path) -> sqlite3.Connection:
 
 
 def _make_ready(connection: sqlite3.Connection, path: Path) -> bool:
-    """Make the connection ready for use, if every page and the log are sound; tell whether they are."""
+    """Prepare the connection if the log, every page and the schema are sound; tell whether they are."""
     if _log_was_lost(path):
         return False
     try:
-        # Reads every page. integrity_check would also look up every row in every index: slow, and no use to us.
+        # Reads every page. integrity_check would also look up every row in every index: slow, for little use.
         (finding,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-        if finding == "ok":
-            _prepare(connection, path)
-    except sqlite3.Error as error:
+        if finding != "ok":
+            return False
+        _prepare(connection, path)
+        return _has_our_schema(connection)
+    except FAILURES as error:
         if primary_code(error) in _DAMAGE:
             return False
         raise
-    return bool(finding == "ok")
 
 
 def _log_was_lost(path: Path) -> bool:
@@ -91,7 +92,7 @@ def _log_was_lost(path: Path) -> bool:
             header = file.read(_LOG_HEADER.size)
         if not any(header):
             return False
-        if path.stat().st_size == 0:
+        if path.stat().st_size <= 1:  # to SQLite one byte is nothing, too
             return True
     except OSError:
         return False  # no log; or SQLite will say better why it cannot be read
@@ -139,27 +140,41 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
     """Make commits durable and bring the file to this release's schema."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")  # NORMAL would lose the last commits in a power cut
-    connection.execute(
-        "BEGIN IMMEDIATE"
-    )  # a file that cannot be written is found now, not when a mission comes
-    connection.execute("ROLLBACK")
     (version,) = connection.execute("PRAGMA user_version").fetchone()
-    steps = _schema_steps()
-    if not 0 <= version <= len(steps):
+    # A file that may not be written is found now, not when a mission comes. Rolled back, it costs no space.
+    connection.executescript(f"BEGIN; PRAGMA user_version = {version}; ROLLBACK")
+    latest = len(_schema_steps())
+    if version > latest:
         raise StoreError(
             f"the mission store {path} is of a newer naze-bridge (schema {version}, this one knows "
-            f"{len(steps)}); install that release, or move the file away"
+            f"{latest}); install that release, or move the file away"
         )
-    for number, sql in enumerate(steps[version:], start=version + 1):
-        try:
-            connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nPRAGMA user_version = {number};\nCOMMIT;")
-        except sqlite3.Error:
-            if connection.in_transaction:
-                connection.execute("ROLLBACK")
-            raise
+    _apply_schema(connection, version)
 
 
 def _schema_steps() -> list[str]:
     """Return the schema files' text in the order of their numbers; step n makes version n of version n-1."""
     folder = resources.files("storage") / "schema"
     return [file.read_text() for file in sorted(folder.iterdir(), key=lambda file: file.name)]
+
+
+def _apply_schema(connection: sqlite3.Connection, version: int) -> None:
+    """Take the steps that a file of this version lacks, each in a transaction of its own."""
+    for number, sql in enumerate(_schema_steps()[version:], start=version + 1):
+        try:
+            connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nPRAGMA user_version = {number};\nCOMMIT;")
+        except FAILURES:
+            if connection.in_transaction:
+                connection.execute("ROLLBACK")
+            raise
+
+
+def _has_our_schema(connection: sqlite3.Connection) -> bool:
+    """Compare the schema with what its files make: quick_check lets a rotten column name pass."""
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as sample:
+        _apply_schema(sample, version=0)
+        expected, found = (
+            {(str(name), str(sql)) for name, sql in database.execute("SELECT name, sql FROM sqlite_schema")}
+            for database in (sample, connection)
+        )
+    return expected <= found  # a person may have added a view of their own

@@ -158,9 +158,7 @@ class MissionStore:
         if row is None:
             return None
         if _crc32(row[column] for column in _CONTENTS) != row["crc32"]:
-            raise StoreError(
-                f"mission {number} in {self._path} was damaged on the disk; the others can still be read"
-            )
+            raise StoreError(f"mission {number} in {self._path} was damaged on the disk; the others can still be read")
         received = ReceivedMission(
             received_at=row["received_at"],
             source=row["source"],

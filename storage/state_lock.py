@@ -37,8 +37,7 @@ class StateLock:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
             raise StoreError(
-                f"cannot use the state directory {self._directory}: {error.strerror}; "
-                f"name another with --state-dir"
+                f"cannot use the state directory {self._directory}: {error.strerror}; name another with --state-dir"
             ) from error
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -51,9 +50,7 @@ class StateLock:
                 f"stop that one, or name another directory with --state-dir"
             ) from error
         self._descriptor = descriptor
-        with contextlib.suppress(
-            OSError
-        ):  # the number is only for that sentence: a full disk must not stop us
+        with contextlib.suppress(OSError):  # the number is only for that sentence: a full disk must not stop us
             os.ftruncate(descriptor, 0)
             os.write(descriptor, f"{os.getpid()}\n".encode())
 

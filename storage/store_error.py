@@ -13,7 +13,7 @@ class StoreError(Exception):
 _REASONS = {
     sqlite3.SQLITE_FULL: "the disk is full; free some space",
     sqlite3.SQLITE_IOERR: "the disk is full or failing; look at df and dmesg",
-    sqlite3.SQLITE_READONLY: "it may not be written; look at its owner and mode, and at the mount",
+    sqlite3.SQLITE_READONLY: "it may not be written; look at its owner, mode and mount, or move it away",
     sqlite3.SQLITE_PERM: "it may not be opened; look at its owner and mode",
     sqlite3.SQLITE_CANTOPEN: "it cannot be opened or made; look at the directory's owner, mode and mount",
     sqlite3.SQLITE_BUSY: "another process keeps it locked; end that one",
@@ -22,10 +22,15 @@ _REASONS = {
 }
 
 
-def primary_code(error: sqlite3.Error) -> int | None:
-    """SQLite's primary result code; None if the error came from Python's own module."""
-    code = getattr(error, "sqlite_errorcode", None)
-    return None if code is None else code & 0xFF
+# What the sqlite3 module raises; the second where it cannot read SQLite's own complaint about rotten names.
+FAILURES = (sqlite3.Error, UnicodeDecodeError)
+
+
+def primary_code(error: Exception) -> int:
+    """Return the primary result code of one of FAILURES; SQLITE_MISUSE if it is of Python's own making."""
+    if isinstance(error, UnicodeDecodeError):
+        return sqlite3.SQLITE_CORRUPT
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_MISUSE) & 0xFF
 
 
 @contextmanager
@@ -33,7 +38,6 @@ def explained(failure: str) -> Iterator[None]:
     """Turn what SQLite raises into a StoreError that starts with `failure`, e.g. "cannot open /x/y.db"."""
     try:
         yield
-    except sqlite3.Error as error:
-        code = primary_code(error)
-        reason = _REASONS.get(code) if code is not None else None
+    except FAILURES as error:
+        reason = _REASONS.get(primary_code(error))
         raise StoreError(f"{failure}: {reason} ({error})" if reason else f"{failure}: {error}") from error

@@ -1,0 +1,24 @@
+"""Missions for the storage tests."""
+
+import random
+import zlib
+
+from storage.mission_store import ReceivedMission
+
+
+def mission(tag: int, items: int = 3) -> ReceivedMission:
+    """A mission that differs from that of every other tag in every part."""
+    records = random.Random(tag).randbytes(16 * items)
+    return ReceivedMission(
+        received_at=1_700_000_000.25 + tag,
+        source=f"udp 192.168.4.2:{tag} sysid 255",
+        items=[{"seq": seq, "command": 16, "p1": float("inf"), "lat_e7": tag} for seq in range(items)],
+        verdict="ACCEPTED",
+        ack="MAV_MISSION_ACCEPTED",
+        findings=[{"seq": 1, "field": "p2", "was": tag, "becomes": 2, "why": "below gps_wp_radius"}],
+        stored_items=[{"seq": seq, "command": 16, "alt_m": tag} for seq in range(items)],
+        records=records,
+        record_count=items,
+        checksum=zlib.crc32(records),
+        roi_commands={tag: 201},
+    )

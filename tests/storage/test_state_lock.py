@@ -1,0 +1,93 @@
+"""One daemon on one state directory, whatever became of the last one."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from sample_missions import mission
+
+from storage.mission_store import open_store
+from storage.state_lock import StateLock
+from storage.store_error import StoreError
+
+DAEMON = """
+import sys
+from pathlib import Path
+from sample_missions import mission
+from storage.mission_store import StoreError, open_store
+from storage.state_lock import StateLock
+
+directory = Path(sys.argv[1])
+try:
+    with StateLock(directory), open_store(directory / "missions.db", now=0.0).store as store:
+        print(store.add(mission(1)), flush=True)
+        sys.stdin.read()
+except StoreError as error:
+    print(error, flush=True)
+"""
+
+
+def start(directory: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", DAEMON, str(directory)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": f"{Path(__file__).parents[2]}:{Path(__file__).parent}"},
+    )
+
+
+def said_by(daemon: subprocess.Popen[str]) -> str:
+    assert daemon.stdout is not None
+    return daemon.stdout.readline().strip()
+
+
+def test_the_second_daemon_is_told_who_the_first_is(tmp_path: Path) -> None:
+    directory = tmp_path / "state"
+    with start(directory) as first:
+        assert said_by(first) == "1"
+        with start(directory) as second:
+            assert said_by(second) == (
+                f"the state directory {directory} is in use by process {first.pid}; "
+                f"stop that one, or name another directory with --state-dir"
+            )
+        assert first.poll() is None
+        first.kill()
+    with start(directory) as third:  # the dead one's lock is no lock
+        assert said_by(third) == "2"
+    with StateLock(directory), open_store(directory / "missions.db", now=0.0).store as store:
+        assert [summary.number for summary in store.list(9)] == [2, 1]
+
+
+def test_of_many_that_start_at_once_one_gets_it(tmp_path: Path) -> None:
+    daemons = [start(tmp_path) for _ in range(5)]
+    said = [said_by(daemon) for daemon in daemons]
+    for daemon in daemons:
+        daemon.communicate()
+    assert sum(line == "1" for line in said) == 1
+    assert sum("is in use by" in line for line in said) == 4
+
+
+def test_it_can_be_released_and_held_again(tmp_path: Path) -> None:
+    lock = StateLock(tmp_path)
+    for _ in range(2):
+        with lock, pytest.raises(StoreError, match=f"in use by process {os.getpid()}"):
+            StateLock(tmp_path).acquire()
+    lock.release()
+
+
+def test_a_file_in_the_directorys_place(tmp_path: Path) -> None:
+    (tmp_path / "state").touch()
+    with pytest.raises(StoreError, match=r"cannot use the state directory .*/state: .*name another with --state-dir"):
+        StateLock(tmp_path / "state").acquire()
+
+
+def test_without_the_lock_two_writers_take_turns(tmp_path: Path) -> None:
+    """The lock is the rule, but a store shared against it still loses nothing."""
+    path = tmp_path / "missions.db"
+    with open_store(path, now=0.0).store as one, open_store(path, now=0.0).store as other:
+        numbers = [store.add(mission(tag)) for tag in range(10) for store in (one, other)]
+        assert numbers == list(range(1, 21))
+        assert one.list(99) == other.list(99)

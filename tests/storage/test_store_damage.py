@@ -1,0 +1,263 @@
+"""A damaged file never stops the daemon: it is kept aside whole, its name is told, and a new one works."""
+
+import random
+import sqlite3
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sample_missions import mission
+
+from storage.mission_store import MissionStore, StoreError, open_store
+
+NOW = 1_767_323_045.9  # 2026-01-02 03:04:05 UTC
+ASIDE = "missions.db.corrupt-20260102-030405"
+MISSIONS = 12
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store with MISSIONS missions, numbered from 1, closed in peace."""
+    path = tmp_path_factory.mktemp("sound") / "missions.db"
+    with open_store(path, NOW).store as store:
+        for tag in range(1, MISSIONS + 1):
+            store.conclude(store.add(mission(tag, items=40)), "VERIFIED", "", 1.0)
+    return path
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "missions.db"
+
+
+def assert_works(store: MissionStore) -> None:
+    number = store.add(mission(77))
+    stored = store.get(number)
+    assert stored is not None
+    assert stored.received == mission(77)
+
+
+def assert_nothing_false(store: MissionStore) -> None:
+    for number in range(1, MISSIONS + 1):
+        try:
+            stored = store.get(number)
+        except StoreError as error:
+            assert f"mission {number} " in str(error)  # noqa: PT017 - no error is as good
+        else:
+            if stored is not None:
+                assert stored.received.items == mission(number, items=40).items
+                assert stored.received.records == mission(number, items=40).records
+
+
+def assert_kept_aside(path: Path, damaged: bytes) -> None:
+    opened = open_store(path, NOW)
+    with opened.store as store:
+        assert opened.set_aside == path.with_name(ASIDE)
+        assert opened.set_aside.read_bytes() == damaged
+        assert store.list(9) == []
+        assert_works(store)
+
+
+@pytest.mark.parametrize("size", [2, 15, 16, 100, 511, 512, 513, 4096, 5000, 100_000])
+def test_random_bytes(path: Path, size: int) -> None:
+    damaged = random.Random(size).randbytes(size)
+    path.write_bytes(damaged)
+    assert_kept_aside(path, damaged)
+
+
+@pytest.mark.parametrize("size", [16, 99, 100, 512, 2048, 4095, 4096, 4097, 8192, 12_288, 20_480, 50_000])
+def test_a_file_cut_short(path: Path, sound: Path, size: int) -> None:
+    path.write_bytes(sound.read_bytes()[:size])
+    assert_kept_aside(path, sound.read_bytes()[:size])
+
+
+@pytest.mark.parametrize("content", [b"", b"S"])
+def test_an_empty_file_is_a_new_one(path: Path, content: bytes) -> None:
+    """To SQLite one byte is nothing, too."""
+    path.write_bytes(content)
+    opened = open_store(path, NOW)
+    with opened.store as store:
+        assert opened.set_aside is None
+        assert_works(store)
+
+
+def test_pages_overwritten_with_other_pages(path: Path, sound: Path) -> None:
+    """As a card's worn-out address table does it."""
+    content = sound.read_bytes()
+    pages = [content[at : at + 4096] for at in range(0, len(content), 4096)]
+    damaged = b"".join([pages[0], *pages[:0:-1]])
+    path.write_bytes(damaged)
+    assert_kept_aside(path, damaged)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    flips=st.lists(st.tuples(st.integers(0, 99) | st.integers(0, 1 << 30), st.integers(1, 255)), min_size=1, max_size=4)
+)
+def test_flipped_bits_are_noticed_or_harmless(
+    sound: Path, tmp_path_factory: pytest.TempPathFactory, flips: list[tuple[int, int]]
+) -> None:
+    """Whatever rots: the store opens or says why not, and a mission comes back as it was or not at all."""
+    path = tmp_path_factory.mktemp("flip") / "missions.db"
+    rotten = bytearray(sound.read_bytes())
+    for at, bits in flips:  # half of them hit the file's header
+        rotten[at % len(rotten)] ^= bits
+    path.write_bytes(rotten)
+    try:
+        opened = open_store(path, NOW)
+    except StoreError as error:
+        # The very bytes that say so were hit; a person reads what to do.
+        assert str(error).endswith("or move the file away") or "or move it away" in str(error)  # noqa: PT017
+        return
+    with opened.store as store:
+        store.list(99)
+        assert_nothing_false(store)
+        assert_works(store)
+
+
+@pytest.mark.parametrize("missing", [1, 2, 100, 3000])
+def test_an_end_cut_off_is_noticed_or_harmless(path: Path, sound: Path, missing: int) -> None:
+    """SQLite reads zeros there, which are a sound page's end as often as not."""
+    path.write_bytes(sound.read_bytes()[:-missing])
+    with open_store(path, NOW).store as store:
+        assert_nothing_false(store)
+        assert_works(store)
+
+
+def test_a_rotten_mission_does_not_hide_the_others(path: Path, sound: Path) -> None:
+    records = mission(3, items=40).records
+    assert sound.read_bytes().count(records[:160]) == 1
+    path.write_bytes(sound.read_bytes().replace(records[:160], b"?" + records[1:160]))
+    with open_store(path, NOW).store as store:
+        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
+            store.get(3)
+        assert len(store.list(99)) == MISSIONS
+        other = store.get(4)
+        assert other is not None
+        assert other.received == mission(4, items=40)
+
+
+def test_a_rotten_text_does_not_hide_the_list(path: Path, sound: Path) -> None:
+    source = mission(3).source.encode()
+    path.write_bytes(sound.read_bytes().replace(source, b"\xff" + source[1:]))
+    with open_store(path, NOW).store as store:
+        assert [summary.source[0] for summary in store.list(99) if summary.number == 3] == ["\ufffd"]
+
+
+@pytest.fixture
+def killed(path: Path, sound: Path) -> bytes:
+    """Leave what a kill -9 leaves, a main file and a log with commits of its own; return the log."""
+    path.write_bytes(sound.read_bytes())
+    store = open_store(path, NOW).store
+    store.add(mission(50))
+    store.add(mission(51))
+    main, log = path.read_bytes(), path.with_name("missions.db-wal").read_bytes()
+    store.close()
+    path.write_bytes(main)
+    path.with_name("missions.db-wal").write_bytes(log)
+    return log
+
+
+def test_a_sound_log_is_taken_up(path: Path, killed: bytes) -> None:
+    opened = open_store(path, NOW)
+    with opened.store as store:
+        assert opened.set_aside is None
+        assert len(store.list(99)) == MISSIONS + 2
+
+
+@pytest.mark.parametrize("bit", range(0, 32 * 8, 5))
+def test_a_log_with_a_damaged_head_is_not_thrown_away(path: Path, killed: bytes, bit: int) -> None:
+    """SQLite takes such a log for an old one and overwrites it: its commits would be gone without a word."""
+    log = bytearray(killed)
+    log[bit // 8] ^= 1 << bit % 8
+    path.with_name("missions.db-wal").write_bytes(log)
+    assert_kept_aside(path, path.read_bytes())
+    assert path.with_name(f"{ASIDE}-wal").read_bytes() == log
+
+
+def test_random_bytes_for_a_log(path: Path, killed: bytes) -> None:
+    log = random.Random(1).randbytes(30_000)
+    path.with_name("missions.db-wal").write_bytes(log)
+    assert_kept_aside(path, path.read_bytes())
+    assert path.with_name(f"{ASIDE}-wal").read_bytes() == log
+
+
+@pytest.mark.parametrize("remains", [None, b"", b"S"])
+def test_a_log_whose_main_file_is_gone_is_not_thrown_away(path: Path, killed: bytes, remains: bytes | None) -> None:
+    path.unlink()
+    if remains is not None:
+        path.write_bytes(remains)
+    assert_kept_aside(path, remains or b"")
+    assert path.with_name(f"{ASIDE}-wal").read_bytes() == killed
+
+
+def test_a_damaged_main_file_keeps_its_log(path: Path, killed: bytes) -> None:
+    # Not at its start: the log holds newer copies of the pages there.
+    damaged = path.read_bytes()[:30_000]
+    path.write_bytes(damaged)
+    assert_kept_aside(path, damaged)
+    assert path.with_name(f"{ASIDE}-wal").read_bytes() == killed
+
+
+def test_nothing_kept_aside_is_ever_overwritten(path: Path) -> None:
+    kept = []
+    for size in (10, 20, 30):
+        path.write_bytes(b"x" * size)
+        opened = open_store(path, NOW)
+        opened.store.close()
+        kept.append(opened.set_aside)
+    assert kept == [path.with_name(name) for name in (ASIDE, f"{ASIDE}-2", f"{ASIDE}-3")]
+    assert [file.stat().st_size for file in kept if file] == [10, 20, 30]
+
+
+def test_what_was_kept_aside_can_be_opened_for_rescue(path: Path, killed: bytes) -> None:
+    path.with_name("missions.db-wal").write_bytes(b"x" * len(killed))
+    opened = open_store(path, NOW)
+    opened.store.close()
+    assert opened.set_aside is not None
+    with open_store(opened.set_aside.with_name("rescued.db"), NOW).store as fresh:
+        assert fresh.list(1) == []
+    connection = sqlite3.connect(opened.set_aside)
+    assert connection.execute("SELECT count(*) FROM missions").fetchone() == (MISSIONS,)
+    connection.close()
+
+
+def test_a_file_of_another_program(path: Path) -> None:
+    """A sound database with a table of our name and no schema number is none of ours."""
+    connection = sqlite3.connect(path)
+    connection.execute("CREATE TABLE missions (something TEXT)")
+    connection.close()
+    opened = open_store(path, NOW)
+    with opened.store as store:
+        assert_works(store)
+    assert opened.set_aside == path.with_name(ASIDE)
+    connection = sqlite3.connect(opened.set_aside)
+    assert connection.execute("SELECT something FROM missions").fetchall() == []
+    connection.close()
+
+
+def test_a_rotten_column_name(path: Path, sound: Path) -> None:
+    """SQLite's own check does not mind."""
+    content = sound.read_bytes()
+    assert content.count(b"received_at   REAL") == 1
+    damaged = content.replace(b"received_at   REAL", b"receivef_at   REAL")
+    path.write_bytes(damaged)
+    assert_kept_aside(path, damaged)
+
+
+def test_a_schema_that_sqlite_cannot_even_complain_about(path: Path, sound: Path) -> None:
+    damaged = sound.read_bytes().replace(b"CREATE TABLE missions", b"CREATE TABLE \xffissions")
+    path.write_bytes(damaged)
+    assert_kept_aside(path, damaged)
+
+
+def test_a_view_of_ones_own_is_no_damage(path: Path, sound: Path) -> None:
+    path.write_bytes(sound.read_bytes())
+    connection = sqlite3.connect(path)
+    connection.execute("CREATE VIEW refused AS SELECT number FROM missions WHERE outcome = 'REFUSED'")
+    connection.close()
+    opened = open_store(path, NOW)
+    with opened.store as store:
+        assert opened.set_aside is None
+        assert len(store.list(99)) == MISSIONS

@@ -1,0 +1,116 @@
+"""What was acknowledged is there after a kill -9, and after a power cut that tore what was being written."""
+
+import random
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from sample_missions import mission
+
+from storage.mission_store import open_store
+
+# Adds and concludes as fast as it can, and says so only when the store has returned.
+WRITER = """
+import sys
+from pathlib import Path
+from sample_missions import mission
+from storage.mission_store import open_store
+
+store = open_store(Path(sys.argv[1]), now=0.0).store
+number = store.list(1)[0].number if store.list(1) else 0
+while True:
+    number = store.add(mission(number + 1, items=40))
+    print(number, "PENDING", flush=True)
+    store.conclude(number, "VERIFIED", f"answer {number}", float(number))
+    print(number, "VERIFIED", flush=True)
+"""
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, seed: int) -> None:
+    path = tmp_path / "missions.db"
+    chance = random.Random(seed)
+    acknowledged: dict[int, str] = {}
+    for _ in range(4):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path)],
+            stdout=subprocess.PIPE,
+            text=True,
+            env={"PYTHONPATH": f"{Path(__file__).parents[2]}:{Path(__file__).parent}"},
+        )
+        assert writer.stdout is not None
+        with writer, writer.stdout:
+            said = [writer.stdout.readline() for _ in range(chance.randrange(1, 120))]
+            time.sleep(chance.random() * 0.005)  # anywhere within the next write
+            writer.kill()
+            said += writer.stdout.readlines()
+        # A last line without its end was not said in full.
+        acknowledged.update((int(number), outcome) for number, outcome in map(str.split, filter(_whole, said)))
+
+        opened = open_store(path, now=0.0)
+        with opened.store as store:
+            assert opened.set_aside is None
+            for number, outcome in acknowledged.items():
+                stored = store.get(number)
+                assert stored is not None
+                assert stored.received == mission(number, items=40)
+                assert outcome == "PENDING" or stored.detail == f"answer {number}"
+            assert len(store.list(10_000)) <= len(acknowledged) + 4  # a round's last one may be there unsaid
+
+
+def _whole(line: str) -> bool:
+    return line.endswith("\n")
+
+
+def test_a_power_cut_tears_only_what_was_not_acknowledged(tmp_path: Path) -> None:
+    """After add() has returned, the log up to there is on the disk; of what follows, any part may be."""
+    path = tmp_path / "live" / "missions.db"
+    log = path.with_name("missions.db-wal")
+    chance = random.Random(5)
+    with open_store(path, now=0.0).store as store:
+        number = store.add(mission(1))
+        main, synced = path.read_bytes(), log.read_bytes()
+        store.add(mission(2, items=100))
+        rest = log.read_bytes()[len(synced) :]
+        assert path.read_bytes() == main  # no checkpoint in between, or this test would prove nothing
+    assert len(rest) > 4096
+    for trial in range(40):
+        torn = bytearray(rest[: chance.randrange(len(rest))])
+        for _ in range(chance.randrange(3)):  # sectors come in any order
+            hole = chance.randrange(0, max(len(torn), 1), 512)
+            torn[hole : hole + 512] = bytes(len(torn[hole : hole + 512]))
+        copy = tmp_path / f"cut{trial}" / "missions.db"
+        copy.parent.mkdir()
+        copy.write_bytes(main)
+        copy.with_name("missions.db-wal").write_bytes(synced + torn)
+        opened = open_store(copy, now=0.0)
+        with opened.store as store:
+            assert opened.set_aside is None
+            stored = store.get(number)
+            assert stored is not None
+            assert stored.received == mission(1)
+            assert store.add(mission(3)) > number
+        shutil.rmtree(copy.parent)
+
+
+@pytest.mark.parametrize("size", [0, 1, 31, 32, 4096])
+def test_a_power_cut_before_the_first_commit_is_no_damage(tmp_path: Path, size: int) -> None:
+    """A log that was made but never written: its bytes are zeros."""
+    path = tmp_path / "missions.db"
+    with open_store(path, now=0.0).store as store:
+        store.add(mission(1))
+    path.with_name("missions.db-wal").write_bytes(bytes(size))
+    opened = open_store(path, now=0.0)
+    with opened.store as store:
+        assert opened.set_aside is None
+        assert [summary.number for summary in store.list(9)] == [1]
+
+
+def test_commits_are_synced_to_the_disk(tmp_path: Path) -> None:
+    with open_store(tmp_path / "missions.db", now=0.0).store as store:
+        (journal,) = store._connection.execute("PRAGMA journal_mode").fetchone()
+        (synchronous,) = store._connection.execute("PRAGMA synchronous").fetchone()
+    assert (journal, synchronous) == ("wal", 2)

@@ -1,0 +1,148 @@
+"""Where nothing can be stored, one sentence says why, and what was stored before is still there."""
+
+import sqlite3
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from sample_missions import mission
+
+from storage.mission_store import StoreError, open_store
+
+
+def run(script: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", script, *arguments],
+        cwd=cwd,
+        env={"PYTHONPATH": f"{Path(__file__).parents[2]}:{Path(__file__).parent}"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+
+# A limit on the size of files is the full disk that needs no disk of its own.
+FULL_DISK = """
+import resource, signal, sys
+from pathlib import Path
+from sample_missions import mission
+from storage.mission_store import StoreError, open_store
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+_, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+store = open_store(Path(sys.argv[1]), now=0.0).store
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), most))
+numbers = []
+try:
+    while True:
+        numbers.append(store.add(mission(len(numbers) + 1, items=100)))
+except StoreError as error:
+    print(error)
+try:
+    while True:
+        store.conclude(numbers[0], "VERIFIED", "", 1.0)
+except StoreError as error:
+    print(error)
+print(len(store.list(10_000)))
+resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+store.conclude(store.add(mission(0)), "VERIFIED", "after", 1.0)
+print(len(numbers))
+"""
+
+
+@pytest.mark.parametrize("limit", [150_000, 400_001])
+def test_a_full_disk_is_told_and_costs_only_what_it_refused(tmp_path: Path, limit: int) -> None:
+    path = tmp_path / "missions.db"
+    add_error, conclude_error, listed, added = run(FULL_DISK, str(path), str(limit)).stdout.splitlines()
+    assert add_error.startswith(f"cannot store the mission in {path}: the disk is full")
+    assert conclude_error.startswith(f"cannot store the outcome of mission 1 in {path}: the disk is full")
+    count = int(added)
+    assert count > 2
+    assert int(listed) == count
+    opened = open_store(path, now=0.0)
+    with opened.store as store:
+        assert opened.set_aside is None
+        for number in range(1, count + 1):
+            stored = store.get(number)
+            assert stored is not None
+            assert stored.received == mission(number, items=100)
+        last = store.list(1)[0]
+        assert (last.outcome, last.detail) == ("VERIFIED", "after")
+
+
+# Root may write anywhere, so the one who tries is nobody.
+AS_NOBODY = """
+import os, sys
+from pathlib import Path
+from storage.mission_store import StoreError, open_store
+from storage.state_lock import StateLock
+
+if os.geteuid() == 0:
+    os.setgid(65534)
+    os.setuid(65534)
+try:
+    if sys.argv[1] == "lock":
+        StateLock(Path(".")).acquire()
+    else:
+        open_store(Path("missions.db"), now=0.0).store.close()
+except StoreError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("with_store", [False, True])
+def test_a_directory_that_may_not_be_written(with_store: bool) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        directory = Path(name)
+        if with_store:
+            with open_store(directory / "missions.db", now=0.0).store as store:
+                store.add(mission(1))
+            (directory / "missions.db").chmod(0o444)
+        directory.chmod(0o555)
+        said = run(AS_NOBODY, "store", cwd=directory).stdout
+        lock_said = run(AS_NOBODY, "lock", cwd=directory).stdout
+        directory.chmod(0o755)
+    assert said.startswith("cannot open the mission store missions.db: it ")
+    assert "look at" in said
+    assert lock_said.startswith("cannot use the state directory .: Permission denied")
+
+
+@pytest.mark.parametrize("path", ["/proc/naze-bridge/missions.db", "/dev/null/missions.db"])
+def test_a_directory_that_cannot_be_made(path: str) -> None:
+    with pytest.raises(StoreError, match=f"cannot open the mission store {path}: its directory cannot be made"):
+        open_store(Path(path), now=0.0)
+
+
+def test_a_directory_in_the_files_place(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"cannot open the mission store .*: it cannot be opened"):
+        open_store(tmp_path, now=0.0)
+
+
+def test_a_store_of_a_newer_release_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "missions.db"
+    with open_store(path, now=0.0).store as store:
+        store.add(mission(1))
+    connection = sqlite3.connect(path)
+    connection.execute("PRAGMA user_version = 4711")
+    connection.close()
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match=r"of a newer naze-bridge \(schema 4711, this one knows \d+\); install"):
+        open_store(path, now=0.0)
+    assert path.read_bytes() == before
+
+
+def test_another_program_holds_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "missions.db"
+    with open_store(path, now=0.0).store as store:
+        other = sqlite3.connect(path, isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(StoreError, match=r"cannot store the mission in .*: another process keeps it locked"):
+            store.add(mission(1))
+        assert store.list(9) == []  # reading goes on
+        with pytest.raises(StoreError, match="another process keeps it locked"):
+            open_store(path, now=0.0)
+        other.execute("ROLLBACK")
+        other.close()
+        assert store.add(mission(1)) == 1
