@@ -76,4 +76,5 @@ class MissionItem:
 
 def degrees_to_e7(degrees: float) -> int | None:
     """Round degrees to 1e-7 degrees; None if not a finite number (mission-rules.md, "Each item")."""
-    return round(degrees * 1e7) if math.isfinite(degrees) else None
+    scaled = degrees * 1e7  # may overflow to infinity on its own
+    return round(scaled) if math.isfinite(scaled) else None

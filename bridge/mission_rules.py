@@ -1,0 +1,121 @@
+"""What Harakiri can hold, command by command: the table of mission-rules.md ("Each item")."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from protocols.mission_item import Command
+from protocols.wp_record import WpCommand
+
+MAV_COMMANDS: Mapping[int, Command] = {
+    WpCommand.WAYPOINT: Command.NAV_WAYPOINT,
+    WpCommand.LOITER_UNLIM: Command.NAV_LOITER_UNLIM,
+    WpCommand.LOITER_TURNS: Command.NAV_LOITER_TURNS,
+    WpCommand.LOITER_TIME: Command.NAV_LOITER_TIME,
+    WpCommand.RETURN_TO_LAUNCH: Command.NAV_RETURN_TO_LAUNCH,
+    WpCommand.LAND: Command.NAV_LAND,
+    WpCommand.TAKEOFF: Command.NAV_TAKEOFF,
+    WpCommand.SETROI: Command.NAV_ROI,
+}
+ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
+
+_MAX_RADIUS_M = 255
+
+
+@dataclass(frozen=True, slots=True)
+class RuleProfile:
+    """What the rules need to know of the flight controller and the settings.
+
+    capacity: records it can hold, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: highest take-off.
+    """
+
+    capacity: int = 146
+    wp_radius_cm: int = 200
+    takeoff_max_m: int = 15
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """The whole numbers that a field can hold; `instead_of_zero` is stored where a 0 would mean nothing."""
+
+    low: int
+    high: int
+    why: str
+    instead_of_zero: int = 0
+
+    def fit(self, value: float) -> int:
+        """Truncate toward zero, then clamp; what is not a finite number counts as 0."""
+        whole = math.trunc(value) if math.isfinite(value) else 0
+        return min(max(whole, self.low), self.high) or self.instead_of_zero
+
+
+class Place(Enum):
+    """Where a command may stand, in the list as received and in what is kept of it."""
+
+    ANY = auto()
+    ITEM_1 = auto()
+    LAST = auto()
+    NOT_LAST = auto()
+
+
+UNUSED = Range(0, 0, "not used")
+BRAKE = Range(0, 1, "0 fast corner, 1 brake")
+TURNS = Range(-127, 127, "turns: -127..127, not 0", instead_of_zero=1)
+SECONDS = Range(1, 255, "seconds: 1..255")
+NOSE_ON_ROI = Range(0, 1, "1 = nose on the ROI")
+NO_ROI_KNOWN = Range(0, 0, "no ROI is known")
+CRUISE = Range(-32768, 32767, "0 is no flying height", instead_of_zero=2)
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRule:
+    """One row: what becomes of the fields of one command. param3 is 0 for every command.
+
+    position: needed, else the item is dropped; if False, latitude and longitude are stored as 0.
+    alone: False if the mission needs another command besides this one (and ROIs).
+    """
+
+    record: WpCommand
+    p1: Range
+    p2: Range
+    p4: Range
+    position: bool
+    height: Range
+    place: Place = Place.ANY
+    alone: bool = True
+
+    @property
+    def name(self) -> str:
+        """Return the command's name as Mission Planner's list has it."""
+        return "ROI" if self.record is WpCommand.SETROI else self.record.name
+
+    @property
+    def uses_height(self) -> bool:
+        """Tell whether the height that was sent matters."""
+        return self.height is not UNUSED
+
+
+def command_rules(profile: RuleProfile) -> Mapping[int, CommandRule]:
+    """Return the table: MAV_CMD number to rule; a command without a rule cannot be stored.
+
+    gps_wp_radius is rounded up to whole metres, so that no stored radius is smaller than it.
+    """
+    least = min(math.ceil(profile.wp_radius_cm / 100), _MAX_RADIUS_M)
+    radius = Range(least, _MAX_RADIUS_M, f"hit radius: {least}..{_MAX_RADIUS_M} m")
+    climb = Range(2, profile.takeoff_max_m, f"take-off: 2..{profile.takeoff_max_m} m")
+    # fmt: off
+    rows = (
+        #           record                      p1       p2      p4           position height  place           alone
+        CommandRule(WpCommand.WAYPOINT,         BRAKE,   radius, NOSE_ON_ROI, True,    CRUISE),
+        CommandRule(WpCommand.LOITER_UNLIM,     UNUSED,  radius, NOSE_ON_ROI, True,    CRUISE, Place.LAST),
+        CommandRule(WpCommand.LOITER_TURNS,     TURNS,   radius, UNUSED,      True,    CRUISE),
+        CommandRule(WpCommand.LOITER_TIME,      SECONDS, radius, NOSE_ON_ROI, True,    CRUISE),
+        CommandRule(WpCommand.RETURN_TO_LAUNCH, UNUSED,  UNUSED, UNUSED,      False,   CRUISE, Place.ANY,      False),
+        CommandRule(WpCommand.LAND,             UNUSED,  UNUSED, UNUSED,      False,   UNUSED, Place.LAST,     False),
+        CommandRule(WpCommand.TAKEOFF,          UNUSED,  UNUSED, UNUSED,      False,   climb,  Place.ITEM_1,   False),
+        CommandRule(WpCommand.SETROI,           UNUSED,  UNUSED, UNUSED,      True,    UNUSED, Place.NOT_LAST, False),
+    )
+    # fmt: on
+    rules: dict[int, CommandRule] = {MAV_COMMANDS[row.record]: row for row in rows}
+    return rules | dict.fromkeys(ROI_COMMANDS, rules[Command.NAV_ROI])
