@@ -130,7 +130,7 @@ class MissionStore:
                     PENDING,
                 ),
             ).lastrowid
-            assert number is not None  # noqa: S101 - an INSERT that did not raise has made a row
+            assert number is not None  # an INSERT that did not raise has made a row
             self._connection.execute(
                 "INSERT INTO mission_contents (number, items, findings, stored_items, roi_commands, records,"
                 " crc32) VALUES (?, ?, ?, ?, ?, ?, ?)",
