@@ -7,7 +7,7 @@ nominal time, so that a caller who comes late changes nothing but the moment at 
 import contextlib
 import random
 from enum import Enum, auto
-from math import ceil
+from math import ceil, inf
 
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.hazards import HAZARDS, RUN_LENGTH
@@ -20,7 +20,7 @@ from service.simulator.mission_commands import Board, MissionCommands
 from service.simulator.mission_slots import MissionSlots, StoredConfig, flash_size
 from service.simulator.msp_port import HarakiriCommand, MspAnswers, MspReceiver, reply
 from service.simulator.options import Counters, Faults, SimOptions, TelemetryProtocol
-from service.simulator.uart import Uart
+from service.simulator.uart import GATHER_SECONDS, Uart
 
 _AUTOSENSE_SECONDS = 4.0
 _SINGLE_STEPS = 3
@@ -119,10 +119,16 @@ class SimulatedNaze:
         return self._disturb(self._uart.transmitted(now))
 
     def next_wakeup(self, now: float) -> float:
-        """Tell when `advance` will next have something to do or to give; infinity if never by itself."""
+        """Tell when it is next worth calling `advance`; infinity if nothing will happen by itself.
+
+        Loops that run late are computed as if in time, so requests that follow each other closely are taken together.
+        """
         work = self._next_loop()
-        departure = self._uart.next_departure()
-        return max(now, min(at for at in (work, departure, float("inf")) if at is not None))
+        if work is None:
+            work = inf
+        elif self._uart.last_arrival() > work:
+            work = min(self._loop_at(self._uart.last_arrival()), work + GATHER_SECONDS)
+        return max(now, min(work, self._uart.next_departure() or inf))
 
     def power_on(self, now: float) -> None:
         """Supply the board; it boots."""
@@ -222,8 +228,12 @@ class SimulatedNaze:
         earliest = min((at for at in wanted if at is not None), default=None)
         if earliest is None:
             return None
-        idle_loops = ceil((earliest - self._next_tick) / self._looptime - 1e-6)
-        return self._next_tick + max(idle_loops, 0) * self._looptime
+        return self._loop_at(earliest)
+
+    def _loop_at(self, earliest: float) -> float:
+        """Tell when the first main loop at or after `earliest` runs."""
+        loops = ceil((earliest - self._next_tick) / self._looptime - 1e-6)
+        return self._next_tick + max(loops, 0) * self._looptime
 
     def _telemetry_due(self) -> float | None:
         """Tell when the firmware next sends, or changes its protocol, by itself."""

@@ -8,8 +8,8 @@ RING_SIZE = 256
 _BITS_PER_BYTE = 10
 # Times are seconds as floats: a byte that ends exactly now has ended.
 _EPSILON_BYTES = 1e-3
-# How long a finished frame may wait for the next one, so that a reader is not woken for each.
-_GATHER_SECONDS = 0.002
+#: How long a finished frame may wait for the next one, so that neither end is woken for each.
+GATHER_SECONDS = 0.004
 
 
 class Uart:
@@ -62,6 +62,10 @@ class Uart:
         if self._unread:
             return 0.0
         return self._wire[0][0] + self._byte_time if self._wire else None
+
+    def last_arrival(self) -> float:
+        """Tell when the last byte on the wire will be there."""
+        return self._wire_free_at
 
     def discard_unread(self, now: float) -> None:
         """Drop what arrived until `now` (the receiver was not running)."""
@@ -120,7 +124,7 @@ class Uart:
         """Tell when it is worth calling `transmitted`: at the end of a burst, or of one soon after it."""
         if not self._burst_ends:
             return None
-        latest = self._burst_ends[0] + _GATHER_SECONDS
+        latest = self._burst_ends[0] + GATHER_SECONDS
         return max(end for end in self._burst_ends if end <= latest)
 
     def _outstanding(self) -> int:
