@@ -1,1 +1,23 @@
 """Mission files as ground stations write them."""
+
+from protocols.mission_file.error import MissionFileError
+from protocols.mission_file.qgc_plan import read_qgc_plan
+from protocols.mission_file.qgc_wpl import read_qgc_wpl, write_qgc_wpl
+from protocols.mission_item import MissionItem
+
+__all__ = ["MissionFileError", "read_mission_file", "write_qgc_wpl"]
+
+
+def read_mission_file(data: bytes, name: str) -> list[MissionItem]:
+    """Read a QGC WPL 110 or a QGroundControl plan, told apart by what is in it; home is item 0.
+
+    MissionFileError says in one sentence what is wrong, where in the file called `name`, and what to do.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        remedy = "give a QGC WPL 110 (.waypoints) or a QGroundControl plan (.plan)"
+        raise MissionFileError(name, f"line {line}", "this is not text", remedy) from None
+    read = read_qgc_plan if text.lstrip().startswith("{") or name.lower().endswith(".plan") else read_qgc_wpl
+    return read(text, name)

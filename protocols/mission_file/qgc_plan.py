@@ -1,0 +1,114 @@
+"""QGroundControl's .plan (JSON; docs.qgroundcontrol.com, "Plan File Format"). Fence and rally points are passed over.
+
+An item's frame and params are what QGroundControl would send; its AltitudeMode only says how it arrived at them.
+Surveys and corridor scans carry the plain items they are flown as, and become those. The planned home position becomes
+item 0, as QGroundControl sends it to an ArduPilot vehicle.
+"""
+
+import json
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from protocols.mission_file.error import MissionFileError, shown
+from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
+
+_PARAM_COUNT = 7
+_SAVE_AGAIN = "save it again from QGroundControl"
+
+
+def read_qgc_plan(text: str, name: str) -> list[MissionItem]:
+    """Return the items, home first; MissionFileError names the file and the entry of mission.items, from 1."""
+    plan = _parse(text, name)
+    if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
+        what = 'this is no QGroundControl plan, its fileType is not "Plan"'
+        raise MissionFileError(name, "", what, _SAVE_AGAIN)
+    mission = plan.get("mission")
+    entries = mission.get("items") if isinstance(mission, dict) else None
+    if not isinstance(mission, dict) or not isinstance(entries, list):
+        raise MissionFileError(name, "", "the plan has no mission.items", _SAVE_AGAIN)
+    items = [_home(mission.get("plannedHomePosition"), name)]
+    for number, entry in enumerate(entries, start=1):
+        where = f"item {number}"
+        for simple in _simple_items(entry, name, where):
+            items.append(_item(simple, len(items), name, where))
+    return items
+
+
+def _parse(text: str, name: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        what = f"not valid JSON ({error.msg})"
+        raise MissionFileError(name, f"line {error.lineno}", what, _SAVE_AGAIN) from None
+    except (ValueError, RecursionError):  # a number of thousands of digits; thousands of brackets
+        raise MissionFileError(name, "", "no plan that QGroundControl could have written", _SAVE_AGAIN) from None
+
+
+def _home(position: Any, name: str) -> MissionItem:
+    """Make item 0. An unknown ground level (null) is 0; no position at all is for the rules to judge."""
+    where = "plannedHomePosition"
+    coordinates = position if position is not None else []
+    if not isinstance(coordinates, list) or len(coordinates) not in (0, 2, 3):
+        what = f"{shown(position)} where [latitude, longitude, altitude] must be"
+        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+    numbers = [_number(value, name, where) for value in coordinates]
+    lat, lon, alt_m = (*numbers, *[math.nan] * 3)[:3]
+    return MissionItem(
+        seq=0,
+        command=int(Command.NAV_WAYPOINT),
+        frame=int(Frame.GLOBAL),
+        p1=0.0,
+        p2=0.0,
+        p3=0.0,
+        p4=0.0,
+        lat_e7=degrees_to_e7(lat),
+        lon_e7=degrees_to_e7(lon),
+        alt_m=0.0 if math.isnan(alt_m) else alt_m,
+    )
+
+
+def _simple_items(entry: Any, name: str, where: str) -> Iterator[dict[str, Any]]:
+    kind = entry.get("type") if isinstance(entry, dict) else None
+    if kind == "SimpleItem":
+        yield entry
+    elif kind == "ComplexItem":
+        transects = entry.get("TransectStyleComplexItem")
+        flown_as = transects.get("Items") if isinstance(transects, dict) else None
+        if not isinstance(flown_as, list) or not all(isinstance(item, dict) for item in flown_as):
+            what = f"a {shown(entry.get('complexItemType'))} carries no plain items"
+            raise MissionFileError(name, where, what, "use waypoints instead of it")
+        yield from flown_as
+    else:
+        what = "its type is neither SimpleItem nor ComplexItem"
+        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+
+
+def _item(entry: dict[str, Any], seq: int, name: str, where: str) -> MissionItem:
+    params = entry.get("params")
+    if not isinstance(params, list) or len(params) != _PARAM_COUNT:
+        raise MissionFileError(name, where, f"it has no list of {_PARAM_COUNT} params", _SAVE_AGAIN)
+    command = _integer(entry, "command", 65535, name, where)
+    frame = _integer(entry, "frame", 255, name, where)
+    p1, p2, p3, p4, lat, lon, alt_m = (_number(param, name, where) for param in params)
+    return MissionItem(seq, command, frame, p1, p2, p3, p4, degrees_to_e7(lat), degrees_to_e7(lon), alt_m)
+
+
+def _integer(entry: dict[str, Any], key: str, highest: int, name: str, where: str) -> int:
+    value = entry.get(key)
+    if type(value) is int and 0 <= value <= highest:
+        return value
+    what = f"its {key} is {shown(value)}, not a whole number from 0 to {highest}"
+    raise MissionFileError(name, where, what, _SAVE_AGAIN)
+
+
+def _number(value: Any, name: str, where: str) -> float:
+    """Return a JSON number; null is NaN, "not given"."""
+    if value is None:
+        return math.nan
+    if type(value) in (int, float):
+        try:
+            return float(value)
+        except OverflowError:  # an integer beyond 1.8e308
+            pass
+    raise MissionFileError(name, where, f"{shown(value)} where a number must be", _SAVE_AGAIN)

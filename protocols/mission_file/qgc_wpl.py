@@ -1,0 +1,92 @@
+"""QGC WPL 110, the text format of Mission Planner and most others (https://mavlink.io/en/file_formats/).
+
+A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and
+autocontinue. Tabs by custom; any white space is taken. Empty lines and lines that start with # are passed over.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+
+from protocols.mission_file.error import MissionFileError, shown
+from protocols.mission_item import MissionItem, degrees_to_e7
+
+_HEADER = ["QGC", "WPL", "110"]
+_INTEGER_FIELDS = {"seq": 65535, "current": 1, "frame": 255, "command": 65535}
+_NUMBER_FIELDS = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude", "autocontinue")
+_FIELD_COUNT = len(_INTEGER_FIELDS) + len(_NUMBER_FIELDS)
+# float() and int() also take underscores and the digits of every script: not what a ground station writes.
+_INTEGER = re.compile(r"\d{1,9}", re.ASCII)
+_NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)", re.ASCII | re.IGNORECASE)
+_SAVE_AGAIN = "save the file again from the ground station"
+
+
+def read_qgc_wpl(text: str, name: str) -> list[MissionItem]:
+    """Return the items, home first; MissionFileError names the file and the line.
+
+    A file without items is an error: it is cut off more likely than meant to erase a mission.
+    """
+    items: list[MissionItem] = []
+    header_seen = False
+    for number, line in enumerate(text.split("\n"), start=1):
+        fields = line.split()
+        if not fields or line.startswith("#"):
+            continue
+        where = f"line {number}"
+        if header_seen:
+            items.append(_item(fields, len(items), name, where))
+        elif fields == _HEADER:
+            header_seen = True
+        else:
+            what = f"the header is {shown(line)}, not 'QGC WPL 110'"
+            raise MissionFileError(name, where, what, "save it as a QGC WPL 110 file (.waypoints)")
+    if not items:
+        what = "the file has no items" if header_seen else "the file is empty"
+        raise MissionFileError(name, "", what, _SAVE_AGAIN)
+    return items
+
+
+def write_qgc_wpl(items: Sequence[MissionItem]) -> str:
+    """Return the items as a file's text; `read_qgc_wpl` reads the same items again."""
+    return "".join(f"{line}\n" for line in ["QGC WPL 110", *map(_line, items)])
+
+
+def _item(fields: list[str], seq: int, name: str, where: str) -> MissionItem:
+    if len(fields) != _FIELD_COUNT:
+        what = f"{len(fields)} fields where an item has {_FIELD_COUNT}, the line is cut off or damaged"
+        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+    integers = []
+    for (field, highest), token in zip(_INTEGER_FIELDS.items(), fields, strict=False):
+        if not _INTEGER.fullmatch(token) or int(token) > highest:
+            what = f"{field} is {shown(token)}, not a whole number from 0 to {highest}"
+            raise MissionFileError(name, where, what, _SAVE_AGAIN)
+        integers.append(int(token))
+    for field, token in zip(_NUMBER_FIELDS, fields[len(integers) :], strict=True):
+        if not _NUMBER.fullmatch(token):
+            what = f"{field} is {shown(token)}, not a number"
+            raise MissionFileError(name, where, what, _SAVE_AGAIN)
+    found, _, frame, command = integers
+    if found != seq:
+        what = f"item {found} where item {seq} must be"
+        raise MissionFileError(name, where, what, "number the items from 0 (home) without gaps")
+    p1, p2, p3, p4, lat, lon, alt_m, _ = map(float, fields[len(integers) :])
+    return MissionItem(seq, command, frame, p1, p2, p3, p4, degrees_to_e7(lat), degrees_to_e7(lon), alt_m)
+
+
+def _line(item: MissionItem) -> str:
+    current = 0 if item.seq else 1
+    params = (item.p1, item.p2, item.p3, item.p4)
+    place = (_degrees(item.lat_e7), _degrees(item.lon_e7), _number(item.alt_m))
+    fields = (item.seq, current, item.frame, item.command, *map(_number, params), *place, 1)
+    return "\t".join(map(str, fields))
+
+
+def _degrees(e7: int | None) -> str:
+    return "NaN" if e7 is None else f"{e7 / 1e7:.7f}"
+
+
+def _number(value: float) -> str:
+    """Write the shortest text that reads back as the same number; "NaN" as .NET spells it."""
+    if math.isnan(value):
+        return "NaN"
+    return f"{value:.0f}" if value.is_integer() and abs(value) < 1e15 else repr(value)
