@@ -1,0 +1,63 @@
+# `make demo` shows the main job on a simulated flight controller, `make test` proves it. Both set up what they need in
+# .venv, from python3 >= 3.11 with venv and from make: every package is pinned by its hash, and none needs a compiler.
+#
+#   make demo           run the demonstration, and stay up for Mission Planner to connect
+#   make demo ONCE=1    the same, but end there
+#   make test           run all tests (ARGS="tests/storage -x" runs some)
+#   make lint           check style, format and types
+#   make bench          measure speed and memory
+#   make lock           pin the newest packages that pyproject.toml allows (needs uv)
+#   make clean          remove everything that the above have made
+
+PYTHON ?= python3
+UV ?= uv
+VENV := .venv
+BIN := $(VENV)/bin
+
+.NOTPARALLEL:
+.PHONY: demo test lint bench lock clean
+
+demo: $(VENV)/.demo-ready
+	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
+
+test: $(VENV)/.test-ready
+	$(BIN)/python -m pytest $(ARGS)
+
+lint: $(VENV)/.test-ready
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+bench: $(VENV)/.test-ready
+	$(BIN)/python -m benchmarks $(ARGS)
+
+# The project itself is installed editable: what is edited is what runs. Its build backend comes from the lock, too;
+# --no-deps because pip would miss what the lock leaves out on purpose (pyproject.toml, tool.uv).
+PIP_INSTALL = $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-deps
+define set_up
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	    echo 'naze-bridge needs Python 3.11 or newer as $(PYTHON); name another one: make PYTHON=python3.12' >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' || { \
+	    echo 'naze-bridge needs the venv module of $(PYTHON); on Debian: apt-get install python3-venv' >&2; exit 1; }
+	@echo 'Installing $< in $(VENV)'
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP_INSTALL) --require-hashes --only-binary=:all: -r $<
+	@$(PIP_INSTALL) --no-build-isolation --editable .
+	@touch $@
+endef
+
+$(VENV)/.demo-ready: requirements.lock pyproject.toml
+	$(set_up)
+
+$(VENV)/.test-ready: requirements-dev.lock pyproject.toml
+	$(set_up)
+
+PIN = $(UV) pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate \
+    --custom-compile-command 'make lock' pyproject.toml --group build
+lock:
+	$(PIN) --output-file requirements.lock
+	$(PIN) --constraint requirements.lock --group test --group lint --output-file requirements-dev.lock
+
+clean:
+	rm -rf $(VENV) build dist .demo .hypothesis .mypy_cache .pytest_cache .ruff_cache benchmarks/results
+	find . -name __pycache__ -prune -exec rm -rf {} +
