@@ -163,27 +163,31 @@ static nm_list_t get_list(const uint8_t *body)
     return list;
 }
 
+static void heard(nm_t *m)
+{
+    m->heard_ms = m->board->millis(m->self);
+}
+
 static nm_status_t begin(nm_t *m, const uint8_t *body)
 {
     const nm_list_t list = get_list(body);
     const nm_status_t allowed = may_write(m);
     if (allowed != NM_OK)
         return allowed;
-    if (m->open && same(list, m->wanted))
-        return NM_OK;
-    m->open = false;
-    if (list.count > NM_CAPACITY)
-        return NM_NO_SPACE;
-    if (list.count == 0 && list.checksum != 0)
-        return NM_BAD_REQUEST;
-    if (is_stored(m, list))
-        return NM_SAME;
-    if (!erase_slot(m, unused_slot(m)))
-        return NM_FLASH;
-    m->open = true;
-    m->wanted = list;
-    m->staged.count = 0;
-    m->staged.checksum = 0;
+    if (!m->open || !same(list, m->wanted)) {
+        m->open = false;
+        if (list.count > NM_CAPACITY)
+            return NM_NO_SPACE;
+        if (is_stored(m, list))
+            return NM_SAME;
+        if (!erase_slot(m, unused_slot(m)))
+            return NM_FLASH;
+        m->open = true;
+        m->wanted = list;
+        m->staged.count = 0;
+        m->staged.checksum = 0;
+    }
+    heard(m);
     return NM_OK;
 }
 
@@ -199,10 +203,11 @@ static nm_status_t chunk(nm_t *m, const uint8_t *body, uint8_t length)
         return allowed;
     if (!m->open)
         return NM_NO_TRANSFER;
+    heard(m);
     if (first != m->staged.count)
         return first < m->staged.count ? NM_OK : NM_SEQUENCE;
     if (count > m->wanted.count - m->staged.count)
-        return NM_RANGE;
+        return NM_BAD_REQUEST;
     for (uint16_t i = 0; i < count; i++) {
         if (records[i * NM_RECORD_SIZE + COMMAND_AT] > LAST_COMMAND) {
             m->open = false;
@@ -222,10 +227,13 @@ static nm_status_t commit(nm_t *m, const uint8_t *body)
 {
     const nm_list_t list = get_list(body);
     const nm_status_t allowed = may_write(m);
+    if (!m->open && is_stored(m, list))
+        return NM_OK;
     if (allowed != NM_OK)
         return allowed;
     if (!m->open)
-        return is_stored(m, list) ? NM_OK : NM_NO_TRANSFER;
+        return NM_NO_TRANSFER;
+    heard(m);
     if (m->staged.count < m->wanted.count)
         return NM_INCOMPLETE;
     m->open = false;
@@ -246,11 +254,8 @@ static nm_status_t set_radius(nm_t *m, const uint8_t *body)
         return NM_RANGE;
     if (m->board->armed(m->self))
         return NM_ARMED;
-    if (radius == m->board->radius(m->self))
-        return NM_OK;
-    if (m->board->write_pending(m->self))
-        return NM_BUSY;
-    m->board->set_radius(m->self, radius);
+    if (radius != m->board->radius(m->self))
+        m->board->set_radius(m->self, radius);
     return NM_OK;
 }
 
@@ -267,7 +272,9 @@ static int reply_list(uint8_t *reply, nm_status_t status, nm_list_t list)
 static int reply_progress(const nm_t *m, uint8_t *reply, nm_status_t status)
 {
     const nm_list_t nothing = {0, 0};
-    return reply_list(reply, status, m->open ? m->staged : nothing);
+    if (status == NM_SAME)
+        return reply_list(reply, status, m->stored);
+    return reply_list(reply, status, status == NM_OK || status == NM_SEQUENCE ? m->staged : nothing);
 }
 
 static int reply_stored(const nm_t *m, uint8_t *reply, nm_status_t status)
@@ -297,22 +304,32 @@ static int reply_info(const nm_t *m, uint8_t *reply)
     return INFO_SIZE;
 }
 
-static int reply_read(const nm_t *m, uint8_t *reply, const uint8_t *body, nm_status_t status)
+static int reply_read(const nm_t *m, uint8_t *reply, const uint8_t *body, uint8_t length)
 {
-    const uint16_t first = get16(body);
-    uint16_t count = body[2];
-    if (status == NM_OK && first >= m->stored.count)
-        status = NM_RANGE;
-    reply[0] = (uint8_t)status;
-    put16(reply + 1, status == NM_OK || status == NM_RANGE ? first : 0);
-    if (status != NM_OK)
+    const uint16_t first = length == 4 ? get16(body) : 0;
+    uint16_t count = length == 4 && body[3] == 0 ? body[2] : 0;
+    put16(reply + 1, first);
+    if (count == 0 || count > NM_READ_RECORDS) {
+        reply[0] = NM_BAD_REQUEST;
         return READ_SIZE;
-    if (count > NM_READ_RECORDS)
-        count = NM_READ_RECORDS;
+    }
+    if (first >= m->stored.count) {
+        reply[0] = NM_RANGE;
+        return READ_SIZE;
+    }
     if (count > m->stored.count - first)
         count = (uint16_t)(m->stored.count - first);
+    reply[0] = NM_OK;
     memcpy(reply + READ_SIZE, nm_records(m) + first * NM_RECORD_SIZE, count * NM_RECORD_SIZE);
     return (int)(READ_SIZE + count * NM_RECORD_SIZE);
+}
+
+static int reply_abort(nm_t *m, uint8_t *reply, uint8_t length)
+{
+    if (length == 0)
+        m->open = false;
+    reply[0] = length == 0 ? NM_OK : NM_BAD_REQUEST;
+    return ABORT_SIZE;
 }
 
 static int reply_radius(const nm_t *m, uint8_t *reply, nm_status_t status)
@@ -342,7 +359,6 @@ static bool chunk_length(uint8_t length)
 int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size)
 {
     const uint8_t *body = buffer + 1;
-    nm_status_t status = NM_BAD_REQUEST;
     uint8_t length;
 
     if (command < NM_INFO || command > NM_RADIUS)
@@ -354,33 +370,18 @@ int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size)
     case NM_INFO:
         return reply_info(m, buffer);
     case NM_BEGIN:
-        if (length == 6)
-            status = begin(m, body);
-        break;
+        return reply_progress(m, buffer, length == 6 ? begin(m, body) : NM_BAD_REQUEST);
     case NM_CHUNK:
-        if (chunk_length(length))
-            status = chunk(m, body, length);
-        break;
+        return reply_progress(m, buffer, chunk_length(length) ? chunk(m, body, length) : NM_BAD_REQUEST);
     case NM_COMMIT:
-        if (length == 6)
-            status = commit(m, body);
-        break;
+        return reply_stored(m, buffer, length == 6 ? commit(m, body) : NM_BAD_REQUEST);
     case NM_READ:
-        return reply_read(m, buffer, body, length == 4 && body[2] && !body[3] ? NM_OK : NM_BAD_REQUEST);
+        return reply_read(m, buffer, body, length);
     case NM_RADIUS:
         return reply_radius(m, buffer, length == 4 ? set_radius(m, body) : NM_BAD_REQUEST);
-    default: /* ABORT */
-        if (length == 0) {
-            m->open = false;
-            status = NM_OK;
-        }
-        buffer[0] = (uint8_t)status;
-        return ABORT_SIZE;
+    default:
+        return reply_abort(m, buffer, length);
     }
-
-    if (status != NM_BAD_REQUEST)
-        m->heard_ms = m->board->millis(m->self); /* after the flash work, which takes its time */
-    return command == NM_COMMIT ? reply_stored(m, buffer, status) : reply_progress(m, buffer, status);
 }
 
 /* ---- the firmware's side ---------------------------------------------------------------------------------------------- */
@@ -400,7 +401,7 @@ void nm_start(nm_t *m, const nm_board_t *board, void *self)
 
 void nm_poll(nm_t *m)
 {
-    if (m->open && (m->board->armed(m->self) || m->board->millis(m->self) - m->heard_ms >= NM_IDLE_TIMEOUT_MS))
+    if (m->open && (m->board->armed(m->self) || m->board->millis(m->self) - m->heard_ms > NM_IDLE_TIMEOUT_MS))
         m->open = false;
 }
 

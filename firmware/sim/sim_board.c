@@ -130,7 +130,10 @@ static uint16_t radius(void *self)
 
 static void set_radius(void *self, uint16_t radius_cm)
 {
-    ((sim_t *)self)->radius_cm = radius_cm;
+    sim_t *s = self;
+    s->radius_cm = radius_cm;
+    s->write_due_ms = s->now_ms + SIM_CONFIG_DELAY_MS;
+    s->write_pending = true;
 }
 
 static void list_changed(void *self, const uint8_t *records, uint16_t count)
@@ -170,6 +173,7 @@ void sim_destroy(sim_t *s)
 void sim_power_up(sim_t *s)
 {
     s->armed = s->write_pending = false;
+    s->write_due_ms = 0;
     s->now_ms = 0;
     s->frame_length = 0;
     s->list_count = 0;
@@ -216,6 +220,10 @@ void sim_advance(sim_t *s, uint32_t milliseconds)
         s->now_ms += step;
         milliseconds -= step;
         nm_poll(&s->core);
+    }
+    if (s->write_due_ms && s->now_ms - s->write_due_ms < UINT32_MAX / 2) {
+        s->write_due_ms = 0;
+        s->write_pending = false;
     }
 }
 

@@ -21,6 +21,7 @@
 
 #define SIM_CONFIG_OFFSET NM_FLASH_SIZE
 #define SIM_FLASH_SIZE (NM_FLASH_SIZE + NM_PAGE_SIZE)
+#define SIM_CONFIG_DELAY_MS 1000u /* a changed gps_wp_radius is stored after this time, write_pending until then */
 #define SIM_FRAME_SIZE (6u + NM_BUFFER_SIZE)
 
 /* How far the operation got at which the power was cut. */
@@ -37,6 +38,7 @@ typedef struct {
     uint16_t radius_cm;
     bool armed;
     bool write_pending;
+    uint32_t write_due_ms; /* when a new gps_wp_radius will have been stored; 0: it is */
 
     uint32_t operations; /* flash operations since sim_create() or sim_count() */
     uint32_t violations; /* of the flash's rules */
