@@ -29,14 +29,19 @@ class Finding:
 
     def text(self) -> str:
         """Say it in one line; a change leaves its reason out where a STATUSTEXT has no room for it."""
+        full = self.full_text()
+        if isinstance(self.becomes, str) or len(full) <= _STATUSTEXT_LENGTH:
+            return full
+        return full.removesuffix(f" ({self.why})")
+
+    def full_text(self) -> str:
+        """Say it in one line, with the reason."""
         who = "Mission" if self.seq is None else f"WP {self.seq}" if self.seq else "Home"
         if isinstance(self.becomes, str):
             return f"{who}: {self.becomes}, {self.why}"
         label = _LABELS.get(self.field, self.field)
         unit = " m" if self.field == "alt_m" else ""
-        change = f"{who}: {label} {self._shown(self.was)} -> {self._shown(self.becomes)}{unit}"
-        with_reason = f"{change} ({self.why})"
-        return with_reason if len(with_reason) <= _STATUSTEXT_LENGTH else change
+        return f"{who}: {label} {self._shown(self.was)} -> {self._shown(self.becomes)}{unit} ({self.why})"
 
     def _shown(self, value: str | float | int | None) -> str:
         if value is None:

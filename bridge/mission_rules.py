@@ -61,8 +61,8 @@ class Place(Enum):
 
 UNUSED = Range(0, 0, "not used")
 BRAKE = Range(0, 1, "0 fast corner, 1 brake")
-TURNS = Range(-127, 127, "turns: -127..127, not 0", instead_of_zero=1)
-SECONDS = Range(1, 255, "seconds: 1..255")
+TURNS = Range(-127, 127, "turns -127..127, not 0", instead_of_zero=1)
+SECONDS = Range(1, 255, "seconds 1..255")
 NOSE_ON_ROI = Range(0, 1, "1 = nose on the ROI")
 NO_ROI_KNOWN = Range(0, 0, "no ROI is known")
 CRUISE = Range(-32768, 32767, "0 is no flying height", instead_of_zero=2)
@@ -102,8 +102,8 @@ def command_rules(profile: RuleProfile) -> Mapping[int, CommandRule]:
     gps_wp_radius is rounded up to whole metres, so that no stored radius is smaller than it.
     """
     least = min(math.ceil(profile.wp_radius_cm / 100), _MAX_RADIUS_M)
-    radius = Range(least, _MAX_RADIUS_M, f"hit radius: {least}..{_MAX_RADIUS_M} m")
-    climb = Range(2, profile.takeoff_max_m, f"take-off: 2..{profile.takeoff_max_m} m")
+    radius = Range(least, _MAX_RADIUS_M, f"hit radius {least}..{_MAX_RADIUS_M} m")
+    climb = Range(2, profile.takeoff_max_m, f"take-off 2..{profile.takeoff_max_m} m")
     # fmt: off
     rows = (
         #           record                      p1       p2      p4           position height  place           alone

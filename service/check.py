@@ -1,0 +1,109 @@
+"""`naze-bridge check`: what would become of a mission file, offline."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from bridge.finding import DROPPED, Finding
+from bridge.mission_check import Result, RuleProfile, Verdict, check_list
+from protocols.mission_file import MissionFileError
+from protocols.mission_item import MissionItem
+from service.mission_source import load_mission
+from service.mission_table import mission_table
+
+_DEFAULT = RuleProfile()
+
+
+class ExitCode(IntEnum):
+    """The answer to a script; of several files the worst one's."""
+
+    ACCEPTED = 0
+    REJECTED = 1
+    UNREADABLE = 2
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.option("--strict", is_flag=True, help="Changed values and dropped items count as rejection (exit code 1).")
+@click.option(
+    "--wp-radius-cm",
+    type=click.IntRange(0, 2000),
+    default=_DEFAULT.wp_radius_cm,
+    show_default=True,
+    help="The flight controller's gps_wp_radius.",
+)
+@click.option(
+    "--capacity",
+    type=click.IntRange(2, 65535),
+    default=_DEFAULT.capacity,
+    show_default=True,
+    help="Records that the flight controller holds, home included.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each file.")
+@click.pass_context
+def check(
+    ctx: click.Context, files: Sequence[Path], strict: bool, wp_radius_cm: int, capacity: int, as_json: bool
+) -> None:
+    """Show what would become of mission files (QGC WPL 110, QGroundControl .plan) on the flight controller.
+
+    Nothing is sent anywhere. Exit code 0: every file would be accepted, 1: one would be rejected, 2: one is unreadable.
+    """
+    profile = RuleProfile(capacity=capacity, wp_radius_cm=wp_radius_cm)
+    ctx.exit(max(_check_file(path, profile, strict, as_json) for path in files))
+
+
+def _check_file(path: Path, profile: RuleProfile, strict: bool, as_json: bool) -> ExitCode:
+    name = click.format_filename(path)
+    try:
+        sent = load_mission(path)
+    except MissionFileError as error:
+        if as_json:
+            click.echo(json.dumps({"file": name, "error": str(error)}))
+        else:
+            click.echo(f"Error: {error}", err=True)
+        return ExitCode.UNREADABLE
+    verdict = check_list(sent, profile)
+    if as_json:
+        click.echo(json.dumps({"file": name, **verdict_as_json(verdict)}, allow_nan=False))
+    else:
+        _print_verdict(name, sent, verdict)
+    rejected = verdict.result is Result.REJECTED or (strict and bool(verdict.findings))
+    return ExitCode.REJECTED if rejected else ExitCode.ACCEPTED
+
+
+def verdict_as_json(verdict: Verdict) -> dict[str, Any]:
+    """Return what a script gets to see of a verdict; a value that JSON has no number for becomes a string."""
+    return {
+        "result": verdict.result.name,
+        "ack": f"MAV_MISSION_{verdict.ack.name}",
+        "items": [asdict(item) for item in verdict.items],
+        "records": [record.pack().hex() for record in verdict.records],
+        "findings": [_finding_as_json(finding) for finding in verdict.findings],
+    }
+
+
+def _finding_as_json(finding: Finding) -> dict[str, Any]:
+    infinite = isinstance(finding.was, float) and math.isinf(finding.was)
+    return asdict(finding) | ({"was": str(finding.was)} if infinite else {})
+
+
+def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict) -> None:
+    console = Console(highlight=False)
+    console.print(name, style="bold", markup=False)
+    console.print(mission_table(sent, verdict.items, verdict.findings))
+    console.print(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n", markup=False)
+
+
+def _summary(sent: int, verdict: Verdict) -> str:
+    if verdict.result is not Result.ACCEPTED:
+        return f"MAV_MISSION_{verdict.ack.name}, {verdict.findings[-1].text()}"
+    dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
+    changed = len(verdict.findings) - dropped
+    return f"{len(verdict.items)} of {sent} items stored, {dropped} dropped, values changed: {changed}"

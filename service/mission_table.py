@@ -1,0 +1,65 @@
+"""A mission as it was sent beside what is stored of it, for a terminal."""
+
+import math
+from collections.abc import Sequence
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from bridge.finding import DROPPED, Finding
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionItem
+
+_CHANGED = "yellow"
+_DROPPED = "red"
+
+
+def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]) -> Table:
+    """Make one row per item sent, with "sent→stored" where a value or the item's number became another.
+
+    `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` tell which items are missing
+    in it, and stand below the table with their reasons.
+    """
+    reasons = Text("\n".join(finding.full_text() for finding in findings))
+    table = Table(box=box.SIMPLE_HEAD, collapse_padding=True, caption=reasons, caption_justify="left")
+    table.add_column("WP", justify="right", no_wrap=True)
+    table.add_column("Command")
+    for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):
+        table.add_column(title, justify="right", no_wrap=True)
+    dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
+    left = iter(stored)
+    for item in sent:
+        before = _values(item)
+        if item.seq in dropped:
+            table.add_row(f"{item.seq}→-", *before[1:], style=_DROPPED)
+        else:
+            held = next(left, None)
+            table.add_row(*map(_cell, before, _values(held) if held else before))
+    return table
+
+
+def command_name(command: int) -> str:
+    """Return a MAV_CMD's name as Mission Planner lists it, or its number."""
+    entry = messages.enums["MAV_CMD"].get(command)
+    return str(entry.name).removeprefix("MAV_CMD_").removeprefix("NAV_") if entry else str(command)
+
+
+def _values(item: MissionItem) -> list[str]:
+    params = (item.p1, item.p2, item.p3, item.p4)
+    place = (_degrees(item.lat_e7), _degrees(item.lon_e7), _number(item.alt_m))
+    return [str(item.seq), command_name(item.command), *map(_number, params), *place]
+
+
+def _cell(was: str, becomes: str) -> Text:
+    if was == becomes or (was, becomes) == ("-", "0"):
+        return Text(was)
+    return Text(f"{was}→{becomes}", style=_CHANGED)
+
+
+def _number(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:g}"
+
+
+def _degrees(e7: int | None) -> str:
+    return "-" if not e7 else f"{e7 / 1e7:.7f}"
