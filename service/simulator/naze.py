@@ -105,12 +105,17 @@ class SimulatedNaze:
         """The mission records that are valid in flash, without the UART's help."""
         return self._slots.read(0, self._slots.stored.count)
 
+    @property
+    def flash_operations(self) -> int:
+        """Erases and programs so far, as `faults.power_cut_at_flash_operation` counts them."""
+        return self._flash.operations
+
     def receive(self, data: bytes, now: float) -> None:
         """Put bytes on the wire to the RX pin; they arrive at line rate."""
         self._run_until(now)
         data = self._disturb(data)
         self._watch_for_hazards(data)
-        if self._power is not Power.OFF and data:
+        if self._power is not Power.OFF:
             self._uart.receive(data, now)
 
     def advance(self, now: float) -> bytes:

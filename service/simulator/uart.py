@@ -53,6 +53,8 @@ class Uart:
 
     def receive(self, data: bytes, now: float) -> None:
         """Put bytes on the RX wire, behind those that are on it already."""
+        if not data:
+            return
         start = max(now, self._wire_free_at)
         self._wire.append((start, data))
         self._wire_free_at = start + len(data) * self._byte_time

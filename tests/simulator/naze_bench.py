@@ -1,0 +1,111 @@
+"""A test bench: a simulated Naze, a client at its UART, and a clock that only the test moves."""
+
+from collections.abc import Sequence
+
+from protocols.msp.frame import MspFrame, MspParser
+from protocols.msp.mission import (
+    Progress,
+    Status,
+    Stored,
+    decode_progress,
+    decode_records,
+    decode_stored,
+    encode_begin,
+    encode_chunk,
+    encode_commit,
+    encode_read,
+)
+from protocols.wp_record import WpRecord, identify
+from service.simulator.naze import SimulatedNaze
+from service.simulator.options import Faults, SimOptions
+
+BOOT_SECONDS = 2.0
+
+
+class Bench:
+    """The board has just booted at time 0. `heard` keeps all bytes that came from it."""
+
+    def __init__(self, options: SimOptions | None = None, faults: Faults | None = None) -> None:
+        self.naze = SimulatedNaze(options, faults)
+        self.naze.power_on(-BOOT_SECONDS)
+        self.naze.advance(0.0)
+        self.now = 0.0
+        self.heard = bytearray()
+        self._parser = MspParser()
+        self._frames: list[MspFrame] = []
+
+    def send(self, data: bytes) -> None:
+        self.naze.receive(data, self.now)
+
+    def run(self, seconds: float) -> bytes:
+        """Let time pass as a link would; return what was heard meanwhile."""
+        end = self.now + seconds
+        before = len(self.heard)
+        while self.now < end:
+            self.now = min(max(self.naze.next_wakeup(self.now), self.now + 1e-6), end)
+            self._collect()
+        return bytes(self.heard[before:])
+
+    def ask(self, frame: bytes, timeout: float = 1.0) -> MspFrame | None:
+        """Send a request and return the first frame that comes; None after `timeout` seconds."""
+        self._frames.clear()
+        self.send(frame)
+        return self.next_frame(timeout)
+
+    def next_frame(self, timeout: float = 1.0) -> MspFrame | None:
+        end = self.now + timeout
+        while not self._frames and self.now < end:
+            self.now = min(max(self.naze.next_wakeup(self.now), self.now + 1e-6), end)
+            self._collect()
+        return self._frames.pop(0) if self._frames else None
+
+    def payload(self, frame: bytes, timeout: float = 1.0) -> bytes:
+        answer = self.ask(frame, timeout)
+        assert answer is not None
+        return answer.payload
+
+    def progress(self, frame: bytes) -> Progress:
+        progress = decode_progress(self.payload(frame))
+        assert progress is not None
+        return progress
+
+    def stored(self, frame: bytes) -> Stored:
+        stored = decode_stored(self.payload(frame))
+        assert stored is not None
+        return stored
+
+    def stage(self, records: Sequence[WpRecord]) -> None:
+        """BEGIN and all CHUNKs, one at a time."""
+        progress = self.progress(encode_begin(identify(records)))
+        while progress.next < len(records):
+            assert progress.status is Status.OK
+            progress = self.progress(encode_chunk(records, progress.next, 15).frame)
+
+    def push(self, records: Sequence[WpRecord]) -> Stored:
+        """A whole upload; returns the answer to COMMIT."""
+        self.stage(records)
+        return self.stored(encode_commit(identify(records)))
+
+    def pull(self) -> list[WpRecord]:
+        """Read the stored list through the UART."""
+        records: list[WpRecord] = []
+        while True:
+            answer = decode_records(self.payload(encode_read(len(records), 6)))
+            assert answer is not None
+            if answer.status is Status.RANGE:
+                return records
+            assert (answer.status, answer.first) == (Status.OK, len(records))
+            records += answer.records
+
+    def _collect(self) -> None:
+        data = self.naze.advance(self.now)
+        self.heard += data
+        self._frames += self._parser.feed(data)
+
+
+def mission(count: int, seed: int = 0) -> list[WpRecord]:
+    """A list of plain waypoints that differ; another `seed` gives another list."""
+    return [
+        WpRecord(473_977_000 + seed * 977 + 31 * i, 85_456_000 - 17 * i, 20 + i % 50, 0, i % 2, 2, 0, 0)
+        for i in range(count)
+    ]

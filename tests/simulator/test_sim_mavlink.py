@@ -1,0 +1,144 @@
+"""When the board speaks MAVLink, what it says, and at which speed (pymavlink reads it)."""
+
+from collections import Counter
+
+import pytest
+from naze_bench import Bench
+from pymavlink.dialects.v10 import common as mavlink1
+from pymavlink.dialects.v20 import common as mavlink2
+
+from protocols.msp.frame import request
+from protocols.msp.mission import encode_radius
+from service.simulator.naze import Protocol
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+IDENT = request(100)
+
+
+def decode(data: bytes) -> list[mavlink1.MAVLink_message]:
+    """Every byte must belong to a MAVLink 1 frame of exactly the length that version 1 gives it."""
+    parser = mavlink1.MAVLink(None)
+    messages = parser.parse_buffer(data) or []
+    assert sum(len(message.get_msgbuf()) for message in messages) == len(data)
+    return list(messages)
+
+
+def ground_station_heartbeat(version: int = 1) -> bytes:
+    module = mavlink1 if version == 1 else mavlink2
+    sender = module.MAVLink(None, srcSystem=255, srcComponent=190)
+    message = module.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    return bytes(message.pack(sender))
+
+
+def test_autosense_sends_heartbeats_of_an_ardupilot_once_a_second() -> None:
+    bench = Bench()
+    messages = decode(bench.run(10.2))
+    assert len(messages) == 10
+    for number, message in enumerate(messages):
+        assert message.get_type() == "HEARTBEAT"
+        assert (message.get_srcSystem(), message.get_srcComponent(), message.get_seq()) == (1, 200, number)
+        assert (message.autopilot, message.type) == (mavlink1.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink1.MAV_TYPE_QUADROTOR)
+        assert not message.base_mode & mavlink1.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def test_msp_ends_the_heartbeats_until_four_seconds_of_silence() -> None:
+    bench = Bench()
+    assert bench.ask(IDENT) is not None
+    assert bench.naze.protocol is Protocol.MSP
+    assert bench.run(3.9) == b""
+    assert [message.get_type() for message in decode(bench.run(1.3))] == ["HEARTBEAT"]
+    assert bench.naze.protocol is Protocol.AUTOSENSE
+
+
+def test_a_mavlink_1_frame_switches_and_msp_is_dead_then() -> None:
+    bench = Bench()
+    bench.send(ground_station_heartbeat())
+    bench.run(0.05)
+    assert bench.naze.protocol is Protocol.MAVLINK
+    assert bench.ask(IDENT, timeout=0.5) is None
+
+
+def test_a_mavlink_2_frame_is_nothing_to_it() -> None:
+    bench = Bench()
+    bench.send(ground_station_heartbeat(version=2))
+    bench.run(0.1)
+    assert bench.naze.protocol is Protocol.AUTOSENSE
+
+
+def test_the_stream_has_the_firmwares_rates() -> None:
+    bench = Bench()
+    for _ in range(30):
+        bench.send(ground_station_heartbeat())
+        bench.run(1.0)
+    assert bench.naze.protocol is Protocol.MAVLINK
+    bench.heard.clear()
+    for _ in range(30):
+        bench.send(ground_station_heartbeat())
+        bench.run(1.0)
+    rates = {name: count / 30 for name, count in Counter(m.get_type() for m in decode(bytes(bench.heard))).items()}
+    expected = {
+        "HEARTBEAT": 0.99, "SYS_STATUS": 1.87, "GPS_RAW_INT": 2.1, "RC_CHANNELS_RAW": 2.2, "VFR_HUD": 8.6,
+        "ATTITUDE": 28.5, "SCALED_PRESSURE": 0.5,
+    }  # fmt: skip
+    assert rates == pytest.approx(expected, rel=0.06)
+
+
+def test_the_stream_tells_of_a_flight() -> None:
+    bench = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), Faults(armed=True))
+    messages = decode(bench.run(60))
+    fixes = [message for message in messages if message.get_type() == "GPS_RAW_INT"]
+    assert {(fix.fix_type, fix.satellites_visible) for fix in fixes} == {(3, 9)}
+    for axis, home in (("lat", 473977000), ("lon", 85456000)):
+        positions = [getattr(fix, axis) for fix in fixes]
+        assert 1000 < max(positions) - min(positions) < 20_000
+        assert all(abs(position - home) < 20_000 for position in positions)
+    heartbeat = next(message for message in messages if message.get_type() == "HEARTBEAT")
+    assert heartbeat.base_mode & mavlink1.MAV_MODE_FLAG_SAFETY_ARMED
+    volts = [message.voltage_battery for message in messages if message.get_type() == "SYS_STATUS"]
+    assert volts[0] == 12600
+    assert 11500 < volts[-1] < volts[0]
+
+
+@pytest.mark.parametrize(
+    ("tele_prot", "baud", "protocol"),
+    [
+        (TelemetryProtocol.MSP, 115200, Protocol.MSP),
+        (TelemetryProtocol.MAVLINK, 115200, Protocol.MAVLINK),
+        (TelemetryProtocol.MAVLINK_57600, 57600, Protocol.MAVLINK),
+    ],
+)
+def test_arming_chooses_protocol_and_speed(tele_prot: TelemetryProtocol, baud: int, protocol: Protocol) -> None:
+    bench = Bench(SimOptions(tele_prot=tele_prot))
+    assert bench.ask(IDENT) is not None
+    bench.naze.faults.armed = True
+    heard = bench.run(10)
+    assert (bench.naze.armed, bench.naze.baud, bench.naze.protocol) == (True, baud, protocol)
+    assert (len(decode(heard)) > 300) is (protocol is Protocol.MAVLINK)
+    assert (bench.ask(IDENT, timeout=0.3) is not None) is (protocol is Protocol.MSP)
+    bench.naze.faults.armed = False
+    bench.run(0.5)
+    assert (bench.naze.armed, bench.naze.baud) == (False, 115200)
+    # Nothing valid was heard for four seconds: AUTOSENSE, where MSP is found again.
+    bench.run(4.1)
+    assert bench.ask(IDENT) is not None
+
+
+def test_frsky_is_sent_at_9600_eight_times_a_second() -> None:
+    bench = Bench(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
+    assert bench.ask(IDENT) is not None
+    bench.naze.faults.armed = True
+    heard = bench.run(4.0)
+    assert bench.naze.baud == 9600
+    assert heard[:2] == b"\x5e\x24"
+    # A frame ends with a lone mark, the next begins with one.
+    assert heard.count(b"\x5e\x5e\x24") in (30, 31, 32)
+
+
+def test_arming_is_refused_while_a_configuration_write_is_scheduled() -> None:
+    bench = Bench()
+    assert bench.ask(encode_radius(300)) is not None
+    bench.naze.faults.armed = True
+    bench.run(0.5)
+    assert not bench.naze.armed
+    bench.run(1.0)
+    assert bench.naze.armed

@@ -1,0 +1,464 @@
+"""The flight controller's side of docs/msp-mission.md, through the UART."""
+
+import struct
+from itertools import count
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from naze_bench import BOOT_SECONDS, Bench, mission
+
+from protocols.msp.frame import request
+from protocols.msp.hazards import apply_mask
+from protocols.msp.mission import (
+    ABORT_REQUEST,
+    INFO_REQUEST,
+    Info,
+    InfoFlag,
+    MissionCommand,
+    Progress,
+    Status,
+    Stored,
+    decode_info,
+    decode_radius,
+    decode_records,
+    encode_begin,
+    encode_chunk,
+    encode_commit,
+    encode_radius,
+    encode_read,
+)
+from protocols.wp_record import ListIdentity, WpRecord, identify, pack_records
+from service.simulator.naze import Power
+from service.simulator.options import Faults, SimOptions
+
+NOTHING = ListIdentity(0, 0)
+LINE_RATE = 115200 / 10
+
+records_of_any_kind = st.builds(
+    WpRecord,
+    lat_e7=st.integers(-900_000_000, 900_000_000),
+    lon_e7=st.integers(-1_800_000_000, 1_800_000_000),
+    height_m=st.integers(-32767, 32767),
+    roi_heading=st.integers(0, 1),
+    time=st.integers(0, 255),
+    radius_m=st.integers(0, 255),
+    turns=st.integers(-127, 127),
+    command=st.integers(0, 7),
+)
+
+
+def info(bench: Bench) -> Info:
+    found = decode_info(bench.payload(INFO_REQUEST))
+    assert found is not None
+    return found
+
+
+def raw(command: MissionCommand, body: bytes, mask: int = 0x41) -> bytes:
+    """A request that the encoders would not make."""
+    return request(command, bytes((mask,)) + apply_mask(body, mask))
+
+
+def test_info_tells_the_boards_limits() -> None:
+    assert info(Bench()) == Info(
+        version=1,
+        flags=InfoFlag(0),
+        chunk_records=15,
+        chunk_window=2,
+        read_records=6,
+        capacity=146,
+        stored=NOTHING,
+        wp_radius_cm=200,
+        inter_byte_timeout_ms=50,
+        staged=0,
+        flash_writes=0,
+    )
+
+
+def test_without_the_extension_its_commands_are_unknown() -> None:
+    bench = Bench(faults=Faults(extension=False))
+    answer = bench.ask(INFO_REQUEST)
+    assert answer is not None
+    assert answer.payload == b""
+    assert decode_info(answer.payload) is None
+
+
+@settings(max_examples=40)
+@given(st.lists(records_of_any_kind, max_size=146))
+def test_a_pushed_list_comes_back_identical(records: list[WpRecord]) -> None:
+    bench = Bench()
+    if records:
+        assert bench.push(records) == Stored(Status.OK, identify(records))
+    assert bench.pull() == records
+    assert bench.naze.stored == pack_records(records)
+    assert bench.naze.counters.hazard_runs == 0
+    assert info(bench).stored == identify(records)
+
+
+def test_a_full_list_survives_a_power_cycle() -> None:
+    bench, records = Bench(), mission(146)
+    bench.push(records)
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    bench.run(BOOT_SECONDS + 0.1)
+    assert bench.pull() == records
+    assert info(bench).flash_writes == 1
+
+
+def test_the_newer_of_two_lists_counts_after_boot() -> None:
+    bench = Bench()
+    for seed in range(5):
+        bench.push(mission(10 + seed, seed))
+        bench.naze.power_off(bench.now)
+        bench.naze.power_on(bench.now)
+        bench.run(BOOT_SECONDS + 0.1)
+        assert bench.pull() == mission(10 + seed, seed)
+    assert bench.naze.counters.flash_writes == 5
+
+
+def test_an_identical_list_is_not_written_again() -> None:
+    bench, records = Bench(), mission(12)
+    bench.push(records)
+    assert bench.progress(encode_begin(identify(records))) == Progress(Status.SAME, 0, 0)
+    assert not info(bench).flags
+    assert bench.naze.counters.flash_writes == 1
+
+
+def test_an_empty_list_clears() -> None:
+    bench = Bench()
+    bench.push(mission(3))
+    assert bench.push([]) == Stored(Status.OK, NOTHING)
+    assert bench.pull() == []
+    assert bench.progress(encode_begin(NOTHING)).status is Status.SAME
+
+
+def test_begin_stalls_for_the_erase_and_commit_does_not() -> None:
+    bench = Bench(SimOptions(flash_erase_ms=300))
+    before = bench.now
+    bench.progress(encode_begin(identify(mission(2))))
+    assert 0.300 < bench.now - before < 0.310
+    before = bench.now
+    bench.progress(encode_chunk(mission(2), 0, 1).frame)
+    bench.progress(encode_chunk(mission(2), 1, 1).frame)
+    bench.stored(encode_commit(identify(mission(2))))
+    assert bench.now - before < 0.030
+
+
+def test_what_comes_during_the_erase_laps_the_receive_ring() -> None:
+    bench = Bench(SimOptions(flash_erase_ms=100))
+    bench.send(encode_begin(identify(mission(2))))
+    bench.run(0.01)
+    bench.send(request(100) * 100)
+    bench.run(0.3)
+    assert bench.naze.counters.rx_overflows == 1
+
+
+def test_a_window_of_two_chunks_fills_the_line() -> None:
+    """What the benchmark relies on: from the first CHUNK to COMMIT's answer within 1.10 of the bare line time."""
+    bench, records = Bench(), mission(146)
+    bench.progress(encode_begin(identify(records)))
+    start, first, outstanding, following = bench.now, 0, 0, 0
+    while following < len(records):
+        while outstanding < 2 and first < len(records):
+            chunk = encode_chunk(records, first, 15)
+            bench.send(chunk.frame)
+            first, outstanding = first + chunk.count, outstanding + 1
+        answer = bench.next_frame()
+        assert answer is not None
+        following, outstanding = int.from_bytes(answer.payload[1:3], "little"), outstanding - 1
+    assert bench.stored(encode_commit(identify(records))).status is Status.OK
+    assert 1.0 < (bench.now - start) / (146 * 16 / LINE_RATE) < 1.12
+    assert bench.naze.counters.rx_overflows == 0
+
+
+# -- every request may be repeated ---------------------------------------------------------------------------------------
+
+
+def test_begin_of_the_same_list_goes_on_and_of_another_starts_anew() -> None:
+    bench, records = Bench(), mission(20)
+    bench.progress(encode_begin(identify(records)))
+    standing = bench.progress(encode_chunk(records, 0, 15).frame)
+    assert standing == Progress(Status.OK, 15, identify(records[:15]).checksum)
+    assert bench.progress(encode_begin(identify(records))) == standing
+    assert bench.progress(encode_begin(identify(mission(20, 1)))) == Progress(Status.OK, 0, 0)
+
+
+def test_a_repeated_chunk_stores_nothing_and_tells_where_the_transfer_stands() -> None:
+    bench, records = Bench(), mission(20)
+    bench.progress(encode_begin(identify(records)))
+    standing = bench.progress(encode_chunk(records, 0, 10).frame)
+    assert bench.progress(encode_chunk(records, 0, 10).frame) == standing
+    assert bench.progress(encode_chunk(records, 5, 10).frame) == standing
+
+
+def test_a_chunk_beyond_the_next_is_a_gap() -> None:
+    bench, records = Bench(), mission(20)
+    bench.progress(encode_begin(identify(records)))
+    bench.progress(encode_chunk(records, 0, 3).frame)
+    expected = Progress(Status.SEQUENCE, 3, identify(records[:3]).checksum)
+    assert bench.progress(encode_chunk(records, 5, 3).frame) == expected
+
+
+def test_a_repeated_commit_and_abort_are_well() -> None:
+    bench, records = Bench(), mission(4)
+    bench.push(records)
+    assert bench.stored(encode_commit(identify(records))) == Stored(Status.OK, identify(records))
+    for _ in range(2):
+        assert bench.payload(ABORT_REQUEST) == bytes((Status.OK,))
+    assert bench.naze.counters.flash_writes == 1
+
+
+# -- refusals ------------------------------------------------------------------------------------------------------------
+
+
+def test_chunk_and_commit_need_a_transfer() -> None:
+    bench, records = Bench(), mission(4)
+    assert bench.progress(encode_chunk(records, 0, 4).frame) == Progress(Status.NO_TRANSFER, 0, 0)
+    assert bench.stored(encode_commit(identify(records))) == Stored(Status.NO_TRANSFER, NOTHING)
+
+
+def test_five_seconds_of_silence_end_a_transfer() -> None:
+    bench, records = Bench(), mission(4)
+    bench.progress(encode_begin(identify(records)))
+    bench.run(4.8)
+    assert bench.progress(encode_chunk(records, 0, 1).frame).status is Status.OK
+    for flags in (InfoFlag.TRANSFER_OPEN, InfoFlag.TRANSFER_OPEN, InfoFlag(0)):
+        bench.run(1.8)
+        assert info(bench).flags == flags
+    assert bench.progress(encode_chunk(records, 1, 1).frame).status is Status.NO_TRANSFER
+
+
+def test_more_than_fits_is_refused() -> None:
+    bench = Bench(SimOptions(capacity=5))
+    assert bench.progress(encode_begin(ListIdentity(6, 1))).status is Status.NO_SPACE
+    assert bench.push(mission(5)).status is Status.OK
+
+
+def test_commit_of_an_incomplete_list_keeps_the_transfer() -> None:
+    bench, records = Bench(), mission(7)
+    bench.progress(encode_begin(identify(records)))
+    bench.progress(encode_chunk(records, 0, 3).frame)
+    assert bench.stored(encode_commit(identify(records))) == Stored(Status.INCOMPLETE, NOTHING)
+    assert bench.progress(encode_chunk(records, 3, 4).frame).status is Status.OK
+    assert bench.stored(encode_commit(identify(records))).status is Status.OK
+
+
+def test_a_list_of_another_checksum_is_not_committed() -> None:
+    bench = Bench()
+    bench.push(mission(3))
+    records = mission(4, 1)
+    announced = ListIdentity(4, identify(records).checksum ^ 1)
+    bench.progress(encode_begin(announced))
+    bench.progress(encode_chunk(records, 0, 4).frame)
+    assert bench.stored(encode_commit(announced)) == Stored(Status.CHECKSUM, identify(mission(3)))
+    assert bench.progress(encode_chunk(records, 0, 4).frame).status is Status.NO_TRANSFER
+
+
+def test_a_record_of_an_unknown_command_drops_the_transfer() -> None:
+    bench = Bench()
+    records = [*mission(3), WpRecord(1, 2, 3, 0, 0, 2, 0, 8)]
+    bench.progress(encode_begin(identify(records)))
+    assert bench.progress(encode_chunk(records, 0, 4).frame) == Progress(Status.BAD_RECORD, 0, 0)
+    assert bench.progress(encode_chunk(records, 0, 3).frame).status is Status.NO_TRANSFER
+
+
+def test_flash_that_fails_drops_the_transfer_and_keeps_the_list() -> None:
+    for failing in ("begin", "chunk", "commit"):
+        bench, records = Bench(), mission(3, 1)
+        bench.push(mission(2))
+        if failing == "begin":
+            bench.naze.faults.flash_failures = 1
+            status = bench.progress(encode_begin(identify(records))).status
+        elif failing == "chunk":
+            bench.progress(encode_begin(identify(records)))
+            bench.naze.faults.flash_failures = 1
+            status = bench.progress(encode_chunk(records, 0, 3).frame).status
+        else:
+            bench.stage(records)
+            bench.naze.faults.flash_failures = 1
+            status = bench.stored(encode_commit(identify(records))).status
+        assert status is Status.FLASH
+        assert not info(bench).flags
+        assert bench.pull() == mission(2)
+        assert bench.push(records).status is Status.OK
+
+
+def test_arming_drops_the_transfer_and_refuses_writers_but_not_readers() -> None:
+    bench, records = Bench(), mission(4)
+    bench.push(records)
+    bench.progress(encode_begin(identify(mission(4, 1))))
+    bench.naze.faults.armed = True
+    bench.run(0.01)
+    assert info(bench).flags == InfoFlag.ARMED
+    assert bench.progress(encode_begin(identify(mission(4, 1)))).status is Status.ARMED
+    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is Status.ARMED
+    assert bench.stored(encode_commit(identify(records))).status is Status.ARMED
+    assert bench.payload(encode_radius(300)) == struct.pack("<BH", Status.ARMED, 200)
+    assert bench.pull() == records
+    bench.naze.faults.armed = False
+    bench.run(0.01)
+    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is Status.NO_TRANSFER
+
+
+@pytest.mark.parametrize("busy", [False, True])
+def test_a_busy_board_says_so(busy: bool) -> None:
+    bench = Bench(faults=Faults(busy=busy))
+    assert bool(info(bench).flags & InfoFlag.WRITE_PENDING) is busy
+    status = bench.progress(encode_begin(identify(mission(1)))).status
+    assert status is (Status.BUSY if busy else Status.OK)
+
+
+@pytest.mark.parametrize("frame", [
+    request(MissionCommand.BEGIN),
+    raw(MissionCommand.BEGIN, bytes(4)),
+    raw(MissionCommand.BEGIN, bytes(5)),
+    raw(MissionCommand.BEGIN, bytes((0, 0, 1, 0, 0, 0))),
+    raw(MissionCommand.CHUNK, bytes(2)),
+    raw(MissionCommand.CHUNK, bytes(2 + 8)),
+    raw(MissionCommand.COMMIT, bytes(8)),
+    request(MissionCommand.ABORT, b"\x00"),
+    raw(MissionCommand.READ, bytes((0, 0, 0, 0))),
+    raw(MissionCommand.READ, bytes((0, 0, 1, 1))),
+    raw(MissionCommand.RADIUS, struct.pack("<HH", 300, 300)),
+    raw(MissionCommand.RADIUS, bytes(2)),
+])  # fmt: skip
+def test_what_is_not_of_the_form_is_a_bad_request(frame: bytes) -> None:
+    assert Bench().payload(frame)[0] == Status.BAD_REQUEST
+
+
+def test_a_chunk_of_more_records_than_the_board_takes_is_a_bad_request() -> None:
+    bench, records = Bench(SimOptions(chunk_records=15)), mission(20)
+    small = Bench(SimOptions(chunk_records=4))
+    for board, status in ((bench, Status.OK), (small, None)):
+        board.progress(encode_begin(identify(records)))
+        answer = board.ask(encode_chunk(records, 0, 10).frame, timeout=0.3)
+        assert (answer and answer.payload[0]) == status
+
+
+def test_reading_past_the_end_is_out_of_range() -> None:
+    bench = Bench()
+    bench.push(mission(4))
+    answer = decode_records(bench.payload(encode_read(2, 6)))
+    assert answer is not None
+    assert (answer.status, answer.first, list(answer.records)) == (Status.OK, 2, mission(4)[2:])
+    assert bench.payload(encode_read(4, 1)) == struct.pack("<BH", Status.RANGE, 4)
+
+
+# -- gps_wp_radius -------------------------------------------------------------------------------------------------------
+
+
+def test_a_radius_counts_at_once_and_is_written_a_second_later() -> None:
+    bench = Bench()
+    radius = decode_radius(bench.payload(encode_radius(350)))
+    assert radius is not None
+    assert (radius.status, radius.wp_radius_cm) == (Status.OK, 350)
+    assert info(bench).flags == InfoFlag.WRITE_PENDING
+    assert bench.payload(encode_radius(350))[0] == Status.OK
+    assert bench.payload(encode_radius(360))[0] == Status.BUSY
+    assert bench.progress(encode_begin(identify(mission(1)))).status is Status.BUSY
+    bench.run(1.3)
+    assert not info(bench).flags
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    bench.run(BOOT_SECONDS + 0.1)
+    assert info(bench).wp_radius_cm == 350
+
+
+def test_a_radius_that_was_not_yet_written_goes_with_the_power() -> None:
+    bench = Bench()
+    bench.payload(encode_radius(350))
+    bench.run(0.9)
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    bench.run(BOOT_SECONDS + 0.1)
+    assert info(bench).wp_radius_cm == 200
+
+
+@pytest.mark.parametrize(("radius", "status"), [(0, Status.OK), (2000, Status.OK), (2001, Status.RANGE)])
+def test_a_radius_above_20_m_is_out_of_range(radius: int, status: Status) -> None:
+    assert Bench().payload(encode_radius(radius))[0] == status
+
+
+def test_the_same_radius_is_not_written_again() -> None:
+    bench = Bench()
+    assert bench.payload(encode_radius(200))[0] == Status.OK
+    assert not info(bench).flags
+
+
+# -- power cuts ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("old", [0, 9])
+def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(old: int) -> None:
+    """Each erase, each record, the header: cut in the middle of it, boot, look; then push again."""
+    new = mission(20, 1)
+    outcomes = []
+    for operation in count(1):
+        bench = Bench()
+        if old:
+            bench.push(mission(old))
+        bench.naze.faults.power_cut_at_flash_operation = bench.naze.flash_operations + operation
+        bench.send(encode_begin(identify(new)))
+        for index in range(20):
+            bench.run(0.2)
+            bench.send(encode_chunk(new, index, 1).frame)
+        bench.run(0.2)
+        bench.send(encode_commit(identify(new)))
+        bench.run(0.2)
+        bench.naze.faults.power_cut_at_flash_operation = 0
+        if bench.naze.power is not Power.OFF:
+            break
+        bench.naze.power_on(bench.now)
+        bench.run(BOOT_SECONDS + 0.1)
+        outcomes.append(bench.pull())
+        assert bench.push(new).status is Status.OK
+        assert bench.pull() == new
+    # Three pages, twenty records, and the header, without which the new list does not count.
+    assert outcomes == [mission(old) if old else []] * 24
+    assert bench.pull() == new
+
+
+def test_a_power_cut_in_the_configuration_loses_it_but_not_the_list() -> None:
+    """Harakiri has one copy of its configuration; the slots are not in it."""
+    bench = Bench()
+    bench.push(mission(7))
+    bench.payload(encode_radius(350))
+    bench.run(1.5)
+    bench.payload(encode_radius(500))
+    bench.naze.faults.power_cut_at_flash_operation = bench.naze.flash_operations + 2
+    bench.run(1.5)
+    assert bench.naze.power is Power.OFF
+    bench.naze.power_on(bench.now)
+    bench.run(BOOT_SECONDS + 0.1)
+    assert info(bench).wp_radius_cm == 200
+    assert bench.pull() == mission(7)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), size=st.integers(1, 60))
+def test_a_stubborn_client_gets_a_list_through_a_bad_line(seed: int, size: int) -> None:
+    """Repeat until answered, begin again when told to: never a wrong list, and in the end the right one."""
+    faults = Faults(bit_error_rate=2e-4, lost_byte_rate=1e-3)
+    bench, records = Bench(SimOptions(seed=seed), faults), mission(size, seed)
+    identity = identify(records)
+    for _ in range(600):
+        if bench.naze.power is Power.CLI or bench.naze.counters.resets:
+            return  # a flipped bit completed a run: the line's doing, and rare
+        bench.run(0.08)
+        standing = info_or_none(bench)
+        if standing is None:
+            continue
+        if standing.stored == identity:
+            break
+        if not standing.flags & InfoFlag.TRANSFER_OPEN:
+            bench.ask(encode_begin(identity), timeout=0.5)
+        elif standing.staged < size:
+            bench.ask(encode_chunk(records, standing.staged, 15).frame, timeout=0.1)
+        else:
+            bench.ask(encode_commit(identity), timeout=0.2)
+    assert bench.naze.stored == pack_records(records)
+
+
+def info_or_none(bench: Bench) -> Info | None:
+    answer = bench.ask(INFO_REQUEST, timeout=0.1)
+    return decode_info(answer.payload) if answer else None

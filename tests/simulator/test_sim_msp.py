@@ -1,0 +1,206 @@
+"""MSP as Harakiri answers it: lengths, oddities, and a receiver that never looks back."""
+
+import struct
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from naze_bench import Bench
+
+from protocols.msp.frame import Direction, request
+from protocols.msp.mission import INFO_REQUEST
+from service.simulator.naze import Power
+from service.simulator.options import Faults, SimOptions
+
+IDENT = request(100)
+LENGTHS = {
+    100: 7, 101: 11, 102: 18, 103: 16, 104: 16, 105: 16, 106: 14, 107: 5, 108: 8, 109: 6, 110: 5, 111: 7, 112: 30,
+    113: 30, 114: 2, 115: 8, 200: 0, 201: 0, 202: 0, 203: 0, 204: 0, 205: 0, 206: 0, 207: 0, 208: 0, 250: 0, 254: 8,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("command", "length"), LENGTHS.items())
+def test_lengths_are_harakiris(command: int, length: int) -> None:
+    answer = Bench().ask(request(command))
+    assert answer is not None
+    assert (answer.direction, answer.command, len(answer.payload)) == (Direction.REPLY, command, length)
+
+
+def test_ident_is_a_quad_x_of_version_211() -> None:
+    assert Bench().payload(IDENT) == struct.pack("<BBBI", 211, 3, 0, 0x80000000)
+
+
+@pytest.mark.parametrize("command", [0, 1, 2, 3, 99, 119, 190, 199, 209, 253])
+def test_what_the_stock_firmware_does_not_know_is_an_error_of_size_0(command: int) -> None:
+    answer = Bench(faults=Faults(extension=False)).ask(request(command))
+    assert answer is not None
+    assert (answer.direction, answer.command, answer.payload) == (Direction.ERROR, command, b"")
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_the_arm_bit_of_status_is_where_boxnames_has_arm(armed: bool) -> None:
+    bench = Bench(faults=Faults(armed=armed))
+    bench.run(0.01)
+    names = bench.payload(request(116)).split(b";")
+    assert names[-1] == b""
+    flags = struct.unpack_from("<I", bench.payload(request(101)), 6)[0]
+    assert bool(flags >> names.index(b"ARM") & 1) is armed
+
+
+def test_pid_names_match_the_pids() -> None:
+    bench = Bench()
+    assert bench.payload(request(117)).count(b";") * 3 == len(bench.payload(request(112)))
+
+
+def test_settings_are_kept_until_power_goes() -> None:
+    bench = Bench()
+    assert bench.ask(request(204, b"1234567")) is not None
+    assert bench.payload(request(111)) == b"1234567"
+
+
+def test_waypoint_0_is_home_and_16_the_hold_position() -> None:
+    bench = Bench()
+    home, hold = bench.payload(request(118, b"\x00")), bench.payload(request(118, b"\x10"))
+    assert struct.unpack("<BiiHB", home) == (0, 473977000, 85456000, 0, 0)
+    assert struct.unpack("<BiiHB", hold)[0] == 16
+
+
+def test_another_waypoint_is_answered_with_a_header_without_its_payload() -> None:
+    bench = Bench()
+    bench.send(request(118, b"\x01"))
+    assert bench.run(0.2) == b"$M>" + bytes((12, 118, 12 ^ 118))
+
+
+def test_a_request_with_a_bad_checksum_is_ignored() -> None:
+    assert Bench().ask(IDENT[:-1] + b"\x00", timeout=0.3) is None
+
+
+def test_after_a_cut_frame_the_stock_receiver_swallows_the_next_ones() -> None:
+    bench = Bench(faults=Faults(extension=False))
+    bench.send(request(200, bytes(16))[:9])
+    bench.run(1.0)
+    assert bench.ask(IDENT, timeout=0.3) is None
+    # 12 payload bytes and a checksum were owed: two IDENTs pay 12 of them, the third's first byte is the last.
+    assert bench.ask(IDENT, timeout=0.3) is None
+    assert bench.ask(IDENT, timeout=0.3) is None
+    assert bench.ask(IDENT, timeout=0.3) is not None
+
+
+@pytest.mark.parametrize(("silence", "answers"), [(0.03, False), (0.08, True)])
+def test_the_extension_forgets_a_cut_frame_after_50_ms(silence: float, answers: bool) -> None:
+    bench = Bench()
+    assert bench.ask(IDENT) is not None
+    bench.send(request(200, bytes(16))[:9])
+    bench.run(silence)
+    assert (bench.ask(IDENT, timeout=0.02) is not None) is answers
+
+
+@pytest.mark.parametrize(("extension", "size", "answers"), [
+    (False, 64, True), (False, 65, False), (True, 243, True), (True, 244, False),
+])  # fmt: skip
+def test_the_receive_buffer_bounds_the_payload(extension: bool, size: int, answers: bool) -> None:
+    bench = Bench(faults=Faults(extension=extension))
+    assert bench.ask(IDENT) is not None
+    # No '$' in the payload: a refused frame's bytes must not look like another one.
+    assert (bench.ask(request(205, b"\x11" * size), timeout=0.2) is not None) is answers
+
+
+def test_a_reply_takes_its_time_on_the_line() -> None:
+    bench = Bench(SimOptions(baud=9600))
+    bench.send(IDENT)
+    up, loop, down = 6 * 10 / 9600, 0.003, 13 * 10 / 9600
+    bench.run(up + down - 10 / 9600)
+    assert len(bench.heard) < 13
+    bench.run(loop + 10 / 9600 + 0.005)
+    assert len(bench.heard) == 13
+
+
+def test_the_main_loop_answers_at_most_every_looptime() -> None:
+    """With a loop of 50 ms a request waits for the loop, not only for the line."""
+    bench = Bench(SimOptions(looptime_ms=50.0))
+    bench.run(0.101 - 0.05)
+    before = bench.now
+    assert bench.ask(IDENT) is not None
+    assert 0.04 < bench.now - before < 0.06
+
+
+def test_a_hang_answers_nothing_and_goes_on_when_released() -> None:
+    bench = Bench()
+    bench.naze.faults.hang = True
+    assert bench.ask(IDENT, timeout=3.0) is None
+    bench.naze.faults.hang = False
+    assert bench.next_frame(0.1) is not None
+
+
+def test_what_came_during_a_hang_laps_the_ring() -> None:
+    bench = Bench()
+    bench.naze.faults.hang = True
+    bench.send(IDENT * 50)
+    bench.run(1.0)
+    bench.naze.faults.hang = False
+    bench.run(0.1)
+    assert bench.naze.counters.rx_overflows == 1
+
+
+def test_too_many_requests_at_once_corrupt_the_replies() -> None:
+    """Why a client bounds what is outstanding: three BOXNAMES are more than the ring holds."""
+    bench = Bench(SimOptions(looptime_ms=9.0))
+    bench.send(request(116) * 4)
+    bench.run(0.5)
+    assert bench.naze.counters.tx_overflows > 0
+    assert bench.naze.counters.max_outstanding_reply_bytes > 255
+    assert bench.heard.count(b"ANGLE;HORIZON;BARO;") < 4
+
+
+def test_without_power_nothing_is_heard_or_answered() -> None:
+    bench = Bench()
+    bench.naze.power_off(bench.now)
+    assert bench.ask(IDENT, timeout=5.0) is None
+    assert bench.heard == b""
+    assert bench.naze.power is Power.OFF
+
+
+def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:
+    def talk(seed: int, faults: Faults) -> bytes:
+        bench = Bench(SimOptions(seed=seed), faults)
+        for _ in range(20):
+            bench.send(IDENT)
+            bench.run(0.05)
+        return bytes(bench.heard)
+
+    clean = talk(1, Faults())
+    for faults in ({"bit_error_rate": 0.01}, {"lost_byte_rate": 0.03}):
+        first, again, other = (talk(seed, Faults(**faults)) for seed in (1, 1, 2))
+        assert first == again
+        assert first not in (clean, other)
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([IDENT, request(101), request(116), INFO_REQUEST, request(200, bytes(16))[:9], b"$M<"]),
+            st.floats(0.0001, 0.4),
+        ),
+        max_size=25,
+    )
+)
+def test_a_caller_who_comes_late_changes_nothing(schedule: list[tuple[bytes, float]]) -> None:
+    """Collected at each wake-up or once at the end: the same bytes."""
+    punctual, late = Bench(), Bench()
+    for data, pause in schedule:
+        for bench in (punctual, late):
+            bench.send(data)
+        punctual.run(pause)
+        late.now = punctual.now
+    for bench in (punctual, late):
+        bench.run(0.5)
+    assert punctual.heard == late.heard
+
+
+@given(st.binary(max_size=400))
+def test_any_bytes_at_all_are_survived(data: bytes) -> None:
+    bench = Bench()
+    bench.send(data)
+    bench.run(0.2)
+    assert bench.naze.power in (Power.RUNNING, Power.CLI, Power.BOOTING)

@@ -1,0 +1,165 @@
+"""The byte runs on which Harakiri acts outside of any protocol (serialCom), with its counters' exact habits."""
+
+import pytest
+from naze_bench import BOOT_SECONDS, Bench, mission
+
+from protocols.msp.frame import request
+from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
+from protocols.wp_record import identify
+from service.simulator.naze import Power, Protocol
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+IDENT = request(100)
+# A frame that ends in one 0D: size 1 ^ command 108 ^ payload 60.
+ENDS_IN_CR = request(108, b"\x60")
+
+
+def speaks_msp(bench: Bench) -> bool:
+    return bench.ask(IDENT) is not None
+
+
+def test_three_returns_spread_over_frames_enter_the_cli() -> None:
+    bench = Bench()
+    assert ENDS_IN_CR[-1] == 0x0D
+    assert bench.ask(ENDS_IN_CR) is not None
+    bench.send(b"\r\r")
+    heard = bench.run(0.1)
+    assert bench.naze.counters.cli_entered
+    assert bench.naze.power is Power.CLI
+    assert b"# " in heard
+    assert not speaks_msp(bench)
+    bench.run(10)
+    assert not speaks_msp(bench)
+    assert bench.naze.counters.hazard_runs == 1
+
+
+def test_three_returns_inside_of_a_frame_enter_the_cli() -> None:
+    bench = Bench()
+    assert speaks_msp(bench)
+    assert bench.ask(request(250, b"\r\r\r"), timeout=0.1) is None
+    assert bench.naze.counters.cli_entered
+
+
+@pytest.mark.parametrize("data", [b"\r\rx\r\r", b"\r\r$\r"])
+def test_a_byte_between_the_returns_disarms_the_trap(data: bytes) -> None:
+    bench = Bench()
+    bench.send(data)
+    bench.run(0.1)
+    assert not bench.naze.counters.cli_entered
+    assert bench.naze.counters.hazard_runs == 0
+
+
+def test_returns_are_harmless_while_armed() -> None:
+    bench = Bench(faults=Faults(armed=True))
+    bench.run(0.01)
+    bench.send(b"\r\r\r\r")
+    bench.run(0.1)
+    assert not bench.naze.counters.cli_entered
+    assert bench.naze.counters.hazard_runs == 1
+    assert speaks_msp(bench)
+
+
+def test_number_signs_enter_the_cli_in_autosense_only() -> None:
+    quiet = Bench()
+    assert speaks_msp(quiet)
+    quiet.send(b"###" * 4)
+    quiet.run(0.1)
+    assert not quiet.naze.counters.cli_entered
+    assert quiet.naze.counters.hazard_runs == 1
+
+    bench = Bench()
+    bench.send(b"###")
+    bench.run(0.1)
+    assert bench.naze.counters.cli_entered
+
+
+def test_letters_r_reset_in_autosense_only() -> None:
+    quiet = Bench()
+    assert speaks_msp(quiet)
+    quiet.send(b"RRR")
+    quiet.run(0.1)
+    assert quiet.naze.counters.resets == 0
+
+    bench = Bench()
+    bench.send(b"RRR")
+    bench.run(0.01)
+    assert bench.naze.counters.resets == 1
+    assert bench.naze.power is Power.BOOTING
+
+
+def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
+    bench = Bench()
+    records = mission(20)
+    bench.progress(encode_begin(identify(records)))
+    bench.progress(encode_chunk(records, 0, 15).frame)
+    bench.run(4.1)
+    assert bench.naze.protocol is Protocol.AUTOSENSE
+    bench.send(b"RRR")
+    bench.run(0.05)
+    bench.heard.clear()
+    assert bench.ask(IDENT, timeout=BOOT_SECONDS - 0.1) is None
+    assert bench.heard == b""
+    bench.run(0.1)
+    info = decode_info(bench.payload(INFO_REQUEST))
+    assert info is not None
+    assert info.staged == 0
+    assert not info.flags
+
+
+def test_the_counters_for_autosense_stand_still_outside_of_it() -> None:
+    """Two '#' before MSP was found and one four seconds after it was lost are three for the firmware."""
+    bench = Bench()
+    bench.send(b"##")
+    bench.run(0.01)
+    assert speaks_msp(bench)
+    bench.send(b"abc")
+    bench.run(4.5)
+    assert bench.naze.protocol is Protocol.AUTOSENSE
+    assert not bench.naze.counters.cli_entered
+    # The MSP frame's first byte was still read in AUTOSENSE and cleared the count.
+    bench.send(b"#")
+    bench.run(0.1)
+    assert not bench.naze.counters.cli_entered
+
+    bench = Bench()
+    bench.send(IDENT[:-1] + b"##")  # a broken frame: AUTOSENSE goes on, and counts
+    bench.run(0.01)
+    bench.send(b"#")
+    bench.run(0.01)
+    assert bench.naze.counters.cli_entered
+
+
+def test_a_run_that_begins_in_autosense_is_finished_four_seconds_later() -> None:
+    """The byte that completes the frame switches to MSP; a count begun by it waits there for AUTOSENSE."""
+    ends_in_sign = request(108, bytes((0x23 ^ 1 ^ 108,)))
+    assert ends_in_sign[-1] == 0x23
+    bench = Bench()
+    assert bench.ask(ends_in_sign) is not None
+    bench.send(b"irrelevant")
+    bench.run(4.5)
+    bench.send(b"##")
+    bench.run(0.1)
+    assert bench.naze.counters.cli_entered
+
+
+def test_signs_act_on_an_armed_craft_that_never_left_autosense() -> None:
+    """With tele_prot 1 arming does not choose a protocol."""
+    options = SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600)
+    bench = Bench(options, Faults(armed=True))
+    bench.run(0.5)
+    assert bench.naze.protocol is Protocol.AUTOSENSE
+    bench.send(b"###")
+    bench.run(0.1)
+    assert bench.naze.counters.cli_entered
+
+
+def test_the_cli_echoes_and_a_power_cycle_leads_out_of_it() -> None:
+    bench = Bench()
+    bench.send(b"\r\r\r")
+    bench.run(0.1)
+    bench.send(b"help\r")
+    assert bench.run(0.1) == b"help\r\n# "
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    bench.run(BOOT_SECONDS + 0.1)
+    assert speaks_msp(bench)
