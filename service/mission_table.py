@@ -16,23 +16,23 @@ _DROPPED = "red"
 
 
 def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]) -> Table:
-    """Make one row per item sent, with "sent→stored" where a value or the item's number became another.
+    """Make one row per item sent, with "sent->stored" where a value or the item's number became another.
 
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` tell which items are missing
     in it, and stand below the table with their reasons.
     """
     reasons = Text("\n".join(finding.full_text() for finding in findings))
     table = Table(box=box.SIMPLE_HEAD, collapse_padding=True, caption=reasons, caption_justify="left")
-    table.add_column("WP", justify="right", no_wrap=True)
-    table.add_column("Command")
+    table.add_column("WP", justify="right", overflow="fold")
+    table.add_column("Command", overflow="fold")
     for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):
-        table.add_column(title, justify="right", no_wrap=True)
+        table.add_column(title, justify="right", overflow="fold")
     dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
     left = iter(stored)
     for item in sent:
         before = _values(item)
         if item.seq in dropped:
-            table.add_row(f"{item.seq}→-", *before[1:], style=_DROPPED)
+            table.add_row(f"{item.seq}->-", *before[1:], style=_DROPPED)
         else:
             held = next(left, None)
             table.add_row(*map(_cell, before, _values(held) if held else before))
@@ -54,11 +54,11 @@ def _values(item: MissionItem) -> list[str]:
 def _cell(was: str, becomes: str) -> Text:
     if was == becomes or (was, becomes) == ("-", "0"):
         return Text(was)
-    return Text(f"{was}→{becomes}", style=_CHANGED)
+    return Text(f"{was}->{becomes}", style=_CHANGED)
 
 
 def _number(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:g}"
+    return "-" if math.isnan(value) else f"{value + 0.0:g}"  # + 0.0: no "-0"
 
 
 def _degrees(e7: int | None) -> str:

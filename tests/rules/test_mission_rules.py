@@ -1,0 +1,494 @@
+"""Every row of mission-rules.md, one by one."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from rule_items import (
+    HERE,
+    HOME,
+    LAND,
+    LAT,
+    LON,
+    ROI,
+    ROI_LOCATION,
+    ROI_NONE,
+    RTL,
+    SET_ROI,
+    SPEED,
+    TAKEOFF,
+    TIME,
+    TURNS,
+    UNLIM,
+    WAYPOINT,
+    item,
+    mission,
+)
+
+from bridge.finding import CLEARED, DROPPED, REJECTED
+from bridge.mission_check import MissionCheck, Result, RuleProfile, Verdict, check_count, check_list
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.wp_record import WpCommand, WpRecord
+
+PROFILE = RuleProfile()
+NAN, INF = math.nan, math.inf
+
+
+def verdict_on(*items: MissionItem, profile: RuleProfile = PROFILE, **kwargs: Any) -> Verdict:
+    return check_list(mission(*items), profile, **kwargs)
+
+
+def placed(tested: MissionItem) -> tuple[list[MissionItem], int]:
+    """A valid list with the tested item where its command may stand, and the item's number."""
+    match tested.command:
+        case 22:
+            return mission(tested, item(WAYPOINT)), 1
+        case 17 | 21:
+            return mission(item(WAYPOINT), tested), 2
+        case _:
+            return mission(item(WAYPOINT), tested, item(WAYPOINT)), 2
+
+
+def stored(tested: MissionItem, profile: RuleProfile = PROFILE) -> tuple[MissionItem, dict[str, tuple[Any, Any]]]:
+    """What the item reads back as, and its findings: field to (was, becomes)."""
+    items, seq = placed(tested)
+    verdict = check_list(items, profile)
+    assert verdict.result is Result.ACCEPTED
+    assert len(verdict.items) == len(items)
+    return verdict.items[seq], {f.field: (f.was, f.becomes) for f in verdict.findings if f.seq == seq}
+
+
+# ---------------------------------------------------------------- values
+
+
+@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, RTL, LAND, TAKEOFF, ROI, ROI_LOCATION, SET_ROI])
+def test_a_faultless_item_is_stored_as_it_is_without_a_finding(command: int) -> None:
+    items, seq = placed(item(command))
+    verdict = check_list(items, PROFILE)
+    assert verdict.findings == ()
+    assert replace(verdict.items[seq], seq=0) == items[seq]
+
+
+VALUES = [
+    # p1: fast corner or brake
+    *[(WAYPOINT, "p1", sent, becomes) for sent, becomes in [(0, 0), (1, 1), (1.9, 1), (0.9, 0), (7, 1), (-1, 0)]],
+    *[(WAYPOINT, "p1", sent, becomes) for sent, becomes in [(1e30, 1), (NAN, 0), (INF, 0), (-INF, 0)]],
+    *[(UNLIM, "p1", sent, 0) for sent in (0, 1, -3, NAN)],
+    *[(TURNS, "p1", sent, becomes) for sent, becomes in [(1, 1), (-1, -1), (127, 127), (128, 127), (-127, -127)]],
+    *[(TURNS, "p1", sent, becomes) for sent, becomes in [(-128, -127), (0, 1), (0.9, 1), (-0.9, 1), (NAN, 1)]],
+    *[(TURNS, "p1", sent, becomes) for sent, becomes in [(2.7, 2), (-2.7, -2), (1e30, 127), (-1e30, -127), (INF, 1)]],
+    *[(TIME, "p1", sent, becomes) for sent, becomes in [(1, 1), (255, 255), (256, 255), (0, 1), (-5, 1), (30.9, 30)]],
+    *[(TIME, "p1", sent, becomes) for sent, becomes in [(NAN, 1), (1e30, 255), (INF, 1), (0.99, 1)]],
+    # p2: hit radius of 2 m at least
+    *[
+        (command, "p2", sent, becomes)
+        for command in (WAYPOINT, UNLIM, TURNS, TIME)
+        for sent, becomes in [(2, 2), (0, 2), (1, 2), (2.9, 2), (255, 255), (256, 255), (-9, 2), (NAN, 2), (1e30, 255)]
+    ],
+    # p3 is never used; p4 only with a region of interest (below)
+    *[(command, "p3", sent, 0) for command in (WAYPOINT, UNLIM, TURNS, TIME) for sent in (0, 5, -5, NAN, INF)],
+    *[(command, "p4", sent, 0) for command in (WAYPOINT, UNLIM, TURNS, TIME) for sent in (0, 1, 90, NAN)],
+    # commands without parameters
+    *[
+        (command, field, sent, 0)
+        for command in (RTL, LAND, TAKEOFF, ROI, ROI_LOCATION, SET_ROI)
+        for field in ("p1", "p2", "p3", "p4")
+        for sent in (0, 1, -2.5, NAN)
+    ],
+    # height
+    *[
+        (command, "alt_m", sent, becomes)
+        for command in (WAYPOINT, UNLIM, TURNS, TIME, RTL)
+        for sent, becomes in [(1, 1), (0, 2), (0.99, 2), (-0.99, 2), (-1, -1), (-50.7, -50), (18.5, 18)]
+    ],
+    *[(WAYPOINT, "alt_m", sent, becomes) for sent, becomes in [(32767, 32767), (32768, 32767), (-32768, -32768)]],
+    *[(WAYPOINT, "alt_m", sent, becomes) for sent, becomes in [(-40000, -32768), (1e30, 32767), (-1e30, -32768)]],
+    *[(TAKEOFF, "alt_m", sent, becomes) for sent, becomes in [(2, 2), (15, 15), (15.9, 15), (16, 15), (255, 15)]],
+    *[(TAKEOFF, "alt_m", sent, becomes) for sent, becomes in [(1.9, 2), (0, 2), (-5, 2), (1e30, 15)]],
+    *[(command, "alt_m", sent, 0) for command in (LAND, ROI, ROI_LOCATION, SET_ROI) for sent in (0, 5, -5, NAN, INF)],
+    # position
+    *[(command, "lat_e7", sent, 0) for command in (RTL, LAND, TAKEOFF) for sent in (0, LAT, None, 2**31 - 1)],
+    *[(command, "lon_e7", sent, 0) for command in (RTL, LAND, TAKEOFF) for sent in (0, LON, None, -(2**31))],
+    *[(command, "lat_e7", sent, sent) for command in (WAYPOINT, UNLIM, ROI) for sent in (1, -1, 9 * 10**8, -9 * 10**8)],
+    *[(command, "lon_e7", sent, sent) for command in (TURNS, TIME, SET_ROI) for sent in (1, 18 * 10**8, -18 * 10**8)],
+]
+
+
+@pytest.mark.parametrize(("command", "field", "sent", "becomes"), VALUES)
+def test_a_value_is_truncated_and_clamped_and_a_changed_one_is_a_finding(
+    command: int, field: str, sent: float | None, becomes: int
+) -> None:
+    held, findings = stored(item(command, **{field: sent}))
+    assert getattr(held, field) == becomes
+    as_sent = 0 if sent is None or math.isnan(sent) else sent
+    was = None if sent is None or math.isnan(sent) else sent
+    assert findings == ({} if as_sent == becomes else {field: (was, becomes)})
+
+
+@pytest.mark.parametrize(
+    ("wp_radius_cm", "least"),
+    [(0, 0), (1, 1), (99, 1), (100, 1), (101, 2), (200, 2), (201, 3), (2000, 20), (25500, 255), (65535, 255)],
+)
+def test_gps_wp_radius_is_rounded_up_to_whole_metres(wp_radius_cm: int, least: int) -> None:
+    profile = RuleProfile(wp_radius_cm=wp_radius_cm)
+    for sent in (0, NAN, least - 1):
+        assert stored(item(WAYPOINT, p2=sent), profile)[0].p2 == least
+
+
+def test_the_highest_take_off_is_a_setting() -> None:
+    assert stored(item(TAKEOFF, alt_m=80), RuleProfile(takeoff_max_m=30))[0].alt_m == 30
+
+
+def test_records_hold_what_the_firmware_expects() -> None:
+    verdict = verdict_on(
+        item(TAKEOFF, alt_m=5),
+        item(SET_ROI, lat_e7=1, lon_e7=-2),
+        item(WAYPOINT, p1=1, p2=3, p4=1, alt_m=-7),
+        item(TIME, p1=200, p4=1),
+        item(TURNS, p1=-3),
+        item(RTL, alt_m=9),
+        item(UNLIM, p4=1),
+    )
+    assert verdict.records == (
+        WpRecord(LAT, LON, 10, 0, 0, 2, 0, WpCommand.WAYPOINT),
+        WpRecord(0, 0, 5, 0, 0, 0, 0, WpCommand.TAKEOFF),
+        WpRecord(1, -2, 0, 0, 0, 0, 0, WpCommand.SETROI),
+        WpRecord(LAT, LON, -7, 1, 1, 3, 0, WpCommand.WAYPOINT),
+        WpRecord(LAT, LON, 10, 1, 200, 2, 0, WpCommand.LOITER_TIME),
+        WpRecord(LAT, LON, 10, 0, 0, 2, -3, WpCommand.LOITER_TURNS),
+        WpRecord(0, 0, 9, 0, 0, 0, 0, WpCommand.RETURN_TO_LAUNCH),
+        WpRecord(LAT, LON, 10, 1, 0, 2, 0, WpCommand.LOITER_UNLIM),
+    )
+    assert [held.seq for held in verdict.items] == list(range(8))
+    assert [held.frame for held in verdict.items] == [0] + [3] * 7
+    assert verdict.roi_commands == {2: SET_ROI}
+
+
+# ---------------------------------------------------------------- nose on the region of interest
+
+
+@pytest.mark.parametrize("roi", [ROI, ROI_LOCATION, SET_ROI])
+@pytest.mark.parametrize(("sent", "becomes"), [(1, 1), (1.5, 1), (90, 1), (0.9, 0), (0, 0), (-1, 0), (NAN, 0)])
+def test_with_a_known_roi_p4_turns_the_nose_to_it(roi: int, sent: float, becomes: int) -> None:
+    verdict = verdict_on(
+        item(roi), item(WAYPOINT, p4=sent), item(TIME, p4=sent), item(TURNS, p4=sent), item(UNLIM, p4=sent)
+    )
+    assert [held.p4 for held in verdict.items[2:]] == [becomes, becomes, 0, becomes]
+
+
+def test_a_roi_stays_known_until_roi_none() -> None:
+    wish = item(WAYPOINT, p4=1)
+    verdict = verdict_on(wish, item(ROI), wish, item(SPEED), wish, item(ROI_NONE), wish, item(SET_ROI), wish)
+    assert [held.p4 for held in verdict.items if held.command == WAYPOINT] == [0, 0, 1, 1, 0, 1]
+    assert [(f.seq, f.field, f.becomes) for f in verdict.findings] == [
+        (1, "p4", 0),
+        (4, "command", DROPPED),
+        (6, "command", DROPPED),
+        (7, "p4", 0),
+    ]
+
+
+@pytest.mark.parametrize("missing", [{"lat_e7": 0}, {"lon_e7": None}])
+def test_a_dropped_roi_is_not_known(missing: dict[str, int | None]) -> None:
+    verdict = verdict_on(item(ROI, **missing), item(WAYPOINT, p4=1))
+    assert [held.p4 for held in verdict.items] == [0, 0]
+    assert [f.becomes for f in verdict.findings] == [DROPPED, 0]
+
+
+# ---------------------------------------------------------------- dropped items
+
+
+@pytest.mark.parametrize("command", [0, 1, SPEED, 82, 177, 115, 206, 400, 65535])
+def test_an_unknown_command_is_dropped(command: int) -> None:
+    verdict = verdict_on(item(WAYPOINT), item(command), item(RTL))
+    assert [held.command for held in verdict.items] == [WAYPOINT, WAYPOINT, RTL]
+    assert [(f.seq, f.field, f.was, f.becomes) for f in verdict.findings] == [(2, "command", command, DROPPED)]
+
+
+@pytest.mark.parametrize("command", [WAYPOINT, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI])
+@pytest.mark.parametrize(("field", "sent"), [("lat_e7", 0), ("lat_e7", None), ("lon_e7", 0), ("lon_e7", None)])
+def test_without_coordinates_an_item_is_dropped(command: int, field: str, sent: int | None) -> None:
+    verdict = verdict_on(item(WAYPOINT), item(command, **{field: sent}), item(RTL))
+    assert [held.command for held in verdict.items] == [WAYPOINT, WAYPOINT, RTL]
+    assert [(f.seq, f.field, f.was, f.becomes) for f in verdict.findings] == [(2, field, sent, DROPPED)]
+
+
+def test_a_last_loiter_without_coordinates_is_dropped() -> None:
+    assert len(verdict_on(item(WAYPOINT), item(UNLIM, lat_e7=0)).items) == 2
+
+
+@pytest.mark.parametrize("height", [NAN, INF, -INF])
+@pytest.mark.parametrize("command", [WAYPOINT, TURNS, TIME, RTL])
+def test_without_a_finite_height_an_item_is_dropped(command: int, height: float) -> None:
+    verdict = verdict_on(item(WAYPOINT), item(command, alt_m=height), item(WAYPOINT))
+    assert len(verdict.items) == 3
+    assert [(f.seq, f.field, f.becomes) for f in verdict.findings] == [(2, "alt_m", DROPPED)]
+
+
+def test_a_take_off_without_a_finite_height_is_dropped() -> None:
+    assert [held.command for held in verdict_on(item(TAKEOFF, alt_m=NAN), item(WAYPOINT)).items] == [WAYPOINT] * 2
+
+
+# ---------------------------------------------------------------- frames
+
+
+@pytest.mark.parametrize(
+    ("frame", "is_finding"), [(0, True), (3, False), (5, True), (6, False), (10, True), (11, True)]
+)
+@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, RTL, TAKEOFF])
+def test_every_height_is_taken_as_relative(command: int, frame: int, is_finding: bool) -> None:
+    held, findings = stored(item(command, frame=frame))
+    assert held.frame == 3
+    assert findings == ({"frame": (frame, 3)} if is_finding else {})
+
+
+@pytest.mark.parametrize("frame", [0, 3, 5, 6, 10, 11])
+@pytest.mark.parametrize("command", [LAND, ROI, SET_ROI])
+def test_the_frame_of_a_height_that_is_not_used_is_no_finding(command: int, frame: int) -> None:
+    assert stored(item(command, frame=frame))[1] == {}
+
+
+@pytest.mark.parametrize("command", [RTL, LAND, TAKEOFF])
+def test_the_mission_frame_is_fine_where_no_position_is_used(command: int) -> None:
+    assert stored(item(command, frame=2))[1] == {}
+
+
+@pytest.mark.parametrize("command", [ROI_NONE, SPEED])
+def test_the_mission_frame_is_fine_for_what_is_not_stored(command: int) -> None:
+    assert verdict_on(item(command, frame=2), item(WAYPOINT)).result is Result.ACCEPTED
+
+
+@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI])
+def test_the_mission_frame_rejects_the_list_where_a_position_is_used(command: int) -> None:
+    items, seq = placed(item(command, frame=2))
+    assert_rejected(check_list(items, PROFILE), MissionResult.UNSUPPORTED_FRAME, seq, "frame")
+
+
+@pytest.mark.parametrize("frame", [1, 4, 7, 8, 9, 12, 20, 255])
+@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, RTL, LAND, TAKEOFF, ROI, SET_ROI, SPEED])
+def test_every_other_frame_rejects_the_list(command: int, frame: int) -> None:
+    items, seq = placed(item(command, frame=frame))
+    assert_rejected(check_list(items, PROFILE), MissionResult.UNSUPPORTED_FRAME, seq, "frame")
+
+
+# ---------------------------------------------------------------- rejected lists
+
+
+def assert_rejected(verdict: Verdict, ack: MissionResult, seq: int | None, field: str) -> None:
+    assert (verdict.result, verdict.ack) == (Result.REJECTED, ack)
+    last = verdict.findings[-1]
+    assert (last.seq, last.field, last.becomes) == (seq, field, REJECTED)
+    assert (verdict.records, verdict.items) == ((), ())
+
+
+@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI])
+@pytest.mark.parametrize(
+    ("field", "beyond", "ack"),
+    [
+        ("lat_e7", 900_000_001, MissionResult.INVALID_PARAM5_X),
+        ("lat_e7", -900_000_001, MissionResult.INVALID_PARAM5_X),
+        ("lon_e7", 1_800_000_001, MissionResult.INVALID_PARAM6_Y),
+        ("lon_e7", -1_800_000_001, MissionResult.INVALID_PARAM6_Y),
+    ],
+)
+def test_coordinates_out_of_range_reject_the_list(command: int, field: str, beyond: int, ack: MissionResult) -> None:
+    items, seq = placed(item(command, **{field: beyond}))
+    assert_rejected(check_list(items, PROFILE), ack, seq, field)
+
+
+@pytest.mark.parametrize("command", [UNLIM, LAND])
+def test_a_last_command_elsewhere_rejects_the_list(command: int) -> None:
+    verdict = verdict_on(item(WAYPOINT), item(command), item(SPEED))
+    assert_rejected(verdict, MissionResult.INVALID, 2, "command")
+
+
+@pytest.mark.parametrize("seq", [2, 3])
+def test_a_take_off_elsewhere_rejects_the_list(seq: int) -> None:
+    items = mission(item(WAYPOINT), item(WAYPOINT), item(WAYPOINT))
+    items[seq] = item(TAKEOFF)
+    assert_rejected(check_list(items, PROFILE), MissionResult.INVALID, seq, "command")
+
+
+def test_a_take_off_after_a_dropped_item_rejects_the_list() -> None:
+    verdict = verdict_on(item(SPEED), item(TAKEOFF), item(WAYPOINT))
+    assert_rejected(verdict, MissionResult.INVALID, 2, "command")
+
+
+@pytest.mark.parametrize("roi", [ROI, ROI_LOCATION, SET_ROI])
+def test_a_roi_cannot_be_last_as_received(roi: int) -> None:
+    assert_rejected(verdict_on(item(WAYPOINT), item(roi)), MissionResult.INVALID, 2, "command")
+    assert_rejected(verdict_on(item(WAYPOINT), item(roi, lat_e7=0)), MissionResult.INVALID, 2, "command")
+
+
+@pytest.mark.parametrize("dropped", [item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0)])
+def test_a_roi_cannot_be_last_of_what_is_kept(dropped: MissionItem) -> None:
+    verdict = verdict_on(item(WAYPOINT), item(ROI), dropped)
+    assert_rejected(verdict, MissionResult.INVALID, 2, "command")
+
+
+@pytest.mark.parametrize("command", [RTL, LAND, TAKEOFF])
+def test_some_commands_cannot_stand_alone(command: int) -> None:
+    assert_rejected(verdict_on(item(command)), MissionResult.INVALID, 1, "command")
+
+
+@pytest.mark.parametrize("command", [RTL, LAND])
+def test_a_roi_or_a_dropped_item_is_no_company(command: int) -> None:
+    assert_rejected(verdict_on(item(ROI), item(command)), MissionResult.INVALID, 2, "command")
+    assert_rejected(verdict_on(item(SPEED), item(command)), MissionResult.INVALID, 2, "command")
+
+
+def test_rois_only_are_no_mission() -> None:
+    assert_rejected(verdict_on(item(ROI), item(ROI), item(SPEED)), MissionResult.INVALID, 2, "command")
+
+
+@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME])
+def test_other_commands_can_stand_alone(command: int) -> None:
+    assert verdict_on(item(command)).result is Result.ACCEPTED
+
+
+def test_two_commands_that_cannot_stand_alone_keep_each_other_company() -> None:
+    assert verdict_on(item(TAKEOFF), item(LAND)).result is Result.ACCEPTED
+
+
+# ---------------------------------------------------------------- cleared lists
+
+
+def test_no_items_clear_the_list() -> None:
+    verdict = check_list([], PROFILE)
+    assert (verdict.result, verdict.ack, verdict.records) == (Result.CLEARED, MissionResult.ACCEPTED, ())
+
+
+@pytest.mark.parametrize("dropped", [item(SPEED), item(WAYPOINT, lon_e7=0), item(RTL, alt_m=NAN), item(ROI_NONE)])
+def test_a_list_of_which_only_home_is_kept_clears_the_list(dropped: MissionItem) -> None:
+    for items in (mission(dropped), mission(dropped, item(SPEED), item(SPEED))):
+        verdict = check_list(items, PROFILE)
+        assert (verdict.result, verdict.ack, verdict.records) == (Result.CLEARED, MissionResult.ACCEPTED, ())
+        assert (verdict.findings[-1].was, verdict.findings[-1].becomes) == (len(items), CLEARED)
+        assert "erased" in verdict.findings[-1].text()
+
+
+# ---------------------------------------------------------------- count
+
+
+def test_a_home_alone_is_invalid() -> None:
+    assert_rejected(check_list([HOME], PROFILE), MissionResult.INVALID, None, "count")
+
+
+@pytest.mark.parametrize("capacity", [2, 120, 146])
+def test_more_than_the_capacity_is_no_space(capacity: int) -> None:
+    profile = RuleProfile(capacity=capacity)
+    full = mission(*[item(WAYPOINT)] * (capacity - 1))
+    assert check_list(full, profile).result is Result.ACCEPTED
+    assert_rejected(check_list([*full, item(WAYPOINT)], profile), MissionResult.NO_SPACE, None, "count")
+    rejection = check_count(capacity + 1, profile)
+    assert rejection is not None
+    assert rejection.ack is MissionResult.NO_SPACE
+    assert check_count(capacity, profile) is None
+
+
+def test_count_0_is_no_fault() -> None:
+    assert check_count(0, PROFILE) is None
+
+
+# ---------------------------------------------------------------- home
+
+
+@pytest.mark.parametrize("command", [0, UNLIM, RTL, TAKEOFF, ROI, SPEED])
+def test_home_must_be_a_waypoint(command: int) -> None:
+    verdict = check_list([item(command), item(WAYPOINT)], PROFILE)
+    assert_rejected(verdict, MissionResult.INVALID, 0, "command")
+
+
+@pytest.mark.parametrize(
+    "home", [replace(HOME, lat_e7=0, lon_e7=0), replace(HOME, lat_e7=None), replace(HOME, lon_e7=0)]
+)
+def test_home_without_coordinates_is_where_the_flight_controller_is(home: MissionItem) -> None:
+    items = [home, item(WAYPOINT)]
+    verdict = check_list(items, PROFILE, fallback_home=(11, 22))
+    assert (verdict.items[0].lat_e7, verdict.items[0].lon_e7) == (11, 22)
+    assert [(f.seq, f.field, f.becomes) for f in verdict.findings] == [(0, "lat_e7", 11), (0, "lon_e7", 22)]
+    for no_fix in (None, (0, 0), (11, 0)):
+        rejected = check_list(items, PROFILE, fallback_home=no_fix)
+        assert (rejected.ack, rejected.findings[-1].seq) == (MissionResult.INVALID_PARAM5_X, 0)
+
+
+def test_homes_own_coordinates_come_first() -> None:
+    verdict = check_list([HOME, item(WAYPOINT)], PROFILE, fallback_home=(11, 22))
+    assert (verdict.items[0].lat_e7, verdict.items[0].lon_e7) == (LAT, LON)
+
+
+@pytest.mark.parametrize("frame", [0, 3, 5, 6, 10, 11])
+def test_homes_height_is_the_number_that_was_sent_whatever_its_datum(frame: int) -> None:
+    verdict = check_list([replace(HOME, frame=frame, alt_m=584.0), item(WAYPOINT)], PROFILE)
+    assert (verdict.items[0].frame, verdict.items[0].alt_m, verdict.findings) == (0, 584.0, ())
+
+
+def test_homes_frame_must_have_a_position() -> None:
+    verdict = check_list([replace(HOME, frame=2), item(WAYPOINT)], PROFILE)
+    assert_rejected(verdict, MissionResult.UNSUPPORTED_FRAME, 0, "frame")
+
+
+def test_home_is_a_waypoint_in_every_other_respect() -> None:
+    home = replace(HOME, p1=9.0, p2=math.nan, p3=4.0, p4=1.0, alt_m=0.0)
+    verdict = check_list([home, item(WAYPOINT)], PROFILE)
+    assert verdict.records[0] == WpRecord(LAT, LON, 2, 0, 1, 2, 0, WpCommand.WAYPOINT)
+    assert [f.field for f in verdict.findings] == ["p1", "p2", "p3", "p4", "alt_m"]
+
+
+@pytest.mark.parametrize("height", [NAN, INF])
+def test_home_without_a_finite_height_rejects_the_list(height: float) -> None:
+    verdict = check_list([replace(HOME, alt_m=height), item(WAYPOINT)], PROFILE)
+    assert_rejected(verdict, MissionResult.INVALID_PARAM7, 0, "alt_m")
+
+
+# ---------------------------------------------------------------- item by item
+
+
+@pytest.mark.parametrize(
+    ("seq", "faulty"),
+    [
+        (0, item(LAND)),
+        (0, replace(HOME, lat_e7=0)),
+        (2, item(WAYPOINT, frame=1)),
+        (2, item(WAYPOINT, lat_e7=900_000_001)),
+        (2, item(TAKEOFF)),
+        (2, item(LAND)),
+        (2, item(UNLIM)),
+        (5, item(SET_ROI)),
+    ],
+)
+def test_a_rejection_comes_with_the_item_that_proves_it_and_stays(seq: int, faulty: MissionItem) -> None:
+    items = [HOME] + [item(WAYPOINT)] * 5
+    items[seq] = faulty
+    check = MissionCheck(PROFILE, len(items))
+    answers = [check.take(each) for each in items]
+    assert answers[:seq] == [None] * seq
+    assert answers[seq] is not None
+    assert answers[seq].finding.seq == seq  # type: ignore[union-attr]
+    assert set(map(id, answers[seq:])) == {id(answers[seq])}
+    verdict = check.finish()
+    assert (verdict.result, verdict.findings[-1]) == (Result.REJECTED, answers[seq].finding)  # type: ignore[union-attr]
+
+
+def test_half_a_list_has_no_verdict() -> None:
+    check = MissionCheck(PROFILE, 3)
+    check.take(HOME)
+    check.take(item(WAYPOINT))
+    with pytest.raises(ValueError, match="2 of 3"):
+        check.finish()
+
+
+def test_findings_before_a_rejection_are_kept() -> None:
+    verdict = verdict_on(item(WAYPOINT, p1=5), item(LAND), item(WAYPOINT))
+    assert [(f.seq, f.becomes) for f in verdict.findings] == [(1, 1), (2, REJECTED)]
+
+
+def test_positions_are_stored_to_the_bit() -> None:
+    held, _ = stored(item(WAYPOINT, lat_e7=0x1B0D0D0D, lon_e7=-0x050D0D0D))
+    assert (held.lat_e7, held.lon_e7) == (0x1B0D0D0D, -0x050D0D0D)
+
+
+def test_items_are_numbered_by_their_place() -> None:
+    verdict = check_list([HOME, item(WAYPOINT, seq=77, p1=5, **HERE)], PROFILE)
+    assert [f.seq for f in verdict.findings] == [1]
