@@ -19,8 +19,9 @@ class SimLink:
     async def start(self) -> socket.socket:
         """Supply the board, booted, and return the non-blocking far end, which is the caller's to close.
 
-        Call again after `stop` for the port's return: the board goes on as it was.
+        Called again it is the port's return: an older far end reads end-of-file, the board goes on as it was.
         """
+        self.stop()
         self._near, far = socket.socketpair()
         self._near.setblocking(False)
         far.setblocking(False)

@@ -171,7 +171,7 @@ def test_a_window_of_two_chunks_fills_the_line() -> None:
     assert bench.naze.counters.rx_overflows == 0
 
 
-# -- every request may be repeated ---------------------------------------------------------------------------------------
+# -- every request may be repeated ---------------------------------------------------------------------------
 
 
 def test_begin_of_the_same_list_goes_on_and_of_another_starts_anew() -> None:
@@ -208,7 +208,7 @@ def test_a_repeated_commit_and_abort_are_well() -> None:
     assert bench.naze.counters.flash_writes == 1
 
 
-# -- refusals ------------------------------------------------------------------------------------------------------------
+# -- refusals ------------------------------------------------------------------------------------------------
 
 
 def test_chunk_and_commit_need_a_transfer() -> None:
@@ -344,7 +344,7 @@ def test_reading_past_the_end_is_out_of_range() -> None:
     assert bench.payload(encode_read(4, 1)) == struct.pack("<BH", Status.RANGE, 4)
 
 
-# -- gps_wp_radius -------------------------------------------------------------------------------------------------------
+# -- gps_wp_radius -------------------------------------------------------------------------------------------
 
 
 def test_a_radius_counts_at_once_and_is_written_a_second_later() -> None:
@@ -385,7 +385,7 @@ def test_the_same_radius_is_not_written_again() -> None:
     assert not info(bench).flags
 
 
-# -- power cuts ----------------------------------------------------------------------------------------------------------
+# -- power cuts ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("old", [0, 9])

@@ -169,8 +169,8 @@ def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:
         return bytes(bench.heard)
 
     clean = talk(1, Faults())
-    for faults in ({"bit_error_rate": 0.01}, {"lost_byte_rate": 0.03}):
-        first, again, other = (talk(seed, Faults(**faults)) for seed in (1, 1, 2))
+    for faults in (Faults(bit_error_rate=0.01), Faults(lost_byte_rate=0.03)):
+        first, again, other = (talk(seed, faults) for seed in (1, 1, 2))
         assert first == again
         assert first not in (clean, other)
 

@@ -1,0 +1,215 @@
+"""The simulated Naze on real descriptors: a socket pair, and a pty in a process of its own."""
+
+import asyncio
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import serial
+from naze_bench import mission
+
+from protocols.msp.frame import MspFrame, MspParser, request
+from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
+from protocols.wp_record import identify
+from service.simulator.naze import SimulatedNaze
+from service.simulator.pipe_link import SimLink
+
+IDENT = request(100)
+PATIENCE = 10.0
+
+
+async def ask_socket(far: socket.socket, frame: bytes) -> MspFrame:
+    loop, parser = asyncio.get_running_loop(), MspParser()
+    await loop.sock_sendall(far, frame)
+    async with asyncio.timeout(PATIENCE):
+        while True:
+            if frames := parser.feed(await loop.sock_recv(far, 4096)):
+                return frames[0]
+
+
+async def test_the_pipe_answers_at_once_and_keeps_the_board_over_an_unplugging() -> None:
+    link = SimLink(SimulatedNaze(), asyncio.get_running_loop())
+    with await link.start() as far:
+        assert (await ask_socket(far, IDENT)).payload[0] == 211
+        await ask_socket(far, encode_begin(identify(mission(3))))
+        link.stop()
+        assert await asyncio.get_running_loop().sock_recv(far, 10) == b""
+    with await link.start() as far:
+        info = decode_info((await ask_socket(far, INFO_REQUEST)).payload)
+        assert info is not None
+        assert info.flags.name == "TRANSFER_OPEN"
+        link.stop()
+
+
+@pytest.mark.parametrize("turns", [0, 3])
+async def test_a_client_that_goes_away_can_come_back(turns: int) -> None:
+    link = SimLink(SimulatedNaze(), asyncio.get_running_loop())
+    (await link.start()).close()
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    with await link.start() as far:
+        assert (await ask_socket(far, IDENT)).payload[0] == 211
+    link.stop()
+
+
+class Simulator:
+    """`naze-bridge sim` as its own process."""
+
+    def __init__(self, directory: Path, *options: str) -> None:
+        self.link = directory / "naze"
+        self._control = directory / "control"
+        program = "from service.simulator.command import sim; sim()"
+        arguments = ["--link", str(self.link), "--control", str(self._control), *options]
+        self.process = subprocess.Popen([sys.executable, "-c", program, *arguments], stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        self.greeting = self.process.stdout.readline()
+
+    def control(self, line: str) -> str:
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(self._control))
+            connection.sendall(f"{line}\n".encode())
+            return connection.makefile().readline().strip()
+
+    def stats(self) -> dict[str, object]:
+        found: dict[str, object] = json.loads(self.control("stats"))
+        return found
+
+    def open(self, baud: int = 115200) -> serial.Serial:
+        return serial.Serial(str(self.link), baud, timeout=0.05)
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        self.process.send_signal(number)
+        code = self.process.wait(PATIENCE)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        return code
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
+    started: list[Simulator] = []
+
+    def make(*options: str) -> Simulator:
+        started.append(Simulator(tmp_path, *options))
+        return started[-1]
+
+    yield make
+    for simulator in started:
+        if simulator.process.poll() is None:
+            simulator.end(signal.SIGKILL)
+
+
+def ask(port: serial.Serial, frame: bytes) -> MspFrame | None:
+    """Ask once; None after a second of real time."""
+    parser, deadline = MspParser(), time.monotonic() + 1.0
+    port.write(frame)
+    while time.monotonic() < deadline:
+        if frames := parser.feed(port.read(4096)):
+            return frames[0]
+    return None
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_the_port_answers_at_the_boards_speed_only(start: Callable[..., Simulator]) -> None:
+    simulator = start("--baud", "57600")
+    assert simulator.greeting == f"Simulated Naze at {simulator.link}, 57600 baud. Ctrl-C ends it.\n"
+    with simulator.open(57600) as port:
+        assert ask(port, IDENT) is not None
+        port.baudrate = 115200
+        assert ask(port, IDENT) is None
+        port.baudrate = 57600
+        # What was heard at the wrong speed may have begun a frame; the receiver forgets it.
+        until(lambda: ask(port, IDENT) is not None)
+
+
+def test_the_speed_changes_with_arming(start: Callable[..., Simulator]) -> None:
+    simulator = start("--tele-prot", "3")
+    with simulator.open() as port:
+        assert ask(port, IDENT) is not None
+        assert simulator.control("armed 1") == "ok"
+        until(lambda: simulator.stats()["baud"] == 57600)
+        port.baudrate = 57600
+        port.reset_input_buffer()
+        until(lambda: b"\xfe\x1c" in port.read(200))
+
+
+def test_unplugging_ends_the_port_and_plugging_brings_it_back(start: Callable[..., Simulator]) -> None:
+    simulator = start()
+    port = simulator.open()
+    assert ask(port, IDENT) is not None
+    assert simulator.control("unplug") == "ok"
+    assert not os.path.lexists(simulator.link)
+    with pytest.raises(serial.SerialException):
+        until(lambda: ask(port, IDENT) is None and False)
+    port.close()
+    assert simulator.control("plug") == "ok"
+    with simulator.open() as again:
+        assert ask(again, IDENT) is not None
+
+
+def test_the_flash_outlives_a_kill(start: Callable[..., Simulator], tmp_path: Path) -> None:
+    state, records = str(tmp_path / "flash"), mission(20)
+    simulator = start("--state", state, "--flash-stall", "5")
+    with simulator.open() as port:
+        assert ask(port, encode_begin(identify(records))) is not None
+        first = 0
+        while first < len(records):
+            chunk = encode_chunk(records, first, 15)
+            assert ask(port, chunk.frame) is not None
+            first += chunk.count
+        assert ask(port, encode_commit(identify(records))) is not None
+    assert simulator.end(signal.SIGKILL) == -signal.SIGKILL
+    assert start("--state", state).stats()["records"] == [record.pack().hex() for record in records]
+
+
+def test_control_switches_faults_and_power(start: Callable[..., Simulator]) -> None:
+    simulator = start()
+    with simulator.open() as port:
+        assert simulator.control("hang 1") == "ok"
+        assert ask(port, IDENT) is None
+        assert simulator.control("hang 0") == "ok"
+        assert ask(port, IDENT) is not None
+        assert simulator.control("power off") == "ok"
+        assert ask(port, IDENT) is None
+        assert simulator.stats()["power"] == "OFF"
+    assert simulator.control("bit_error_rate much") == "error: bit_error_rate takes a number, not 'much'"
+    assert simulator.control("sing") == "error: unknown line 'sing'"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number: signal.Signals) -> None:
+    simulator = start()
+    assert simulator.end(number) == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--link", "{}/none/naze"], "Error: Cannot make {}/none/naze: No such file or directory.\n"),
+        (["--link", "{}/file"], "Error: Cannot make {}/file: File exists.\n"),
+        (["--link", "{}/naze", "--state", "{}/none/flash"], "Error: Cannot use the state file {}/none/flash: "),
+        (["--link", "{}/naze", "--state", "{}/file"], "Error: The state file {}/file has 4 bytes, but this board's"),
+    ],
+)
+def test_what_is_in_the_way_is_named(tmp_path: Path, options: list[str], complaint: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    program = "from service.simulator.command import sim; sim()"
+    arguments = [option.format(tmp_path) for option in options]
+    done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith(complaint.format(tmp_path))
+    assert (tmp_path / "file").read_text() == "mine"
