@@ -178,6 +178,8 @@ static nm_status_t begin(nm_t *m, const uint8_t *body)
         m->open = false;
         if (list.count > NM_CAPACITY)
             return NM_NO_SPACE;
+        if (list.count == 0 && list.checksum != 0)
+            return NM_BAD_REQUEST;
         if (is_stored(m, list))
             return NM_SAME;
         if (!erase_slot(m, unused_slot(m)))
@@ -207,7 +209,7 @@ static nm_status_t chunk(nm_t *m, const uint8_t *body, uint8_t length)
     if (first != m->staged.count)
         return first < m->staged.count ? NM_OK : NM_SEQUENCE;
     if (count > m->wanted.count - m->staged.count)
-        return NM_BAD_REQUEST;
+        return NM_RANGE;
     for (uint16_t i = 0; i < count; i++) {
         if (records[i * NM_RECORD_SIZE + COMMAND_AT] > LAST_COMMAND) {
             m->open = false;
@@ -227,12 +229,10 @@ static nm_status_t commit(nm_t *m, const uint8_t *body)
 {
     const nm_list_t list = get_list(body);
     const nm_status_t allowed = may_write(m);
-    if (!m->open && is_stored(m, list))
-        return NM_OK;
     if (allowed != NM_OK)
         return allowed;
     if (!m->open)
-        return NM_NO_TRANSFER;
+        return is_stored(m, list) ? NM_OK : NM_NO_TRANSFER;
     heard(m);
     if (m->staged.count < m->wanted.count)
         return NM_INCOMPLETE;
@@ -254,8 +254,11 @@ static nm_status_t set_radius(nm_t *m, const uint8_t *body)
         return NM_RANGE;
     if (m->board->armed(m->self))
         return NM_ARMED;
-    if (radius != m->board->radius(m->self))
-        m->board->set_radius(m->self, radius);
+    if (radius == m->board->radius(m->self))
+        return NM_OK;
+    if (m->board->write_pending(m->self))
+        return NM_BUSY;
+    m->board->set_radius(m->self, radius);
     return NM_OK;
 }
 
@@ -272,9 +275,7 @@ static int reply_list(uint8_t *reply, nm_status_t status, nm_list_t list)
 static int reply_progress(const nm_t *m, uint8_t *reply, nm_status_t status)
 {
     const nm_list_t nothing = {0, 0};
-    if (status == NM_SAME)
-        return reply_list(reply, status, m->stored);
-    return reply_list(reply, status, status == NM_OK || status == NM_SEQUENCE ? m->staged : nothing);
+    return reply_list(reply, status, m->open ? m->staged : nothing);
 }
 
 static int reply_stored(const nm_t *m, uint8_t *reply, nm_status_t status)
@@ -306,17 +307,16 @@ static int reply_info(const nm_t *m, uint8_t *reply)
 
 static int reply_read(const nm_t *m, uint8_t *reply, const uint8_t *body, uint8_t length)
 {
-    const uint16_t first = length == 4 ? get16(body) : 0;
-    uint16_t count = length == 4 && body[3] == 0 ? body[2] : 0;
+    const bool well_formed = length == 4 && body[2] != 0 && body[3] == 0;
+    const uint16_t first = well_formed ? get16(body) : 0;
+    uint16_t count = body[2];
     put16(reply + 1, first);
-    if (count == 0 || count > NM_READ_RECORDS) {
-        reply[0] = NM_BAD_REQUEST;
+    if (!well_formed || first >= m->stored.count) {
+        reply[0] = well_formed ? NM_RANGE : NM_BAD_REQUEST;
         return READ_SIZE;
     }
-    if (first >= m->stored.count) {
-        reply[0] = NM_RANGE;
-        return READ_SIZE;
-    }
+    if (count > NM_READ_RECORDS)
+        count = NM_READ_RECORDS;
     if (count > m->stored.count - first)
         count = (uint16_t)(m->stored.count - first);
     reply[0] = NM_OK;

@@ -120,7 +120,8 @@ static bool armed(void *self)
 
 static bool write_pending(void *self)
 {
-    return ((const sim_t *)self)->write_pending;
+    const sim_t *s = self;
+    return s->write_pending || s->radius_cm != s->saved_radius_cm;
 }
 
 static uint16_t radius(void *self)
@@ -132,8 +133,7 @@ static void set_radius(void *self, uint16_t radius_cm)
 {
     sim_t *s = self;
     s->radius_cm = radius_cm;
-    s->write_due_ms = s->now_ms + SIM_CONFIG_DELAY_MS;
-    s->write_pending = true;
+    s->changed_ms = s->now_ms;
 }
 
 static void list_changed(void *self, const uint8_t *records, uint16_t count)
@@ -152,7 +152,7 @@ void sim_init(sim_t *s)
     memset(s->flash, 0xFF, NM_FLASH_SIZE);
     for (uint16_t i = 0; i < NM_PAGE_SIZE; i++)
         s->flash[SIM_CONFIG_OFFSET + i] = config_byte(i);
-    s->radius_cm = 200;
+    s->saved_radius_cm = 200;
     s->random = 1;
     sim_power_up(s);
 }
@@ -173,7 +173,7 @@ void sim_destroy(sim_t *s)
 void sim_power_up(sim_t *s)
 {
     s->armed = s->write_pending = false;
-    s->write_due_ms = 0;
+    s->radius_cm = s->saved_radius_cm;
     s->now_ms = 0;
     s->frame_length = 0;
     s->list_count = 0;
@@ -220,10 +220,8 @@ void sim_advance(sim_t *s, uint32_t milliseconds)
         s->now_ms += step;
         milliseconds -= step;
         nm_poll(&s->core);
-    }
-    if (s->write_due_ms && s->now_ms - s->write_due_ms < UINT32_MAX / 2) {
-        s->write_due_ms = 0;
-        s->write_pending = false;
+        if (!s->armed && s->now_ms - s->changed_ms >= SIM_SAVE_DELAY_MS)
+            s->saved_radius_cm = s->radius_cm;
     }
 }
 

@@ -21,7 +21,7 @@
 
 #define SIM_CONFIG_OFFSET NM_FLASH_SIZE
 #define SIM_FLASH_SIZE (NM_FLASH_SIZE + NM_PAGE_SIZE)
-#define SIM_CONFIG_DELAY_MS 1000u /* a changed gps_wp_radius is stored after this time, write_pending until then */
+#define SIM_SAVE_DELAY_MS 1000u
 #define SIM_FRAME_SIZE (6u + NM_BUFFER_SIZE)
 
 /* How far the operation got at which the power was cut. */
@@ -35,10 +35,11 @@ typedef struct {
     uint8_t flash[SIM_FLASH_SIZE];
 
     uint32_t now_ms;
-    uint16_t radius_cm;
+    uint16_t radius_cm;       /* gps_wp_radius in RAM */
+    uint16_t saved_radius_cm; /* ... and in the configuration, where it gets SIM_SAVE_DELAY_MS after a change */
+    uint32_t changed_ms;
     bool armed;
-    bool write_pending;
-    uint32_t write_due_ms; /* when a new gps_wp_radius will have been stored; 0: it is */
+    bool write_pending; /* some other write of the configuration is scheduled */
 
     uint32_t operations; /* flash operations since sim_create() or sim_count() */
     uint32_t violations; /* of the flash's rules */
@@ -68,7 +69,7 @@ void sim_init(sim_t *s);
 sim_t *sim_create(void);
 void sim_destroy(sim_t *s);
 
-/* Reset: everything but the flash (and gps_wp_radius, which stands in the configuration) is forgotten. */
+/* Reset: everything but the flash and the saved gps_wp_radius is forgotten. */
 void sim_power_up(sim_t *s);
 
 /* Count flash operations from 0 again, and cut the power at the `cut_at`th (0: never). */

@@ -1,0 +1,108 @@
+"""The firmware's mission core, compiled for this machine, on a board of memory (firmware/sim/sim_board.h)."""
+
+import ctypes
+import subprocess
+from ctypes import POINTER, c_bool, c_int, c_uint8, c_uint16, c_uint32, c_void_p
+from functools import cache
+from pathlib import Path
+
+from protocols.wp_record import RECORD_SIZE
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+
+_BUFFER_SIZE = 243
+_CAPACITY = 146
+_NO_COMMAND, _POWER_CUT = -1, -2
+
+_SIGNATURES = {
+    "sim_create": (c_void_p, []),
+    "sim_destroy": (None, [c_void_p]),
+    "sim_power_up": (None, [c_void_p]),
+    "sim_cut_at": (None, [c_void_p, c_uint32, c_int]),
+    "sim_fail_at": (None, [c_void_p, c_uint32, c_int]),
+    "sim_request": (c_int, [c_void_p, c_uint8, POINTER(c_uint8), c_uint8]),
+    "sim_store": (c_int, [c_void_p, POINTER(c_uint8), c_uint16]),
+    "sim_advance": (None, [c_void_p, c_uint32]),
+    "sim_arm": (None, [c_void_p, c_bool]),
+    "sim_set_write_pending": (None, [c_void_p, c_bool]),
+    "sim_config_intact": (c_bool, [c_void_p]),
+    "sim_operations": (c_uint32, [c_void_p]),
+    "sim_violations": (c_uint32, [c_void_p]),
+    "sim_list": (c_uint16, [c_void_p, POINTER(c_uint8)]),
+}
+
+
+class PowerCut(Exception):
+    """The power went away in the middle of a flash operation; `power_cycle` starts the board again."""
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    subprocess.run(["make", "-s", "-C", FIRMWARE, "sim"], check=True)
+    library = ctypes.CDLL(str(FIRMWARE / "build" / "libnaze_mission.so"))
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+class CCore:
+    """One board: flash as delivered, powered up, disarmed."""
+
+    def __init__(self) -> None:
+        self._c = _library()
+        self._board = c_void_p(self._c.sim_create())
+
+    def __del__(self) -> None:
+        self._c.sim_destroy(self._board)
+
+    def request(self, command: int, payload: bytes) -> bytes | None:
+        """Return the reply's payload; None if the core does not know the command. PowerCut."""
+        buffer = (c_uint8 * _BUFFER_SIZE)(*payload)
+        length = self._c.sim_request(self._board, command, buffer, len(payload))
+        if length == _POWER_CUT:
+            raise PowerCut
+        return None if length == _NO_COMMAND else bytes(buffer[:length])
+
+    def store(self, records: bytes) -> int:
+        """Let the firmware save a list of its own; return the status. PowerCut."""
+        buffer = (c_uint8 * max(len(records), 1))(*records)
+        status = int(self._c.sim_store(self._board, buffer, len(records) // RECORD_SIZE))
+        if status == _POWER_CUT:
+            raise PowerCut
+        return status
+
+    def advance(self, milliseconds: int) -> None:
+        """Let time pass."""
+        self._c.sim_advance(self._board, milliseconds)
+
+    def arm(self, armed: bool) -> None:
+        """Arm or disarm."""
+        self._c.sim_arm(self._board, armed)
+
+    def set_busy(self, busy: bool) -> None:
+        """Schedule a write of the configuration, or let it be done."""
+        self._c.sim_set_write_pending(self._board, busy)
+
+    def power_cycle(self) -> None:
+        """Switch off and on: only the flash and gps_wp_radius stay."""
+        self._c.sim_power_up(self._board)
+
+    def cut_power_at(self, operation: int) -> None:
+        """Cut the power within the n-th flash operation from now on; 0: never."""
+        self._c.sim_cut_at(self._board, operation, 1)
+
+    def fail_at(self, operation: int) -> None:
+        """Let the n-th flash operation from now on fail; 0: none."""
+        self._c.sim_fail_at(self._board, operation, 0)
+
+    @property
+    def list(self) -> bytes:
+        """The records that the firmware around the core has in RAM."""
+        buffer = (c_uint8 * (_CAPACITY * RECORD_SIZE))()
+        return bytes(buffer[: self._c.sim_list(self._board, buffer) * RECORD_SIZE])
+
+    @property
+    def sound(self) -> bool:
+        """Whether every flash operation kept the rules and the configuration is untouched."""
+        return bool(self._c.sim_config_intact(self._board)) and self._c.sim_violations(self._board) == 0

@@ -1,0 +1,95 @@
+"""The two flight controllers that must not be told apart: the firmware's C core, and the simulator's model."""
+
+from typing import Protocol
+
+from c_core import PowerCut
+
+from protocols.msp.mission import MissionCommand
+from service.simulator.flash import ERASED, NorFlash, PowerCutError
+from service.simulator.mission_commands import Board, MissionCommands
+from service.simulator.mission_slots import MissionSlots, StoredConfig, flash_size
+from service.simulator.options import Faults, SimOptions
+
+
+class Device(Protocol):
+    """A flight controller without its serial port."""
+
+    def request(self, command: int, payload: bytes) -> bytes | None:
+        """Return the reply's payload; None if the command is none of the extension's. PowerCut."""
+
+    def advance(self, milliseconds: int) -> None:
+        """Let time pass."""
+
+    def arm(self, armed: bool) -> None:
+        """Arm or disarm."""
+
+    def set_busy(self, busy: bool) -> None:
+        """Schedule a write of the configuration, or let it be done."""
+
+    def power_cycle(self) -> None:
+        """Switch off and on."""
+
+    def cut_power_at(self, operation: int) -> None:
+        """Cut the power within the n-th flash operation from now on; 0: never."""
+
+    def fail_at(self, operation: int) -> None:
+        """Let the n-th flash operation from now on fail; 0: none."""
+
+    @property
+    def list(self) -> bytes:
+        """The records that the firmware works with."""
+
+
+class Model:
+    """The simulator's model, in the same clothes as the C core."""
+
+    def __init__(self) -> None:
+        self._options = SimOptions()
+        self._faults = Faults()
+        size = flash_size(self._options)
+        self._flash = NorFlash(memoryview(bytearray((ERASED,)) * size), self._faults)
+        # The configuration has a chip of its own, so that no fault meant for the list hits it.
+        config_flash = NorFlash(memoryview(bytearray((ERASED,)) * size), Faults())
+        self._config = StoredConfig(config_flash, self._options)
+        self.power_cycle()
+
+    def request(self, command: int, payload: bytes) -> bytes | None:
+        try:
+            return self._commands.answer(command, payload, self._now)
+        except PowerCutError:
+            raise PowerCut from None
+
+    def advance(self, milliseconds: int) -> None:
+        self._now += milliseconds / 1000
+        due = self._board.config_write_due
+        if due is not None and not self._board.armed and self._now >= due:
+            self._config.save(self._board.wp_radius_cm)
+            self._board.config_write_due = None
+
+    def arm(self, armed: bool) -> None:
+        self._board.armed = armed
+        # The model looks at arming only when it is asked something; the daemon polls all the time.
+        self.request(MissionCommand.INFO, b"")
+
+    def set_busy(self, busy: bool) -> None:
+        self._faults.busy = busy
+
+    def power_cycle(self) -> None:
+        self._now = 0.0
+        self._faults.busy = False
+        self.cut_power_at(0)
+        self.fail_at(0)
+        self._slots = MissionSlots(self._flash, self._options)
+        self._board = Board(armed=False, wp_radius_cm=self._config.load())
+        self._commands = MissionCommands(self._slots, self._board, self._options, self._faults)
+
+    def cut_power_at(self, operation: int) -> None:
+        self._faults.power_cut_at_flash_operation = operation and self._flash.operations + operation
+
+    def fail_at(self, operation: int) -> None:
+        assert operation in (0, 1), "the model lets the next operations fail, not a later one"
+        self._faults.flash_failures = operation
+
+    @property
+    def list(self) -> bytes:
+        return self._slots.read(0, self._slots.stored.count)
