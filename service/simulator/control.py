@@ -71,7 +71,7 @@ class Control:
             "armed": naze.armed,
             "baud": naze.baud,
             "power": naze.power.name,
-            "protocol": naze.protocol.name,
+            "protocol": naze.protocol.name if naze.protocol else None,
             "records": [stored[at : at + RECORD_SIZE].hex() for at in range(0, len(stored), RECORD_SIZE)],
         }
 

@@ -48,9 +48,9 @@ class Stream(Enum):
 class MavlinkSchedule:
     """Decides which message is due. `only_heartbeat`: the firmware is in AUTOSENSE."""
 
-    def __init__(self) -> None:
+    def __init__(self, now: float) -> None:
         self._slot = 0
-        self._time = 0.0
+        self._time = now
 
     def resume(self, now: float) -> None:
         """Go on from `now`, after a time in which the firmware did not come here."""

@@ -43,9 +43,9 @@ class SimOptions:
 class Faults:
     """Switches that may be turned at any moment.
 
-    Rates are probabilities a bit and a byte, in both directions. `armed` is the pilot's wish: the firmware
-    refuses it while a configuration write is scheduled. Flash operations (page erases, 16-byte programs)
-    count from 1.
+    The rates are probabilities a bit and a byte, in both directions. `armed` is the pilot's wish: the firmware refuses
+    it while a configuration write is scheduled. `extension` counts from the next boot. The power goes in the middle of
+    that flash operation (page erases and 16-byte programs, from 1; 0: never), or so many of them fail.
     """
 
     bit_error_rate: float = 0.0
@@ -63,9 +63,9 @@ class Counters:
     """What happened to the board since it was made.
 
     hazard_runs: three equal hazard bytes in a row on the RX pin, acted on or not.
-    rx_overflows, tx_overflows: how often a ring was lapped. max_outstanding_reply_bytes: of the 255 that
-    the TX ring holds.
-    flash_writes: mission lists made valid.
+    rx_overflows, tx_overflows: how often a ring was lapped.
+    max_outstanding_reply_bytes: of the 255 that the TX ring holds.
+    flash_writes: mission lists that were ever made valid in this flash, as of the last mission command.
     """
 
     hazard_runs: int = 0

@@ -33,8 +33,9 @@ class Uart:
         self._sent = bytearray()
         self._burst_ends: deque[float] = deque()
 
-    def set_baud(self, baud: int) -> None:
+    def set_baud(self, baud: int, now: float) -> None:
         """Initialise the UART anew, as the firmware does on arming: what is in the rings is lost."""
+        self._transmit(now)
         self.baud = baud
         self._byte_time = _BITS_PER_BYTE / baud
         self._unread.clear()
@@ -44,9 +45,12 @@ class Uart:
 
     def power_off(self) -> None:
         """Forget everything that is under way."""
-        self.set_baud(self.baud)
         self._wire.clear()
         self._wire_free_at = 0.0
+        self._unread.clear()
+        self._dma_left = 0
+        self._head = self._tail
+        self._burst_ends.clear()
         self._sent.clear()
 
     # -- incoming --------------------------------------------------------------------------------------------
@@ -69,9 +73,9 @@ class Uart:
         """Tell when the last byte on the wire will be there."""
         return self._wire_free_at
 
-    def discard_unread(self, now: float) -> None:
-        """Drop what arrived until `now` (the receiver was not running)."""
-        self._arrive(now)
+    def discard_arrived(self, now: float) -> None:
+        """Drop what arrived until `now`, while no receiver was running."""
+        self._leave_wire(now)
         self._unread.clear()
 
     def read(self, now: float) -> int | None:
@@ -80,6 +84,13 @@ class Uart:
         return self._unread.pop(0) if self._unread else None
 
     def _arrive(self, now: float) -> None:
+        self._leave_wire(now)
+        if len(self._unread) >= RING_SIZE:
+            # The DMA has lapped the reader, who sees only the distance between the two positions.
+            self._counters.rx_overflows += 1
+            del self._unread[: len(self._unread) - len(self._unread) % RING_SIZE]
+
+    def _leave_wire(self, now: float) -> None:
         while self._wire:
             start, data = self._wire[0]
             count = min(int((now - start) / self._byte_time + _EPSILON_BYTES), len(data))
@@ -90,10 +101,6 @@ class Uart:
                 self._wire.popleft()
             else:
                 self._wire[0] = (start + count * self._byte_time, data[count:])
-        if len(self._unread) >= RING_SIZE:
-            # The DMA has lapped the reader, who sees only the distance between the two positions.
-            self._counters.rx_overflows += 1
-            del self._unread[: len(self._unread) - len(self._unread) % RING_SIZE]
 
     # -- outgoing --------------------------------------------------------------------------------------------
 

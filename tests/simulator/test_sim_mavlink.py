@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common as mavlink2
 
 from protocols.msp.frame import request
 from protocols.msp.mission import encode_radius
-from service.simulator.naze import Protocol
+from service.simulator.firmware import Protocol
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
 
 IDENT = request(100)
@@ -41,7 +41,7 @@ def test_autosense_sends_heartbeats_of_an_ardupilot_once_a_second() -> None:
         assert not message.base_mode & mavlink1.MAV_MODE_FLAG_SAFETY_ARMED
 
 
-def protocol(bench: Bench) -> Protocol:
+def protocol(bench: Bench) -> Protocol | None:
     """Of this moment; mypy takes a property for a constant."""
     return bench.naze.protocol
 

@@ -6,7 +6,8 @@ from naze_bench import BOOT_SECONDS, Bench, mission
 from protocols.msp.frame import request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
 from protocols.wp_record import identify
-from service.simulator.naze import Power, Protocol
+from service.simulator.firmware import Protocol
+from service.simulator.naze import Power
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
 
 IDENT = request(100)

@@ -120,7 +120,7 @@ def test_another_speed_drops_what_is_in_the_rings() -> None:
     uart.receive(b"r" * 20, 0.0)
     assert uart.read(20 * BYTE) == ord("r")
     uart.write(b"t" * 100, 20 * BYTE)
-    uart.set_baud(9600)
+    uart.set_baud(9600, 20 * BYTE)
     assert uart.transmitted(1.0) == b""
     assert uart.read(1.0) is None
     uart.write(b"n" * 10, 1.0)

@@ -1,0 +1,268 @@
+"""Harakiri from one boot to the next: its main loop, and its serial port as serialCom has it (serial.c, mw.c).
+
+All that lives in RAM lives in this object, so a new one is a reset.
+"""
+
+import contextlib
+from enum import Enum, auto
+from math import ceil
+
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.wp_record import RECORD_SIZE
+from service.simulator import frsky
+from service.simulator.flash import FlashError, NorFlash
+from service.simulator.flight import FlightState, fly
+from service.simulator.mavlink_port import MavlinkSchedule, MavlinkSender
+from service.simulator.mission_commands import Board, MissionCommands
+from service.simulator.mission_slots import MissionSlots, StoredConfig
+from service.simulator.msp_port import HarakiriCommand, MspAnswers, MspReceiver, reply
+from service.simulator.options import Counters, Faults, SimOptions, TelemetryProtocol
+from service.simulator.traps import Trap, TrapCounters
+from service.simulator.uart import Uart
+
+_AUTOSENSE_SECONDS = 4.0
+_SINGLE_STEPS = 3
+_LONG_LOOP = 1.05
+_FRSKY_BAUD = 9600
+_MINIMOSD_BAUD = 57600
+_CLI_PROMPT = b"\r\n# "
+_CLI_BANNER = b"\r\nSimulated Naze, command line" + _CLI_PROMPT
+# Times are seconds as floats: what is due now is due.
+_EPSILON = 1e-9
+
+
+class ResetError(Exception):
+    """The firmware has reset the board."""
+
+
+class Protocol(Enum):
+    """What the firmware believes to be spoken on the UART."""
+
+    AUTOSENSE = auto()
+    MSP = auto()
+    MAVLINK = auto()
+
+
+class Firmware:
+    """Runs one main loop at a time; loops that would have nothing to do need not be run."""
+
+    def __init__(
+        self, options: SimOptions, faults: Faults, counters: Counters, uart: Uart, flash: NorFlash, now: float
+    ) -> None:
+        self._options = options
+        self._faults = faults
+        self._counters = counters
+        self._uart = uart
+        self._flash = flash
+        self.protocol = Protocol.AUTOSENSE
+        self.in_cli = False
+
+        self._booted_at = self._clock = self._next_loop = now
+        self._looptime = options.looptime_ms / 1000
+        self._loop_was_long, self._single_steps = False, 0
+        self._flown = 0.0
+
+        self._config = StoredConfig(flash, options)
+        self._board = Board(armed=False, wp_radius_cm=self._config.load())
+        self._slots = MissionSlots(flash, options)
+        self._missions = MissionCommands(self._slots, self._board, options, faults) if faults.extension else None
+        # The extension brings a buffer for its longest CHUNK: mask, number, records.
+        self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
+        self._answers = MspAnswers(lambda: (self._flight(), self.armed))
+        self._mavlink = MavlinkSplitter()
+        self._sender = MavlinkSender()
+        self._schedule = MavlinkSchedule(now)
+        self._frsky_number, self._frsky_time = 0, now
+        self._traps = TrapCounters()
+        self._last_valid = self._last_byte = now
+
+    @property
+    def armed(self) -> bool:
+        """Whether the craft is armed."""
+        return self._board.armed
+
+    # -- the main loop ---------------------------------------------------------------------------------------
+
+    def next_loop(self) -> float | None:
+        """Tell when the next main loop runs that has anything to do; None if it waits for a byte or the pilot."""
+        wanted = [self._uart.next_arrival()]
+        if not self.in_cli:
+            if self._pilot_is_obeyed():
+                return self._next_loop
+            wanted += [self._board.config_write_due, self._telemetry_due()]
+        earliest = min((at for at in wanted if at is not None), default=None)
+        return None if earliest is None else self.loop_at(earliest)
+
+    def loop_at(self, earliest: float) -> float:
+        """Tell when the first main loop at or after `earliest` runs."""
+        loops = ceil((earliest - self._next_loop) / self._looptime - 1e-6)
+        return self._next_loop + max(loops, 0) * self._looptime
+
+    def run_loop(self, at: float) -> None:
+        """Run the main loop that begins at `at`. PowerCutError, ResetError."""
+        if at > self._next_loop:
+            self._loop_was_long = False
+        if self.armed:
+            self._flown += at - self._clock
+        self._clock = at
+        if self.in_cli:
+            self._serve_cli()
+        else:
+            self._follow_pilot()
+            self._write_config_if_due()
+            self._serve_uart()
+        self._loop_was_long = self._clock - at > self._looptime * _LONG_LOOP
+        self._next_loop = max(at + self._looptime, self._clock)
+
+    def hold(self, now: float) -> None:
+        """Do nothing until `now`."""
+        if now > self._next_loop:
+            self._next_loop = now
+            self._schedule.resume(now)
+
+    def _flight(self) -> FlightState:
+        return fly(self._clock - self._booted_at, self._flown, self.armed)
+
+    def _pilot_is_obeyed(self) -> bool:
+        """Arming is refused while a configuration write is scheduled."""
+        return self._faults.armed != self.armed and (self.armed or self._board.config_write_due is None)
+
+    def _follow_pilot(self) -> None:
+        """Arm or disarm; the UART's speed follows (initFRSKYTelemetry, initMinimOSDTelemetry)."""
+        if not self._pilot_is_obeyed():
+            return
+        self._board.armed = not self.armed
+        match self._options.tele_prot:
+            case TelemetryProtocol.FRSKY_9600:
+                self._uart.set_baud(_FRSKY_BAUD if self.armed else self._options.baud, self._clock)
+            case TelemetryProtocol.MAVLINK_57600:
+                self._uart.set_baud(_MINIMOSD_BAUD if self.armed else self._options.baud, self._clock)
+
+    def _write_config_if_due(self) -> None:
+        due = self._board.config_write_due
+        if due is not None and self._clock >= due - _EPSILON:
+            self._write_config()
+
+    def _write_config(self) -> None:
+        """Write the whole configuration; the firmware does not look whether it took (writeParams)."""
+        self._board.config_write_due = None
+        with contextlib.suppress(FlashError):
+            self._config.save(self._board.wp_radius_cm)
+        self._stall()
+
+    def _stall(self) -> None:
+        """Let the time pass for which flash held the CPU."""
+        seconds = self._flash.take_busy_seconds()
+        if seconds:
+            self._clock += seconds
+            self._schedule.resume(self._clock)
+
+    # -- the serial port -------------------------------------------------------------------------------------
+
+    def _serve_uart(self) -> None:
+        one_packet = self._must_single_step()
+        self._choose_protocol()
+        self._send_telemetry()
+        if self._missions and self._clock - self._last_byte > self._options.inter_byte_timeout_ms / 1000:
+            self._msp.forget()
+        while (byte := self._uart.read(self._clock)) is not None:
+            self._last_byte = self._clock
+            match self._traps.count(byte, self.protocol is Protocol.AUTOSENSE, self.armed):
+                case Trap.CLI:
+                    self._enter_cli()
+                    return
+                case Trap.RESET:
+                    raise ResetError
+            if self._completes_packet(byte):
+                self._last_valid = self._clock
+                if one_packet:
+                    return
+
+    def _must_single_step(self) -> bool:
+        """After a long loop only one packet is taken, in three loops running at most."""
+        self._single_steps = min(self._single_steps + 1, _SINGLE_STEPS + 1) if self._loop_was_long else 0
+        return 0 < self._single_steps <= _SINGLE_STEPS
+
+    def _choose_protocol(self) -> None:
+        if not self.armed:
+            if self._clock - self._last_valid >= _AUTOSENSE_SECONDS - _EPSILON:
+                self._switch(Protocol.AUTOSENSE)
+            return
+        match self._options.tele_prot:
+            case TelemetryProtocol.MSP:
+                self._switch(Protocol.MSP)
+            case TelemetryProtocol.FRSKY_9600:
+                self._send_frsky()
+            case TelemetryProtocol.MAVLINK | TelemetryProtocol.MAVLINK_57600:
+                self._switch(Protocol.MAVLINK)
+
+    def _switch(self, protocol: Protocol) -> None:
+        if self.protocol is Protocol.MSP and protocol is not Protocol.MSP:
+            self._schedule.resume(self._clock)
+        self.protocol = protocol
+
+    def _telemetry_due(self) -> float | None:
+        """Tell when the firmware next sends, or changes its protocol, by itself."""
+        due = []
+        if self.protocol is not Protocol.MSP:
+            due.append(self._schedule.next_due(self.protocol is Protocol.AUTOSENSE))
+        if not self.armed:
+            if self.protocol is not Protocol.AUTOSENSE:
+                due.append(self._last_valid + _AUTOSENSE_SECONDS)
+        elif self._options.tele_prot is TelemetryProtocol.FRSKY_9600:
+            due.append(self._frsky_time + frsky.PERIOD_SECONDS)
+        return min(due, default=None)
+
+    def _send_telemetry(self) -> None:
+        if self.protocol is Protocol.MSP:
+            return
+        for message in self._schedule.take_due(self._clock, self.protocol is Protocol.AUTOSENSE):
+            uptime = self._clock - self._booted_at
+            frame = self._sender.pack(message, self._flight(), self.armed, uptime)
+            self._uart.write(frame, self._clock)
+
+    def _send_frsky(self) -> None:
+        if self._clock - self._frsky_time >= frsky.PERIOD_SECONDS - _EPSILON:
+            self._frsky_time = self._clock
+            self._frsky_number += 1
+            self._uart.write(frsky.frame(self._flight(), self._frsky_number), self._clock)
+
+    def _completes_packet(self, byte: int) -> bool:
+        """Give a byte to the receivers that listen; what a MAVLink frame says is not simulated."""
+        if self.protocol is not Protocol.MSP and self._completes_mavlink_1(byte):
+            self._switch(Protocol.MAVLINK)
+            return True
+        if self.protocol is not Protocol.MAVLINK and (request := self._msp.push(byte)):
+            self._switch(Protocol.MSP)
+            self._answer(*request)
+            return True
+        return False
+
+    def _completes_mavlink_1(self, byte: int) -> bool:
+        return any(frame.version == 1 for frame in self._mavlink.feed(bytes((byte,))))
+
+    def _answer(self, command: int, payload: bytes) -> None:
+        answer = self._missions.answer(command, payload, self._clock) if self._missions else None
+        if answer is not None:
+            frame = reply(command, answer)
+            self._counters.flash_writes = self._slots.writes
+        else:
+            if command == HarakiriCommand.EEPROM_WRITE:
+                self._write_config()
+            frame = self._answers.answer(command, payload)
+        self._stall()
+        self._uart.write(frame, self._clock)
+
+    # -- the CLI, from which no way leads back but a reset ---------------------------------------------------
+
+    def _enter_cli(self) -> None:
+        self.in_cli = True
+        self._counters.cli_entered = True
+        self._uart.write(_CLI_BANNER, self._clock)
+
+    def _serve_cli(self) -> None:
+        while (byte := self._uart.read(self._clock)) is not None:
+            if byte == ord("\r"):
+                self._uart.write(_CLI_PROMPT, self._clock)
+            elif ord(" ") <= byte <= ord("~"):
+                self._uart.write(bytes((byte,)), self._clock)
