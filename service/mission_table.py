@@ -21,8 +21,15 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` tell which items are missing
     in it, and stand below the table with their reasons.
     """
-    reasons = Text("\n".join(finding.full_text() for finding in findings))
-    table = Table(box=box.SIMPLE_HEAD, collapse_padding=True, caption=reasons, caption_justify="left")
+    reasons = Text("".join(f"\n{finding.full_text()}" for finding in findings))
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        collapse_padding=True,
+        pad_edge=False,
+        show_edge=False,
+        caption=reasons,
+        caption_justify="left",
+    )
     table.add_column("WP", justify="right", overflow="fold")
     table.add_column("Command", overflow="fold")
     for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):

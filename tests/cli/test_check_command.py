@@ -1,0 +1,162 @@
+"""`naze-bridge check` as a person and as a script use it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_item import MissionItem
+from protocols.wp_record import unpack_record
+from service.check import check
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+FIELD, PLAN, LONG = (EXAMPLES / name for name in ("naze-field.waypoints", "naze-field.plan", "long-146.waypoints"))
+
+HOME = MissionItem(0, 16, 0, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 131.0)
+POINT = MissionItem(1, 16, 3, 0.0, 2.0, 0.0, 0.0, 453839000, 84734000, 10.0)
+LAND = MissionItem(1, 21, 3, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+SPEED = MissionItem(1, 178, 3, 1.0, 4.0, 0.0, 0.0, 0, 0, 0.0)
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(check, [str(argument) for argument in arguments])
+
+
+def objects(result: Result) -> list[dict[str, Any]]:
+    def refuse(token: str) -> None:
+        raise AssertionError(f"{token} is no JSON")
+
+    return [json.loads(line, parse_constant=refuse) for line in result.stdout.splitlines()]
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    texts = {
+        "clean": write_qgc_wpl([HOME, POINT]),
+        "rejected": write_qgc_wpl([HOME, LAND]),
+        "cleared": write_qgc_wpl([HOME, SPEED]),
+        "damaged": write_qgc_wpl([HOME, POINT])[:-20],
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    return {name: tmp_path / name for name in [*texts, "missing"]}
+
+
+@pytest.mark.parametrize(
+    ("names", "code"),
+    [
+        (["clean"], 0),
+        (["cleared"], 0),
+        (["rejected"], 1),
+        (["damaged"], 2),
+        (["missing"], 2),
+        (["clean", "cleared"], 0),
+        (["rejected", "clean"], 1),
+        (["clean", "damaged", "rejected"], 2),
+    ],
+)
+@pytest.mark.parametrize("mode", [[], ["--json"]])
+def test_the_exit_code_is_the_worst_files(files: dict[str, Path], names: list[str], code: int, mode: list[str]) -> None:
+    assert run(*mode, *[files[name] for name in names]).exit_code == code
+
+
+def test_strict_counts_changes_as_rejection(files: dict[str, Path]) -> None:
+    assert run("--strict", files["clean"]).exit_code == 0
+    assert run(FIELD).exit_code == 0
+    assert run("--strict", FIELD).exit_code == 1
+    assert run("--strict", files["cleared"]).exit_code == 1
+    assert run("--strict", FIELD, files["damaged"]).exit_code == 2
+
+
+def test_json_has_one_object_a_file_with_the_promised_keys(files: dict[str, Path]) -> None:
+    result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
+    accepted, rejected, cleared, missing = objects(result)
+    keys = ["file", "result", "ack", "items", "records", "findings"]
+    assert list(accepted) == list(rejected) == list(cleared) == keys
+    assert (accepted["file"], accepted["result"], accepted["ack"]) == (str(FIELD), "ACCEPTED", "MAV_MISSION_ACCEPTED")
+    assert (rejected["result"], rejected["ack"]) == ("REJECTED", "MAV_MISSION_INVALID")
+    assert (cleared["result"], cleared["ack"]) == ("CLEARED", "MAV_MISSION_ACCEPTED")
+    assert rejected["items"] == rejected["records"] == cleared["items"] == cleared["records"] == []
+    assert list(missing) == ["file", "error"]
+    assert missing["file"] == str(files["missing"])
+    assert "no such file" in missing["error"]
+    item_keys = ["seq", "command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m"]
+    assert {tuple(item) for item in accepted["items"]} == {tuple(item_keys)}
+    assert {tuple(finding) for finding in accepted["findings"]} == {("seq", "field", "was", "becomes", "why")}
+    assert {len(record) for record in accepted["records"]} == {32}
+    assert len(accepted["records"]) == len(accepted["items"])
+
+
+def test_json_stays_json_with_infinite_values(tmp_path: Path) -> None:
+    path = tmp_path / "inf.waypoints"
+    path.write_text(write_qgc_wpl([HOME, POINT]).replace("\t0\t2\t0\t0\t45.3839", "\tinf\tnan\t0\tnan\t45.3839"))
+    (document,) = objects(run("--json", path))
+    changes = {finding["field"]: (finding["was"], finding["becomes"]) for finding in document["findings"]}
+    assert changes == {"p1": ("inf", 0), "p2": (None, 2)}
+
+
+def test_radius_and_capacity_are_the_flight_controllers(files: dict[str, Path]) -> None:
+    (document,) = objects(run("--json", "--wp-radius-cm", 550, files["clean"]))
+    assert [item["p2"] for item in document["items"]] == [6, 6]
+    assert run("--capacity", 145, LONG).exit_code == 1
+    assert run("--capacity", 146, LONG).exit_code == 0
+    (document,) = objects(run("--json", "--capacity", 145, LONG))
+    assert document["ack"] == "MAV_MISSION_NO_SPACE"
+
+
+@pytest.mark.parametrize("option", [["--wp-radius-cm", "-1"], ["--capacity", "x"], []])
+def test_wrong_use_is_refused(option: list[str]) -> None:
+    assert run(*option).exit_code == 2
+
+
+def test_a_person_sees_sent_beside_stored_and_why() -> None:
+    output = run(FIELD).stdout
+    for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
+        assert words in output
+    assert "WP 1: height 20 -> 15 m (take-off 2..15 m)" in output
+    assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: 7" in output
+
+
+def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:
+    assert "REJECTED: MAV_MISSION_INVALID, WP 1: rejected, LAND must not be alone" in run(files["rejected"]).stdout
+    assert "CLEARED: MAV_MISSION_ACCEPTED, Mission: cleared" in run(files["cleared"]).stdout
+
+
+def test_an_unreadable_file_is_one_sentence_on_stderr(files: dict[str, Path]) -> None:
+    result = run(files["damaged"])
+    assert result.stdout == ""
+    assert result.stderr.startswith(f"Error: {files['damaged']}, line 3: ")
+    assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["", "[bold]x.waypoints", "ü\u2028.waypoints"])
+def test_any_path_is_shown_as_it_is(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    if name:
+        path.write_text(write_qgc_wpl([HOME, POINT]))
+        assert name in run(path).stdout.replace("\n", "")
+    else:
+        assert "is a directory" in run(path).stderr
+
+
+def test_an_endless_file_is_refused() -> None:
+    result = run("/dev/zero")
+    assert result.exit_code == 2
+    assert "larger than" in result.stderr
+
+
+def test_the_examples_show_what_they_are_meant_to() -> None:
+    documents = objects(run("--json", FIELD, PLAN, LONG))
+    assert [document["result"] for document in documents] == ["ACCEPTED"] * 3
+    assert [len(document["items"]) for document in documents] == [13, 10, 146]
+    assert len(read_mission_file(LONG.read_bytes(), "long")) == 146
+    for document in documents:
+        assert any("0d0d0d" in record for record in document["records"]), "no hazard bytes"
+        for item, record in zip(document["items"], document["records"], strict=True):
+            held = unpack_record(bytes.fromhex(record))
+            assert (held.lat_e7, held.lon_e7, held.height_m) == (item["lat_e7"], item["lon_e7"], item["alt_m"])
+    assert {item["command"] for item in documents[0]["items"]} >= {16, 18, 19, 20, 21, 22, 201}
+    assert {finding["becomes"] for finding in documents[0]["findings"]} >= {"dropped", 15}
