@@ -21,8 +21,6 @@ from service.simulator.traps import Trap, TrapCounters
 from service.simulator.uart import Uart
 
 _AUTOSENSE_SECONDS = 4.0
-_SINGLE_STEPS = 3
-_LONG_LOOP = 1.05
 _FRSKY_BAUD = 9600
 _MINIMOSD_BAUD = 57600
 _CLI_PROMPT = b"\r\n# "
@@ -59,7 +57,6 @@ class Firmware:
 
         self._booted_at = self._clock = self._next_loop = now
         self._looptime = options.looptime_ms / 1000
-        self._loop_was_long, self._single_steps = False, 0
         self._flown = 0.0
 
         self._config = StoredConfig(flash, options)
@@ -100,8 +97,6 @@ class Firmware:
 
     def run_loop(self, at: float) -> None:
         """Run the main loop that begins at `at`. PowerCutError, ResetError."""
-        if at > self._next_loop:
-            self._loop_was_long = False
         if self.armed:
             self._flown += at - self._clock
         self._clock = at
@@ -111,7 +106,6 @@ class Firmware:
             self._follow_pilot()
             self._write_config_if_due()
             self._serve_uart()
-        self._loop_was_long = self._clock - at > self._looptime * _LONG_LOOP
         self._next_loop = max(at + self._looptime, self._clock)
 
     def hold(self, now: float) -> None:
@@ -132,6 +126,8 @@ class Firmware:
         if not self._pilot_is_obeyed():
             return
         self._board.armed = not self.armed
+        if self._missions:
+            self._missions.drop_stale(self._clock)
         match self._options.tele_prot:
             case TelemetryProtocol.FRSKY_9600:
                 self._uart.set_baud(_FRSKY_BAUD if self.armed else self._options.baud, self._clock)
@@ -160,7 +156,6 @@ class Firmware:
     # -- the serial port -------------------------------------------------------------------------------------
 
     def _serve_uart(self) -> None:
-        one_packet = self._must_single_step()
         self._choose_protocol()
         self._send_telemetry()
         if self._missions and self._clock - self._last_byte > self._options.inter_byte_timeout_ms / 1000:
@@ -175,13 +170,6 @@ class Firmware:
                     raise ResetError
             if self._completes_packet(byte):
                 self._last_valid = self._clock
-                if one_packet:
-                    return
-
-    def _must_single_step(self) -> bool:
-        """After a long loop only one packet is taken, in three loops running at most."""
-        self._single_steps = min(self._single_steps + 1, _SINGLE_STEPS + 1) if self._loop_was_long else 0
-        return 0 < self._single_steps <= _SINGLE_STEPS
 
     def _choose_protocol(self) -> None:
         if not self.armed:

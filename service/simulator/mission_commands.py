@@ -56,10 +56,7 @@ class MissionCommands:
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """Return the reply's payload; None if the command is none of the extension's. PowerCutError."""
-        if self._transfer and now - self._transfer.touched > self._options.transfer_timeout_ms / 1000:
-            self._transfer = None
-        if self._board.armed:
-            self._transfer = None
+        self.drop_stale(now)
         body = unmask(payload)
         match command:
             case MissionCommand.INFO:
@@ -77,6 +74,13 @@ class MissionCommands:
             case MissionCommand.RADIUS:
                 return Radius(self._radius(body, now), self._board.wp_radius_cm).encode()
         return None
+
+    def drop_stale(self, now: float) -> None:
+        """Drop an open transfer if the craft is armed, or if nothing was heard of it for too long."""
+        if self._transfer:
+            silence = now - self._transfer.touched
+            if self._board.armed or silence > self._options.transfer_timeout_ms / 1000:
+                self._transfer = None
 
     @property
     def _write_pending(self) -> bool:

@@ -300,6 +300,15 @@ def test_arming_drops_the_transfer_and_refuses_writers_but_not_readers() -> None
     assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is Status.NO_TRANSFER
 
 
+def test_a_short_arming_drops_the_transfer_too() -> None:
+    bench = Bench()
+    bench.progress(encode_begin(identify(mission(4))))
+    for armed in (True, False):
+        bench.naze.faults.armed = armed
+        bench.run(0.01)
+    assert bench.progress(encode_chunk(mission(4), 0, 4).frame).status is Status.NO_TRANSFER
+
+
 @pytest.mark.parametrize("busy", [False, True])
 def test_a_busy_board_says_so(busy: bool) -> None:
     bench = Bench(faults=Faults(busy=busy))

@@ -160,6 +160,17 @@ def test_without_power_nothing_is_heard_or_answered() -> None:
     assert bench.naze.power is Power.OFF
 
 
+def test_what_comes_while_it_boots_is_not_heard() -> None:
+    bench = Bench()
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    bench.send(IDENT * 60)
+    bench.run(2.5)
+    assert bench.heard.count(b"$M>") == 0
+    assert bench.naze.counters.rx_overflows == 0
+    assert bench.ask(IDENT) is not None
+
+
 def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:
     def talk(seed: int, faults: Faults) -> bytes:
         bench = Bench(SimOptions(seed=seed), faults)
