@@ -11,7 +11,7 @@ tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run th
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, auto
 
 from bridge.msp_link import RESYNC
@@ -30,6 +30,7 @@ _SHORT_VISIT_S = 0.65
 _LISTEN_S = 0.2
 _PROBE_INTERVAL_S = 0.2
 _CONFIRM_S = 0.3
+_ANSWER_SIZE = 13
 #: How long MSP may still answer after MAVLink was heard.
 _MSP_CHANCE_S = 0.45
 
@@ -65,27 +66,37 @@ def visit_order(known: int | None, speeds: Sequence[int | None]) -> Iterator[int
         for speed in speeds:
             if known is not None:
                 yield known
-            if speed != known:
+            if known is None or speed != known:
                 yield speed
 
 
+@dataclass(slots=True)
+class _Visit:
+    """What was heard at one speed, and when the present phase and the whole visit end."""
+
+    phase_ends: float
+    ends: float
+    msp: MspParser = field(default_factory=MspParser)
+    mavlink: MavlinkSplitter = field(default_factory=MavlinkSplitter)
+    probes: int = 0
+    answer: MspFrame | None = None
+    heartbeat: MavlinkFrame | None = None
+    last_mavlink: MavlinkFrame | None = None
+
+
 class Autosense:
-    """One search. Call `start`, then feed bytes and time until `found` is set.
+    """One search. Feed bytes and time until `found` is set.
 
     `speed` is what the port must be set to; `take_output` what must be written to it.
     """
 
-    def __init__(self, speeds: Sequence[int | None], known: int | None = None) -> None:
+    def __init__(self, speeds: Sequence[int | None], known: int | None, now: float) -> None:
         self._order = visit_order(known, speeds)
         self.speed = next(self._order)
         self.phase = Phase.LISTEN
         self.found: Found | None = None
         self._output: list[bytes] = []
-        self._begin_visit(0.0)
-
-    def start(self, now: float) -> None:
-        """Begin with the first speed."""
-        self._begin_visit(now)
+        self._visit = self._new_visit(now)
 
     def take_output(self) -> list[bytes]:
         """Return what is to be written, in order."""
@@ -94,72 +105,60 @@ class Autosense:
 
     def next_deadline(self) -> float | None:
         """Return when `tick` has something to do."""
-        return None if self.found else min(self._phase_ends, self._visit_ends)
+        return None if self.found else min(self._visit.phase_ends, self._visit.ends)
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at the present `speed`."""
-        for msp_frame in self._msp.feed(data):
+        for msp_frame in self._visit.msp.feed(data):
             self._msp_frame(msp_frame, now)
-        for mavlink_frame in self._mavlink.feed(data):
+        for mavlink_frame in self._visit.mavlink.feed(data):
             self._mavlink_frame(mavlink_frame, now)
 
     def tick(self, now: float) -> None:
         """Move on when a phase or a visit is over."""
+        visit = self._visit
         if self.found:
             return
-        if now >= self._visit_ends:
-            if self._heartbeat is not None:
-                sender = f"system {self._heartbeat.sysid} component {self._heartbeat.compid}"
-                self._conclude(Spoken.MAVLINK, f"heartbeat of {sender}, no answer to {self._probes} MSP probes")
+        if now >= visit.ends:
+            if visit.heartbeat is not None:
+                sender = f"system {visit.heartbeat.sysid} component {visit.heartbeat.compid}"
+                self._conclude(Spoken.MAVLINK, f"heard {sender}, no answer to {visit.probes} MSP probes")
             else:
-                self._next_visit(now)
-        elif now >= self._phase_ends:
-            self._answer = None
+                self.speed = next(self._order)
+                self.phase = Phase.LISTEN
+                self._visit = self._new_visit(now)
+        elif now >= visit.phase_ends:
+            visit.answer = None
             self.phase = Phase.PROBE
-            self._probe(now)
+            # Each second probe also fills a parser that was left in mid-frame.
+            visit.phase_ends = now + self._ask(PROBE if visit.probes % 2 == 0 else RESYNC) + _PROBE_INTERVAL_S
 
-    def _next_visit(self, now: float) -> None:
-        self.speed = next(self._order)
-        self._begin_visit(now)
-
-    def _begin_visit(self, now: float) -> None:
-        self.phase = Phase.LISTEN
-        self._msp = MspParser()
-        self._mavlink = MavlinkSplitter()
-        self._answer: MspFrame | None = None
-        self._heartbeat: MavlinkFrame | None = None
-        self._last_mavlink: MavlinkFrame | None = None
-        self._probes = 0
+    def _new_visit(self, now: float) -> _Visit:
         full = self.speed is None or self.speed in _HEARTBEAT_SPEEDS
-        self._phase_ends = now + _LISTEN_S
-        self._visit_ends = now + (_FULL_VISIT_S if full else _SHORT_VISIT_S)
+        return _Visit(now + _LISTEN_S, now + (_FULL_VISIT_S if full else _SHORT_VISIT_S))
 
-    def _probe(self, now: float) -> None:
-        # Each second probe also fills a parser that was left in mid-frame.
-        frame = PROBE if self._probes % 2 == 0 else RESYNC
-        self._probes += 1
+    def _ask(self, frame: bytes) -> float:
+        """Send; return how long the question and its answer are on the wire: at 1200 baud that is long."""
+        self._visit.probes += 1
         self._output.append(frame)
-        # At 1200 baud the exchange itself takes longer than the interval.
-        line_s = (len(frame) + 13) * 10 / self.speed if self.speed else 0.0
-        self._phase_ends = now + _PROBE_INTERVAL_S + line_s
-        self._visit_ends = max(self._visit_ends, self._phase_ends) if self._probes == 1 else self._visit_ends
+        return (len(frame) + _ANSWER_SIZE) * 10 / self.speed if self.speed else 0.0
 
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
+        visit = self._visit
         if self.found or frame.command != Msp.IDENT or frame.direction is Direction.REQUEST:
             return
-        if self._answer == frame:
+        if visit.answer == frame:
             self._conclude(Spoken.MSP, f"two equal answers to IDENT ({frame.direction.name.lower()})")
             return
-        self._answer = frame
+        visit.answer = frame
         self.phase = Phase.CONFIRM
-        self._output.append(PROBE)
-        line_s = 19 * 10 / self.speed if self.speed else 0.0
-        self._phase_ends = now + _CONFIRM_S + line_s
-        self._visit_ends = max(self._visit_ends, self._phase_ends)
+        visit.phase_ends = now + self._ask(PROBE) + _CONFIRM_S
+        visit.ends = max(visit.ends, visit.phase_ends)
 
     def _mavlink_frame(self, frame: MavlinkFrame, now: float) -> None:
-        before, self._last_mavlink = self._last_mavlink, frame
-        if self.found or self._heartbeat is not None:
+        visit = self._visit
+        before, visit.last_mavlink = visit.last_mavlink, frame
+        if self.found or visit.heartbeat is not None:
             return
         follows = (
             before is not None
@@ -167,10 +166,10 @@ class Autosense:
             and frame.seq == (before.seq + 1) % 256
         )
         if follows or _is_plausible_heartbeat(frame):
-            self._heartbeat = frame
+            visit.heartbeat = frame
             if self.phase is Phase.LISTEN:
-                self._phase_ends = now
-            self._visit_ends = now + _MSP_CHANCE_S
+                visit.phase_ends = now
+            visit.ends = now + _MSP_CHANCE_S
 
     def _conclude(self, spoken: Spoken, why: str) -> None:
         self.phase = Phase.FOUND

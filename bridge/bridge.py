@@ -323,7 +323,6 @@ class Bridge:
     def _on_demand(self) -> dict[int, Callable[[], Message | None]]:
         return {
             messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION: vehicle_messages.autopilot_version,
-            messages.MAVLINK_MSG_ID_PROTOCOL_VERSION: vehicle_messages.protocol_version,
             messages.MAVLINK_MSG_ID_HOME_POSITION: lambda: vehicle_messages.home_position(self._home()),
             messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
             messages.MAVLINK_MSG_ID_SYS_STATUS: lambda: vehicle_messages.sys_status(self.session.vehicle),

@@ -26,7 +26,6 @@ _DO_SEND_BANNER = 42428
 #: Commands that only ask for a message: command number -> message number.
 _ASKS_FOR = {
     messages.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-    messages.MAV_CMD_REQUEST_PROTOCOL_VERSION: messages.MAVLINK_MSG_ID_PROTOCOL_VERSION,
     messages.MAV_CMD_GET_HOME_POSITION: messages.MAVLINK_MSG_ID_HOME_POSITION,
 }
 

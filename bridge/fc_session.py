@@ -152,8 +152,7 @@ class FcSession:
         self._drop(now)
         if was_known:
             self._journal("warning", "fc.lost", why=why, speed_baud=self.speed)
-        self._search = Autosense(self._speeds, self._known_speed)
-        self._search.start(now)
+        self._search = Autosense(self._speeds, self._known_speed, now)
         self.speed = self._search.speed
 
     def _drop(self, now: float) -> None:

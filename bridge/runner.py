@@ -83,8 +83,7 @@ class Runner:
         self._deadline = None
         try:
             while True:
-                lost = isinstance(answer, LinkLost)
-                effect = procedure.throw(answer) if lost else procedure.send(answer)
+                effect = procedure.throw(answer) if isinstance(answer, LinkLost) else procedure.send(answer)
                 answer = None
                 if isinstance(effect, Send | Receive) and self._link is None:
                     answer = LinkLost("there is no link to the flight controller")

@@ -56,11 +56,6 @@ def autopilot_version() -> Message:
     )
 
 
-def protocol_version() -> Message:
-    """PROTOCOL_VERSION: MAVLink 1 to 2."""
-    return messages.MAVLink_protocol_version_message(200, 100, 200, [0] * 8, [0] * 8)
-
-
 def mission_current(count: int) -> Message:
     """MISSION_CURRENT: `count` records are held (home included); nothing flies them from here."""
     state = _NOT_STARTED if count else _NO_MISSION

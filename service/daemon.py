@@ -1,0 +1,145 @@
+"""The running bridge: its links, its store and its clock, on one event loop."""
+
+import asyncio
+import signal
+from collections.abc import Sequence
+from contextlib import suppress
+
+import structlog
+
+from bridge.autosense import SPEEDS
+from bridge.bridge import Bridge, BridgeConfig
+from bridge.journal import Level
+from bridge.procedure import StoreEffect
+from bridge.station import Peer
+from service.connection import FcAddress, SerialFc
+from service.fc_port import FcPort
+from service.gcs_links import GcsLink, open_link
+from service.settings import Settings
+from service.store_worker import StoreWorker
+
+_log = structlog.get_logger()
+
+
+class Daemon:
+    """Feeds the bridge and carries out what it wants. Must be made on a running event loop."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._loop = asyncio.get_running_loop()
+        self.settings = settings
+        self.bridge = Bridge(
+            BridgeConfig(_speeds(settings.fc), sysid=settings.sysid, takeoff_max_m=settings.takeoff_max_m),
+            _journal,
+            self._loop.time(),
+        )
+        self.store = StoreWorker(settings.state_dir)
+        self._port = FcPort(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
+        self._links: dict[str, GcsLink] = {}
+        self._timer: asyncio.TimerHandle | None = None
+
+    async def run(self) -> None:
+        """Run until cancelled. LinkError if a ground station link cannot be set up."""
+        port: asyncio.Task[None] | None = None
+        try:
+            for address in self.settings.gcs:
+                link = open_link(address, self)
+                self._links[link.name] = link
+            port = self._loop.create_task(self._port.run())
+            self._tick()
+            await port
+        finally:
+            if port is not None:
+                port.cancel()
+                with suppress(asyncio.CancelledError):
+                    await port
+            if self._timer is not None:
+                self._timer.cancel()
+            for link in self._links.values():
+                link.close()
+            self.store.close()
+
+    def flush(self) -> None:
+        """Carry out what the bridge wants after it was told something."""
+        bridge = self.bridge
+        self._port.set_speed(bridge.speed)
+        for data in bridge.take_fc_output():
+            self._port.write(data)
+        for peer, frame in bridge.take_datagrams():
+            self._links[peer.link].send(peer, frame)
+        for effect in bridge.take_store_effects():
+            self._carry_out(effect)
+        deadline = bridge.next_deadline()
+        if self._timer is not None:
+            if self._timer.when() == deadline:
+                return
+            self._timer.cancel()
+        self._timer = self._loop.call_at(deadline, self._tick)
+
+    # What the ground station links tell (service.gcs_links.GcsEvents).
+
+    def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
+        """Take bytes from a ground station."""
+        self.bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram)
+        self.flush()
+
+    def gcs_gone(self, peer: Peer) -> None:
+        """Forget a ground station."""
+        self.bridge.gcs_gone(peer)
+
+    def add_default_peer(self, peer: Peer) -> None:
+        """Speak to `peer` unasked."""
+        self.bridge.add_default_peer(peer)
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        """Stop that."""
+        self.bridge.remove_default_peer(peer)
+
+    def is_heard(self, peer: Peer) -> bool:
+        """Tell whether `peer` speaks MAVLink."""
+        return self.bridge.is_heard(peer)
+
+    # The flight controller's port, the clock and the store.
+
+    def _fc_opened(self) -> None:
+        self.bridge.fc_opened(self._loop.time())
+        self.flush()
+
+    def _fc_data(self, data: bytes) -> None:
+        self.bridge.fc_received(data, self._loop.time())
+        self.flush()
+
+    def _fc_closed(self, why: str) -> None:
+        self.bridge.fc_closed(self._loop.time(), why)
+        self.flush()
+
+    def _tick(self) -> None:
+        self._timer = None
+        self.bridge.tick(self._loop.time())
+        self.flush()
+
+    def _carry_out(self, effect: StoreEffect) -> None:
+        def answered(answer: object) -> None:
+            self.bridge.store_answered(answer, self._loop.time())
+            self.flush()
+
+        self.store.carry_out(effect, answered)
+
+
+async def run_until_signal(daemon: Daemon) -> None:
+    """Run the daemon until SIGINT or SIGTERM."""
+    loop = asyncio.get_running_loop()
+    running = loop.create_task(daemon.run())
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, running.cancel)
+    with suppress(asyncio.CancelledError):
+        await running
+
+
+def _speeds(address: FcAddress) -> Sequence[int | None]:
+    if not isinstance(address, SerialFc):
+        return (None,)
+    return SPEEDS if address.baud is None else (address.baud,)
+
+
+def _journal(level: Level, event: str, /, **facts: object) -> None:
+    getattr(_log, level)(event, **facts)

@@ -1,0 +1,61 @@
+"""Says why a serial port cannot be used: missing, not permitted, busy (by whom), or a login console."""
+
+import errno
+import os
+from pathlib import Path
+
+_LOGIN_PROGRAMS = ("agetty", "getty", "login")
+
+
+def explain_port_error(path: str, error: OSError) -> str:
+    """Turn an error from opening `path` into one sentence: what, where, what to do."""
+    code = error.errno
+    if code is None and isinstance(error.__cause__ or error.__context__, OSError):
+        cause = error.__cause__ or error.__context__
+        code = cause.errno if isinstance(cause, OSError) else None
+    if not Path(path).exists():
+        return f"{path} is missing: plug the flight controller in, or name another port with --fc"
+    if code in (errno.EACCES, errno.EPERM):
+        return f"{path}: no permission; add the user to the group that owns it: sudo usermod -aG dialout $USER"
+    if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
+        holder = find_holder(path)
+        return f"{path} is busy: {holder or 'another program'} has it open; stop that, or name another port"
+    if code == errno.ENOTTY:
+        return f"{path} is no serial port"
+    return f"{path} cannot be opened: {error.strerror or error}"
+
+
+def find_console(path: str) -> str | None:
+    """Return the name of the terminal if a login console sits on the port, else None.
+
+    A getty takes no lock: both could open the port, and each would eat half of what the other is sent.
+    """
+    terminal = Path(path).resolve().name
+    for process in _processes():
+        try:
+            command = (process / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        program = os.path.basename(command[0]).decode(errors="replace")
+        if program in _LOGIN_PROGRAMS and terminal.encode() in command[1:]:
+            return terminal
+    return None
+
+
+def find_holder(path: str) -> str | None:
+    """Return "NAME (pid N)" of another process that has the port open, as far as we may see it."""
+    target = os.path.realpath(path)
+    for process in _processes():
+        if process.name == str(os.getpid()):
+            continue
+        try:
+            for descriptor in (process / "fd").iterdir():
+                if os.path.realpath(descriptor) == target:
+                    return f"{(process / 'comm').read_text().strip()} (pid {process.name})"
+        except OSError:
+            continue
+    return None
+
+
+def _processes() -> list[Path]:
+    return [entry for entry in Path("/proc").iterdir() if entry.name.isdecimal()]

@@ -1,0 +1,52 @@
+"""`naze-bridge run`: the daemon in the foreground."""
+
+import asyncio
+import sys
+from pathlib import Path
+
+import click
+
+from service.connection import AddressError
+from service.control import SOCKET_NAME, ControlServer
+from service.daemon import Daemon, run_until_signal
+from service.gcs_links import LinkError
+from service.log_setup import set_up_logging
+from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
+from storage.state_lock import StateLock
+from storage.store_error import StoreError
+
+
+@click.command()
+@click.option("--fc", metavar="FC", help="/dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:")
+@click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; several at once. Default: {DEFAULT_GCS}")
+@click.option("--config", type=click.Path(path_type=Path), help="TOML file with the same settings.")
+@click.option("--state-dir", type=click.Path(path_type=Path), help="Folder for stored missions.")
+@click.option("--verbose", is_flag=True, help="Show debug events too.")
+def run(fc: str | None, gcs: tuple[str, ...], config: Path | None, state_dir: Path | None, verbose: bool) -> None:
+    """Run the bridge between a flight controller and ground stations."""
+    set_up_logging(verbose=verbose)
+    try:
+        settings = load_settings(config, fc, gcs, state_dir)
+    except (AddressError, SettingsError) as error:
+        raise click.UsageError(str(error)) from error
+    try:
+        _serve(settings)
+    except (LinkError, StoreError) as error:
+        click.echo(f"naze-bridge: {error}", err=True)
+        sys.exit(1)
+
+
+def _serve(settings: Settings) -> None:
+    assert settings.state_dir is not None
+    with StateLock(settings.state_dir):
+        asyncio.run(_main(settings, settings.state_dir / SOCKET_NAME))
+
+
+async def _main(settings: Settings, socket_path: Path) -> None:
+    daemon = Daemon(settings)
+    control = ControlServer(daemon, socket_path)
+    await control.start()
+    try:
+        await run_until_signal(daemon)
+    finally:
+        control.close()

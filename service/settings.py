@@ -1,0 +1,91 @@
+"""Where settings come from: flags over environment over the configuration file over defaults."""
+
+import difflib
+import os
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from service.connection import FcAddress, GcsAddress, parse_fc, parse_gcs
+
+DEFAULT_GCS = "udpin:0.0.0.0:14550"
+DEFAULT_SYSID = 1
+DEFAULT_TAKEOFF_MAX_M = 15
+
+
+class SettingsError(ValueError):
+    """A setting that cannot be used; the text says which, where, and what would be right."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a daemon is started with. Without `state_dir` missions are not stored."""
+
+    fc: FcAddress
+    gcs: Sequence[GcsAddress] = ()
+    state_dir: Path | None = None
+    sysid: int = DEFAULT_SYSID
+    takeoff_max_m: int = DEFAULT_TAKEOFF_MAX_M
+
+
+#: Keys of the configuration file: name -> (type, what it is).
+_KEYS = {
+    "fc": (str, "flight controller connection"),
+    "gcs": (list, "list of ground station connections"),
+    "state_dir": (str, "folder for stored missions"),
+    "sysid": (int, "MAVLink system id, 1..255"),
+    "takeoff_max_m": (int, "greatest take-off height in metres, 2..255"),
+}
+
+
+def default_state_dir() -> Path:
+    """Return systemd's StateDirectory, else the user's own folder for state."""
+    given = os.environ.get("STATE_DIRECTORY")
+    if given:
+        return Path(given.split(":")[0])
+    base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(base) / "naze-bridge"
+
+
+def load_settings(config: Path | None, fc: str | None, gcs: Sequence[str], state_dir: Path | None) -> Settings:
+    """Put the settings of `run` together; SettingsError or AddressError if one cannot be used."""
+    values = {} if config is None else _read_config(config)
+    chosen_fc = fc or values.get("fc")
+    if not isinstance(chosen_fc, str):
+        raise SettingsError("name the flight controller: --fc /dev/serial0, or --fc sim: to try it without one")
+    chosen_gcs = gcs or values.get("gcs") or [DEFAULT_GCS]
+    assert isinstance(chosen_gcs, Sequence)
+    folder = state_dir or values.get("state_dir") or default_state_dir()
+    return Settings(
+        fc=parse_fc(chosen_fc),
+        gcs=[parse_gcs(str(text)) for text in chosen_gcs],
+        state_dir=Path(str(folder)),
+        sysid=_in_range(values, "sysid", 1, 255, DEFAULT_SYSID),
+        takeoff_max_m=_in_range(values, "takeoff_max_m", 2, 255, DEFAULT_TAKEOFF_MAX_M),
+    )
+
+
+def _read_config(path: Path) -> dict[str, object]:
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"{path} cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"{path} is no valid TOML: {error}") from error
+    for key, value in values.items():
+        if key not in _KEYS:
+            near = difflib.get_close_matches(key, _KEYS, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_KEYS)}"
+            raise SettingsError(f"{path}: {key!r} is no setting; {hint}")
+        kind, meaning = _KEYS[key]
+        if not isinstance(value, kind) or isinstance(value, bool):
+            raise SettingsError(f"{path}: {key} must be a {kind.__name__} ({meaning})")
+    return values
+
+
+def _in_range(values: dict[str, object], key: str, least: int, most: int, default: int) -> int:
+    value = values.get(key, default)
+    if not isinstance(value, int) or not least <= value <= most:
+        raise SettingsError(f"{key} is {value}, but must be {least}..{most}")
+    return value

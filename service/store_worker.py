@@ -1,0 +1,112 @@
+"""The mission store on a thread of its own: a slow SD card never holds the links up."""
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, TypeVar
+
+import structlog
+
+from bridge.mission_log import ArrivedMission
+from bridge.procedure import Conclude, Recall, Save, StoreEffect
+from protocols.wp_record import identify, pack_records
+from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
+
+DATABASE_NAME = "missions.db"
+T = TypeVar("T")
+_log = structlog.get_logger()
+
+
+class StoreWorker:
+    """Carries out the bridge's store effects in order. Without a `directory` nothing is stored."""
+
+    def __init__(self, directory: Path | None) -> None:
+        self._directory = directory
+        self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="store")
+        self._loop = asyncio.get_running_loop()
+        self._store: MissionStore | None = None
+        if directory is not None:
+            self._executor.submit(self._open, directory)
+
+    def carry_out(self, effect: StoreEffect, answer: Callable[[object], None]) -> None:
+        """Do it on the worker's thread; `answer` is called on the event loop."""
+
+        def work() -> None:
+            result = self._do(effect)
+            self._loop.call_soon_threadsafe(answer, result)
+
+        self._executor.submit(work)
+
+    async def ask(self, question: Callable[[MissionStore], T]) -> T:
+        """Ask the store something; StoreError if there is no store or it fails."""
+
+        def work() -> T:
+            if self._store is None:
+                raise StoreError("no missions are stored here: start the daemon with --state-dir DIR")
+            return question(self._store)
+
+        return await self._loop.run_in_executor(self._executor, work)
+
+    def close(self) -> None:
+        """Finish what was begun, then close."""
+        self._executor.submit(self._close)
+        self._executor.shutdown(wait=True)
+
+    def _open(self, directory: Path) -> None:
+        try:
+            opened = open_store(directory / DATABASE_NAME, time.time())
+        except StoreError as error:
+            _log.error("store.unavailable", why=str(error))
+            return
+        self._store = opened.store
+        if opened.set_aside is not None:
+            _log.error("store.damaged", kept_as=str(opened.set_aside), what="a new mission store was made")
+
+    def _close(self) -> None:
+        if self._store is not None:
+            self._store.close()
+
+    def _do(self, effect: StoreEffect) -> object:
+        nothing: object = {} if isinstance(effect, Recall) else None
+        if self._store is None:
+            return nothing
+        try:
+            match effect:
+                case Save(mission):
+                    return self._store.add(_received(mission))
+                case Conclude(number, conclusion):
+                    self._store.conclude(number, conclusion.outcome.value, conclusion.detail, time.time())
+                    return True
+                case Recall(identity):
+                    found = self._store.latest_verified(identity.count, identity.checksum)
+                    roi_commands: Mapping[int, int] = {} if found is None else found.received.roi_commands
+                    return roi_commands
+        except StoreError as error:
+            _log.error("store.failed", why=str(error))
+        return nothing
+
+
+def _received(mission: ArrivedMission) -> ReceivedMission:
+    verdict = mission.verdict
+    identity = identify(verdict.records)
+    return ReceivedMission(
+        received_at=time.time(),
+        source=mission.source,
+        items=as_dicts(mission.items),
+        verdict=verdict.result.name,
+        ack=f"MAV_MISSION_{verdict.ack.name}",
+        findings=as_dicts(verdict.findings),
+        stored_items=as_dicts(verdict.items),
+        records=pack_records(verdict.records),
+        record_count=identity.count,
+        checksum=identity.checksum,
+        roi_commands=dict(verdict.roi_commands),
+    )
+
+
+def as_dicts(things: tuple[Any, ...]) -> list[dict[str, Any]]:
+    """Turn dataclasses into plain data."""
+    return [asdict(thing) for thing in things]
