@@ -19,7 +19,7 @@ _FLIGHT_SAG_VS = 0.003
 
 @dataclass(frozen=True, slots=True)
 class FlightState:
-    """What the sensors say. Angles in degrees, lengths in metres, speeds in metres a second, volts."""
+    """What the sensors say. Angles in degrees (`pitch`: nose down is positive), metres, metres a second, volts."""
 
     lat_e7: int
     lon_e7: int
@@ -57,7 +57,7 @@ def fly(uptime: float, flown: float, armed: bool) -> FlightState:
         speed_ms=_CRUISE_SPEED_MS if armed else 0.0,
         course=course,
         roll=sway * (4.0 + 2.0 * math.sin(uptime * 0.9)),
-        pitch=sway * (-3.0 + 1.5 * math.sin(uptime * 0.7)),
+        pitch=sway * (3.0 + 1.5 * math.sin(uptime * 0.7)),
         heading=course,
         volts=max(_FULL_BATTERY_V - _IDLE_SAG_VS * uptime - _FLIGHT_SAG_VS * flown, _EMPTY_BATTERY_V),
         distance_home_m=math.hypot(north, east),

@@ -104,6 +104,17 @@ def test_the_stream_tells_of_a_flight() -> None:
     assert 11500 < volts[-1] < volts[0]
 
 
+def test_nose_down_is_positive_in_msp_and_negative_in_mavlink() -> None:
+    armed = Faults(armed=True)
+    attitude = Bench(faults=armed)
+    attitude.run(1.0)
+    assert int.from_bytes(attitude.payload(request(108))[2:4], "little", signed=True) > 10
+    stream = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), armed)
+    pitches = [message.pitch for message in decode(stream.run(1.0)) if message.get_type() == "ATTITUDE"]
+    assert pitches
+    assert all(pitch < -0.01 for pitch in pitches)
+
+
 @pytest.mark.parametrize(
     ("tele_prot", "baud", "protocol"),
     [
