@@ -16,7 +16,8 @@ from bridge.mission_check import RuleProfile, check_list
         (Finding(3, "p2", None, 2, "hit radius 2..255 m"), "WP 3: p2 none -> 2 (hit radius 2..255 m)"),
         (Finding(0, "p1", 7.0, 1, "brake"), "Home: p1 7 -> 1 (brake)"),
         (Finding(12, "lat_e7", 453838000, 0, "not used by LAND"), "WP 12: lat 45.3838000 -> 0 (not used by LAND)"),
-        (Finding(12, "p1", 1.5, 1, "x" * 50), "WP 12: p1 1.5 -> 1"),
+        (Finding(12, "p1", 1.5, 1, "x" * 29), f"WP 12: p1 1.5 -> 1 ({'x' * 29})"),  # 50 characters
+        (Finding(12, "p1", 1.5, 1, "x" * 30), "WP 12: p1 1.5 -> 1"),
         (
             Finding(4, "command", 178, DROPPED, "command 178 is not supported"),
             "WP 4: dropped, command 178 is not supported",
