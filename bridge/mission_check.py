@@ -1,9 +1,8 @@
 """The rules for a mission list (mission-rules.md): what a list becomes on the flight controller, and why."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from enum import Enum, auto
+from collections.abc import Sequence
+from dataclasses import replace
 
 from bridge.finding import CLEARED, DROPPED, REJECTED, Finding, Rejection
 from bridge.mission_records import items_from_records
@@ -17,6 +16,7 @@ from bridge.mission_rules import (
     RuleProfile,
     command_rules,
 )
+from bridge.verdict import Result, Verdict
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.wp_record import WpCommand, WpRecord
 
@@ -41,31 +41,6 @@ _OTHER_DATUM_FRAMES = (
     Frame.GLOBAL_TERRAIN_ALT,
     Frame.GLOBAL_TERRAIN_ALT_INT,
 )
-
-
-class Result(Enum):
-    """What becomes of a list."""
-
-    ACCEPTED = auto()
-    CLEARED = auto()
-    REJECTED = auto()
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """A checked list.
-
-    `records` is what the flight controller is to hold, `items` the same as it reads back, both empty unless ACCEPTED.
-    `roi_commands` maps stored seq to the MAV_CMD with which a region of interest was sent. `findings` come in the order
-    of the list; that of a rejection is the last.
-    """
-
-    result: Result
-    ack: MissionResult
-    records: tuple[WpRecord, ...] = ()
-    items: tuple[MissionItem, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    roi_commands: Mapping[int, int] = field(default_factory=dict)
 
 
 def check_count(count: int, profile: RuleProfile) -> Rejection | None:
@@ -101,7 +76,8 @@ class MissionCheck:
 
     What mission-rules.md leaves open, decided here: home without a finite height is a list INVALID_PARAM7, because
     home cannot be dropped; a height that is not used (LAND, ROI) may be anything; coordinates out of range reject the
-    list even if the item lacks something else and would be dropped.
+    list even if the item lacks something else and would be dropped, and INT32_MAX, MAVLink's "not given" for an integer
+    coordinate, is out of range like any other; a fallback home with a 0 in it is none.
     """
 
     def __init__(self, profile: RuleProfile, count: int, fallback_home: tuple[int, int] | None = None) -> None:
