@@ -302,6 +302,9 @@ class Bridge:
             self.say(Severity.WARNING, "Flight controller lost")
         else:
             self.say(Severity.INFO, f"Found {controller.name}")
+        if dialect is not None:
+            # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
+            self.runner.start(self.desk.read_back(), lambda _held, _at: None, now)
 
     def _home(self) -> tuple[int, int] | None:
         return self.session.vehicle.home_or_position()

@@ -41,6 +41,25 @@ class MissionJobs:
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
 
+    async def do(self, request: Json, tell: Callable[[Json], None]) -> Json:
+        """Do what a request asks for; `tell` takes the progress. ControlError or StoreError say why not."""
+        match request["do"]:
+            case "push":
+                items = [MissionItem(**item) for item in request["items"]]
+                return await self.push(items, str(request["source"]), tell)
+            case "pull":
+                return await self.pull()
+            case "status":
+                return self.status()
+            case "missions":
+                return await self.list_missions(int(request["limit"]))
+            case "mission":
+                return await self.show_mission(int(request["number"]))
+            case "restore":
+                return await self.restore(int(request["number"]), tell)
+            case other:
+                raise ControlError(f"{other!r} is no request")
+
     async def push(self, items: list[MissionItem], source: str, progress: Callable[[Json], None]) -> Json:
         """Check, push and verify a list; no items clear what is there."""
         future: asyncio.Future[Json] = self._loop.create_future()
@@ -147,7 +166,7 @@ class ControlServer:
 
         try:
             line = await reader.readline()
-            tell({"result": await self._do(json.loads(line), tell)})
+            tell({"result": await self._jobs.do(json.loads(line), tell)})
             await writer.drain()
         except (ControlError, StoreError) as error:
             tell({"error": str(error)})
@@ -160,25 +179,6 @@ class ControlServer:
             with suppress(ConnectionError):
                 writer.close()
                 await writer.wait_closed()
-
-    async def _do(self, request: Json, tell: Callable[[Json], None]) -> Json:
-        jobs = self._jobs
-        match request["do"]:
-            case "push":
-                items = [MissionItem(**item) for item in request["items"]]
-                return await jobs.push(items, str(request["source"]), tell)
-            case "pull":
-                return await jobs.pull()
-            case "status":
-                return jobs.status()
-            case "missions":
-                return await jobs.list_missions(int(request["limit"]))
-            case "mission":
-                return await jobs.show_mission(int(request["number"]))
-            case "restore":
-                return await jobs.restore(int(request["number"]), tell)
-            case other:
-                raise ControlError(f"{other!r} is no request")
 
 
 def ask_daemon(state_dir: Path, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:

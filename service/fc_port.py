@@ -58,6 +58,8 @@ class FcPort:
         self._unsent = bytearray()
         self._closed = asyncio.Event()
         self._last_complaint = ""
+        #: Its list outlives a reopened port, as the real board's does.
+        self._simulated = SimulatedNaze(SimOptions()) if isinstance(address, SimulatedFc) else None
 
     async def run(self) -> None:
         """Open the port and open it again for ever; cancel to end."""
@@ -151,13 +153,12 @@ class FcPort:
         self._last_complaint = why
 
     async def _open(self) -> _Device:
-        match self._address:
-            case SerialFc(path, _):
-                return open_serial(path)
-            case TcpFc(host, port):
-                return await _open_tcp(host, port)
-            case SimulatedFc():
-                return await SimLink(SimulatedNaze(SimOptions()), self._loop).start()
+        if self._simulated is not None:
+            return await SimLink(self._simulated, self._loop).start()
+        if isinstance(self._address, TcpFc):
+            return await _open_tcp(self._address.host, self._address.port)
+        assert isinstance(self._address, SerialFc)
+        return open_serial(self._address.path)
 
 
 def open_serial(path: str) -> serial.Serial:

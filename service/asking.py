@@ -1,0 +1,81 @@
+"""How a command of the command line reaches a bridge: the running daemon's, or one of its own with `--fc`."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from service.connection import AddressError, parse_fc
+from service.control import ControlError, Json, MissionJobs, ask_daemon
+from service.daemon import Daemon
+from service.log_setup import set_up_logging
+from service.settings import Settings, default_state_dir
+
+#: An unknown speed is found within 8 s.
+_SEARCH_PATIENCE_S = 12.0
+_SEARCH_INTERVAL_S = 0.05
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def bridge_options(command: F) -> F:
+    """Add the options that say which bridge is meant."""
+    state_dir = click.option(
+        "--state-dir",
+        type=click.Path(path_type=Path),
+        default=default_state_dir,
+        show_default="as the daemon's",
+        help="State directory of the running daemon.",
+    )
+    fc = click.option("--fc", metavar="FC", help="Talk to this flight controller directly, without a daemon.")
+    as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+    return state_dir(fc(as_json(command)))
+
+
+def ask(state_dir: Path, fc: str | None, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
+    """Ask the bridge; a refusal ends the program with status 1, an unusable --fc with 2."""
+    try:
+        if fc is None:
+            return ask_daemon(state_dir, request, progress)
+        return asyncio.run(_ask_directly(fc, request, progress))
+    except AddressError as error:
+        raise click.UsageError(str(error)) from error
+    except ControlError as error:
+        fail(str(error))
+
+
+def ask_with_progress(state_dir: Path, fc: str | None, request: Json, total: int) -> Json:
+    """Ask the bridge to push `total` records, with a progress bar on standard error."""
+    columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("Flight controller", total=total)
+        return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
+
+
+def fail(text: str) -> NoReturn:
+    """End the program with one sentence."""
+    click.echo(f"naze-bridge: {text}", err=True)
+    raise SystemExit(1)
+
+
+async def _ask_directly(fc: str, request: Json, progress: Callable[[int], None]) -> Json:
+    set_up_logging(verbose=False)
+    daemon = Daemon(Settings(parse_fc(fc)))
+    running = asyncio.create_task(daemon.run())
+    try:
+        for _ in range(int(_SEARCH_PATIENCE_S / _SEARCH_INTERVAL_S)):
+            if daemon.bridge.session.controller is not None:
+                break
+            await asyncio.sleep(_SEARCH_INTERVAL_S)
+        else:
+            raise ControlError(f"no flight controller answers on {fc}: check its power, the wiring and the speed")
+        return await MissionJobs(daemon).do(request, lambda answer: progress(answer["progress"]))
+    finally:
+        running.cancel()
+        with suppress(asyncio.CancelledError):
+            await running

@@ -1,0 +1,122 @@
+"""`naze-bridge demo`: the main job on a simulated Naze, from a mission file to the proof."""
+
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from bridge.finding import Finding
+from protocols.mission_file import MissionFileError
+from protocols.mission_item import MissionItem, MissionResult
+from service.asking import fail
+from service.control import ControlError, Json, ask_daemon
+from service.mission_client import ClientError, connect
+from service.mission_source import load_mission
+from service.mission_table import mission_table
+
+_EXAMPLE = Path(__file__).parent.parent / "examples" / "naze-field.waypoints"
+_PATIENCE_S = 15.0
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path), default=_EXAMPLE)
+@click.option("--once", is_flag=True, help="End after the demonstration instead of staying up.")
+@click.option("--port", type=click.IntRange(1, 65535), default=14550, show_default=True, help="UDP port.")
+def demo(file: Path, once: bool, port: int) -> None:
+    """Start the daemon on a simulated Naze, write a mission FILE into it over UDP, show what became of it."""
+    console = Console(highlight=False)
+    try:
+        items = load_mission(file)
+        state_dir = Path(tempfile.mkdtemp(prefix="naze-bridge-demo-"))
+        try:
+            with _daemon(_free_port(port, console), state_dir, console) as (address, process):
+                _show(items, file, address, state_dir, console)
+                if not once:
+                    _stay(address, process, state_dir, console)
+        finally:
+            shutil.rmtree(state_dir, ignore_errors=True)
+    except (MissionFileError, ClientError, ControlError) as error:
+        fail(str(error))
+
+
+def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, console: Console) -> None:
+    with connect("127.0.0.1", port, _PATIENCE_S) as client:
+        console.print(f"Writing {file.name}, {len(items)} items, over UDP port {port} ...", markup=False)
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        with Progress(*columns, console=console) as bar:
+            task = bar.add_task("Upload", total=len(items))
+            result = client.write(items, lambda done: bar.update(task, completed=done))
+        console.print(f"The vehicle answers MAV_MISSION_{result.name}.\n", markup=False)
+        received = _latest_mission(state_dir)
+        held = client.read()
+    findings = [Finding(**finding) for finding in received["findings"]]
+    console.print(mission_table(items, held, findings))
+    if result is not MissionResult.ACCEPTED:
+        raise ClientError(f"the mission was not accepted: {'; '.join(client.texts)}")
+    if held != [MissionItem(**item) for item in received["stored_items"]]:
+        raise ClientError("what was read back is not what was stored")
+    console.print(
+        f"\nSent {len(items)} items; the flight controller holds {len(held)}, read back from it and compared."
+    )
+
+
+def _stay(port: int, process: subprocess.Popen[bytes], state_dir: Path, console: Console) -> None:
+    addresses = ", ".join(_own_addresses()) or "this machine's address"
+    console.print(
+        f"\nThe bridge stays up. In Mission Planner choose UDPCl, host {addresses}, port {port}, and press Connect"
+        "\n(QGroundControl, MAVProxy and MAVSDK: udpout / udp client to the same address). Ctrl-C ends.\n"
+        f"The daemon's log: {state_dir / 'daemon.log'}"
+    )
+    try:
+        process.wait()
+    except KeyboardInterrupt:
+        console.print()  # the shell's prompt belongs on a line of its own
+
+
+def _latest_mission(state_dir: Path) -> Json:
+    newest = ask_daemon(state_dir, {"do": "missions", "limit": 1})["missions"][0]
+    received: Json = ask_daemon(state_dir, {"do": "mission", "number": newest["number"]})["received"]
+    return received
+
+
+@contextmanager
+def _daemon(port: int, state_dir: Path, console: Console) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
+    arguments = ["run", "--fc", "sim:", "--gcs", f"udpin:0.0.0.0:{port}", "--state-dir", str(state_dir)]
+    console.print(f"$ naze-bridge {' '.join(arguments)}", style="bold", markup=False)
+    program = [sys.executable, "-c", "from service.cli import main; main()"]
+    log = state_dir / "daemon.log"
+    with log.open("wb") as stderr, subprocess.Popen([*program, *arguments], stderr=stderr) as process:  # noqa: S603
+        try:
+            yield port, process
+        finally:
+            process.terminate()
+
+
+def _free_port(wanted: int, console: Console) -> int:
+    """Return `wanted`, or another port if a ground station on this machine holds it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("0.0.0.0", wanted))  # noqa: S104  # the port is to be reached over Wi-Fi
+        except OSError:
+            probe.bind(("0.0.0.0", 0))  # noqa: S104
+            console.print(f"UDP port {wanted} is in use here; taking another one.")
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _own_addresses() -> list[str]:
+    """Return the address by which this machine reaches its network, found without sending anything."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))
+        except OSError:
+            return []
+        return [str(probe.getsockname()[0])]

@@ -1,0 +1,103 @@
+"""`naze-bridge push`, `pull`, `clear` and `status`."""
+
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from bridge.finding import Finding
+from protocols.mission_file import MissionFileError, write_qgc_wpl
+from protocols.mission_item import MissionItem
+from service.asking import ask, ask_with_progress, bridge_options, fail
+from service.control import Json
+from service.mission_source import load_mission
+from service.mission_table import mission_table
+
+_ACCEPTED = "MAV_MISSION_ACCEPTED"
+_UNREADABLE = 2
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@bridge_options
+def push(file: Path, state_dir: Path, fc: str | None, as_json: bool) -> None:
+    """Write a mission file to the flight controller and verify it there.
+
+    Exit code 0: verified, 1: refused or failed (the old mission is kept), 2: the file is unreadable.
+    """
+    try:
+        items = load_mission(file)
+    except MissionFileError as error:
+        click.echo(f"naze-bridge: {error}", err=True)
+        raise SystemExit(_UNREADABLE) from error
+    request = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}
+    show_delivery(ask_with_progress(state_dir, fc, request, len(items)), as_json=as_json)
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path), required=False)
+@bridge_options
+def pull(file: Path | None, state_dir: Path, fc: str | None, as_json: bool) -> None:
+    """Read the mission that the flight controller holds; into FILE (QGC WPL 110), or to the screen."""
+    held = ask(state_dir, fc, {"do": "pull"})
+    items = [MissionItem(**item) for item in held["items"]]
+    if file is not None:
+        _write(file, write_qgc_wpl(items))
+    if as_json:
+        click.echo(json.dumps(held))
+        return
+    if file is None and items:
+        Console(highlight=False).print(mission_table(items, items, ()))
+    where = f", written to {file}" if file is not None else ""
+    click.echo(f"{held['count']} records, checksum {held['checksum']}{where}")
+
+
+@click.command()
+@bridge_options
+def clear(state_dir: Path, fc: str | None, as_json: bool) -> None:
+    """Clear the mission on the flight controller and verify that."""
+    show_delivery(ask(state_dir, fc, {"do": "push", "items": [], "source": "clear"}), as_json=as_json)
+
+
+@click.command()
+@bridge_options
+def status(state_dir: Path, fc: str | None, as_json: bool) -> None:
+    """Show how the bridge stands: flight controller, link, ground stations."""
+    facts = ask(state_dir, fc, {"do": "status"})
+    if as_json:
+        click.echo(json.dumps(facts))
+        return
+    table = Table(show_header=False, box=None)
+    for name, value in facts.items():
+        shown = "-" if value is None else ", ".join(value) or "none" if isinstance(value, list) else str(value)
+        table.add_row(name.replace("_", " "), shown)
+    Console(highlight=False).print(table)
+
+
+def show_delivery(delivery: Json, *, as_json: bool) -> None:
+    """Print what was sent beside what is held now; end the program with status 1 if it was not accepted."""
+    if as_json:
+        click.echo(json.dumps(delivery))
+    else:
+        if delivery.get("sent"):
+            sent, stored = ([MissionItem(**item) for item in delivery[key]] for key in ("sent", "stored"))
+            findings = [Finding(**finding) for finding in delivery["findings"]]
+            Console(highlight=False).print(mission_table(sent, stored, findings))
+        click.echo(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
+    if delivery["ack"] != _ACCEPTED:
+        raise SystemExit(1)
+
+
+def _write(file: Path, text: str) -> None:
+    """Replace `file` in one step: a full disk must not cost the file that was there."""
+    draft = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(file)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        fail(f"{file} cannot be written: {error.strerror}")
