@@ -56,7 +56,7 @@ class Bridge:
         self._journal = journal
         self._started_at = now
         self._stations = Stations()
-        self._default_peers: set[Peer] = set()
+        self._default_peers: dict[Peer, bool] = {}
         self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._decoder = MavlinkDecoder()
         self._encoder = MavlinkEncoder(config.sysid, config.compid)
@@ -65,6 +65,7 @@ class Bridge:
         self._heartbeat_due = now
         self._now = now
         self._was_armed = False
+        self._announced_home: tuple[int, int] | None = None
 
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(config.speeds, self.runner, journal, self._controller_changed)
@@ -109,13 +110,13 @@ class Bridge:
 
     # The ground stations' side.
 
-    def add_default_peer(self, peer: Peer) -> None:
-        """Send to `peer` before it was heard: a fixed or a broadcast address."""
-        self._default_peers.add(peer)
+    def add_default_peer(self, peer: Peer, *, until_answered: bool) -> None:
+        """Send to `peer` before it was heard; `until_answered`: only while nobody is heard on its link (broadcast)."""
+        self._default_peers[peer] = until_answered
 
     def remove_default_peer(self, peer: Peer) -> None:
         """Stop that."""
-        self._default_peers.discard(peer)
+        self._default_peers.pop(peer, None)
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Take bytes from a ground station. A datagram holds whole frames only."""
@@ -131,7 +132,9 @@ class Bridge:
         for frame in frames:
             if frame.sysid == self._config.sysid:
                 continue
-            if self._stations.heard(peer, frame.version, now):
+            if not self._stations.heard(peer, frame.version, now):
+                if not self._stations.add(peer, frame.version, now):
+                    return
                 self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
             handler = self._handlers.get(frame.msgid)
             if handler is None:
@@ -144,10 +147,6 @@ class Bridge:
         """A ground station's connection is closed."""
         self._stations.gone(peer)
         self._splitters.pop(peer, None)
-
-    def is_heard(self, peer: Peer) -> bool:
-        """Tell whether a valid frame has come from `peer` lately."""
-        return peer in self._stations.peers()
 
     def peers(self) -> list[Peer]:
         """Return the ground stations that are there."""
@@ -259,9 +258,18 @@ class Bridge:
             vehicle_messages.gps_raw_int(vehicle, boot_ms),
             vehicle_messages.global_position_int(vehicle, boot_ms),
             self._mission_current(),
+            self._changed_home(),
         ):
             if message is not None:
                 self._broadcast(message)
+
+    def _changed_home(self) -> Message | None:
+        """HOME_POSITION whenever it is another one; who asks gets it at any time."""
+        home = self._home()
+        if home == self._announced_home:
+            return None
+        self._announced_home = home
+        return vehicle_messages.home_position(home)
 
     def _introduce(self, heartbeat: Message) -> None:
         """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.
@@ -270,10 +278,9 @@ class Bridge:
         until it has seen MAVLink 2.
         """
         for peer in self._everyone():
-            if not self.is_heard(peer):
-                self._datagrams.append((peer, self._encoder.encode(heartbeat, 1)))
-            elif self._stations.version(peer) == 1:
-                self._datagrams.append((peer, self._encoder.encode(heartbeat, 2)))
+            other = 1 if self._stations.is_unknown(peer) else 2
+            if self._stations.version(peer) != other:
+                self._datagrams.append((peer, self._encoder.encode(heartbeat, other)))
 
     def _broadcast(self, message: Message) -> None:
         frames: dict[int, bytes] = {}
@@ -285,7 +292,13 @@ class Bridge:
 
     def _everyone(self) -> list[Peer]:
         heard = self._stations.peers()
-        return heard + [peer for peer in self._default_peers if peer not in heard]
+        answered = {peer.link for peer in heard}
+        unheard = (
+            peer
+            for peer, until_answered in self._default_peers.items()
+            if peer not in heard and not (until_answered and peer.link in answered)
+        )
+        return [*heard, *unheard]
 
     def _is_for_us(self, message: Message) -> bool:
         system = getattr(message, "target_system", 0)

@@ -320,6 +320,7 @@ class MissionUploads:
 
     def _answer(self, station: Station, count: int, ack: MissionResult, now: float) -> None:
         refused = ack is not MissionResult.ACCEPTED
+        self._answered = {who: what for who, what in self._answered.items() if now <= what.until}
         self._answered[station] = _Answered(ack, count, now + _MEMORY_S, refused)
         self._ack(station, ack)
 

@@ -6,6 +6,8 @@ from bridge.station import Peer
 
 #: A UDP peer that is silent for so long has left; its TCP kind is ended by its connection.
 EXPIRY_S = 60.0
+#: More are not spoken to: every heartbeat costs a datagram for each.
+MAX_PEERS = 32
 
 
 @dataclass(slots=True)
@@ -21,14 +23,24 @@ class Stations:
         self._known: dict[Peer, _Known] = {}
 
     def heard(self, peer: Peer, version: int, now: float) -> bool:
-        """Note a frame from `peer`; True if the peer is new."""
+        """Note a frame from `peer`; False if the peer is not known."""
         known = self._known.get(peer)
         if known is None:
-            self._known[peer] = _Known(version, now)
-            return True
+            return False
         known.heard_at = now
         known.version = max(known.version, version)
-        return False
+        return True
+
+    def add(self, peer: Peer, version: int, now: float) -> bool:
+        """Take a new peer in; False if there are too many."""
+        if len(self._known) >= MAX_PEERS:
+            return False
+        self._known[peer] = _Known(version, now)
+        return True
+
+    def is_unknown(self, peer: Peer) -> bool:
+        """Tell whether nothing was heard from `peer`."""
+        return peer not in self._known
 
     def version(self, peer: Peer) -> int:
         """Return the MAVLink version in which to answer."""

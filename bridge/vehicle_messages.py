@@ -28,6 +28,7 @@ _CAPABILITIES = (
     | messages.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
 _NO_MISSION, _NOT_STARTED = 1, 2
+_NO_TOTAL = 0xFFFF
 _VERSION = (0, 1, 0, 0)
 
 
@@ -58,8 +59,9 @@ def autopilot_version() -> Message:
 
 def mission_current(count: int) -> Message:
     """MISSION_CURRENT: `count` records are held (home included); nothing flies them from here."""
-    state = _NOT_STARTED if count else _NO_MISSION
-    return messages.MAVLink_mission_current_message(0, max(count - 1, 0), state, 0)
+    if not count:
+        return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _NO_MISSION, 0)
+    return messages.MAVLink_mission_current_message(0, count - 1, _NOT_STARTED, 0)
 
 
 def attitude(vehicle: VehicleState, boot_ms: int) -> Message | None:

@@ -86,17 +86,13 @@ class Daemon:
         """Forget a ground station."""
         self.bridge.gcs_gone(peer)
 
-    def add_default_peer(self, peer: Peer) -> None:
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """Speak to `peer` unasked."""
-        self.bridge.add_default_peer(peer)
+        self.bridge.add_default_peer(peer, until_answered=until_answered)
 
     def remove_default_peer(self, peer: Peer) -> None:
         """Stop that."""
         self.bridge.remove_default_peer(peer)
-
-    def is_heard(self, peer: Peer) -> bool:
-        """Tell whether `peer` speaks MAVLink."""
-        return self.bridge.is_heard(peer)
 
     # The flight controller's port, the clock and the store.
 

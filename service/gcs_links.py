@@ -32,14 +32,11 @@ class GcsEvents(Protocol):
     def gcs_gone(self, peer: Peer) -> None:
         """A connection was closed."""
 
-    def add_default_peer(self, peer: Peer) -> None:
-        """`peer` is spoken to before it was heard."""
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
+        """`peer` is spoken to before it was heard; or only as long as nobody on its link was heard."""
 
     def remove_default_peer(self, peer: Peer) -> None:
         """It is not any more."""
-
-    def is_heard(self, peer: Peer) -> bool:
-        """Whether valid MAVLink has come from `peer`."""
 
 
 class GcsLink(Protocol):
@@ -76,16 +73,13 @@ class UdpLink:
         resolved: tuple[str, int] = (str(found[0][4][0]), address.port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._broadcast: Peer | None = None
         try:
             if address.kind == "udpin":
                 self._socket.bind(resolved)
             else:
-                peer = Peer(self.name, resolved)
-                events.add_default_peer(peer)
-                if address.kind == "udpbcast":
-                    self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-                    self._broadcast = peer
+                broadcast = address.kind == "udpbcast"
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, broadcast)
+                events.add_default_peer(Peer(self.name, resolved), until_answered=broadcast)
         except OSError:
             self._socket.close()
             raise
@@ -117,10 +111,7 @@ class UdpLink:
             except OSError:
                 # An ICMP "port unreachable" for something we sent; the ground station is just not there yet.
                 continue
-            peer = Peer(self.name, sender)
-            self._events.gcs_data(peer, data, datagram=True)
-            if self._broadcast is not None and self._events.is_heard(peer):
-                self._events.remove_default_peer(self._broadcast)
+            self._events.gcs_data(Peer(self.name, sender), data, datagram=True)
 
 
 class TcpLink:
