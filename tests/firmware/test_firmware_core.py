@@ -1,0 +1,61 @@
+"""The mission core's own tests, built and run as `make -C firmware test` does, and a short run of its fuzzer."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+
+
+def make(*arguments: str) -> str:
+    """Run make in firmware/ and return what it printed; empty if the tools for it cannot be had on this machine."""
+    run = subprocess.run(["make", "-s", "-C", FIRMWARE, *arguments], capture_output=True, text=True)
+    printed = run.stdout + run.stderr
+    assert run.returncode == 0, printed
+    if "NOT RUN" in printed:
+        print(printed)
+        assert "apt-get install" in printed
+        return ""
+    return printed
+
+
+# Four of the eight variants that `make test` runs hold every compiler, standard and word size.
+@pytest.mark.parametrize("variant", ["gcc-c99-64", "gcc-c11-32", "clang-c11-64", "clang-c99-32"])
+def test_core_survives_every_power_cut_under_sanitizers(variant: str) -> None:
+    printed = make(variant)
+    if not printed:
+        return
+    cuts = re.findall(r"(\d+) of (\d+)", printed)
+    assert len(cuts) == 2
+    assert all(whole == all_ for whole, all_ in cuts)
+    assert int(cuts[0][0]) > 10_000
+    assert re.search(r"\d+ checks passed", printed)
+
+
+def test_core_on_an_emulated_cortex_m3() -> None:
+    printed = make("test-arm")
+    if not printed:
+        return
+    stack = re.search(r"(\d+) bytes at most", printed)
+    assert stack is not None
+    assert int(stack[1]) <= 256
+    assert re.search(r"\d+ checks passed", printed)
+
+
+def test_core_stays_small() -> None:
+    """The budget is for the whole patch, 4 KB of flash; the core must leave room for Harakiri's side of it."""
+    printed = make("size")
+    if not printed:
+        return
+    sizes = re.search(r"^\s*(\d+)\s+(\d+)\s+(\d+)\s", printed, re.MULTILINE)
+    assert sizes is not None
+    text, data, bss = map(int, sizes.groups())
+    assert text <= 3000
+    assert (data, bss) == (0, 0)
+
+
+def test_fuzzer_finds_nothing_in_a_few_seconds() -> None:
+    printed = make("fuzz", "FUZZ_SECONDS=5")
+    assert not printed or "stat::number_of_executed_units" in printed
