@@ -49,6 +49,7 @@ class _Transfer:
     patience_s: float = _FIRST_PATIENCE_S
     round_trip_s: float | None = None
     repeated: bool = False  # the present request went out more than once: its answer measures nothing
+    announced_again: bool = False  # begun anew, or a COUNT that the network repeated: the next item tells
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,8 +102,9 @@ class MissionUploads:
                 # Mission Planner's Cancel button. The pilot did not ask to lose the mission that is in the craft.
                 self._cancel(now, "cancelled by the ground station")
                 return
-            if count == present.count and not present.items:
+            if count == present.count:
                 if present.phase is Phase.RECEIVING:
+                    present.announced_again = bool(present.items)
                     self._request(present, now)
                 return
             self._end(now)
@@ -144,6 +146,13 @@ class MissionUploads:
             self._post.say(Severity.ERROR, f"WP {item.seq} is beyond the {transfer.count} items that were announced")
             self._ack(station, MissionResult.INVALID_SEQUENCE)
             return
+        if transfer.announced_again:
+            transfer.announced_again = False
+            if item.seq == 0:
+                # Two lists must never be mixed: nothing of the former one is kept.
+                self._end(now)
+                self.count(station, transfer.count, mission_type, now)
+                return
         assert transfer.check is not None
         if item.seq not in transfer.items:
             self._measure(transfer, item.seq, now)
@@ -227,15 +236,14 @@ class MissionUploads:
 
     def _request(self, transfer: _Transfer, now: float) -> None:
         """Ask for the lowest missing item; id 40, the only one that Mission Planner understands in both modes."""
+        seq = 0 if transfer.announced_again else transfer.checked
         transfer.repeated = transfer.requested_at > transfer.progress_at
         transfer.requested_at = now
         transfer.request_due = now + transfer.patience_s
         station = transfer.station
         self._post.to(
             station,
-            messages.MAVLink_mission_request_message(
-                station.sysid, station.compid, transfer.checked, MISSION_TYPE_MISSION
-            ),
+            messages.MAVLink_mission_request_message(station.sysid, station.compid, seq, MISSION_TYPE_MISSION),
         )
 
     def _measure(self, transfer: _Transfer, seq: int, now: float) -> None:
