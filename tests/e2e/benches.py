@@ -1,0 +1,60 @@
+"""Test benches: programs that belong together, started for a test and ended with it, however it ends."""
+
+import signal
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from lossy_udp import LossyUdp
+from mission_planner import MissionPlanner
+from programs import Board, Daemon, Program
+
+P = TypeVar("P", bound=Program)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A daemon that has found the simulated board on a pty, and the means to join more to it."""
+
+    board: Board
+    daemon: Daemon
+    stack: ExitStack
+
+    def mission_planner(self, address: tuple[str, int] | None = None, **habits: Any) -> MissionPlanner:
+        """A Mission Planner that has met the vehicle; `habits` are the arguments of MissionPlanner."""
+        planner = self.stack.enter_context(MissionPlanner(address or self.daemon.address, **habits))
+        planner.meet()
+        return planner
+
+    def lossy_link(self, **faults: float) -> LossyUdp:
+        """A bad link to the daemon; `faults` are the arguments of LossyUdp."""
+        return self.stack.enter_context(LossyUdp(self.daemon.address, **faults))
+
+
+class Starter:
+    """Starts programs that keep their files in `directory`."""
+
+    def __init__(self, directory: Path, stack: ExitStack) -> None:
+        self.directory = directory
+        self._stack = stack
+
+    def board(self, *options: str) -> Board:
+        board = self._ended_at_last(Board(self.directory, *options))
+        board.wait()
+        return board
+
+    def daemon(self, fc: str, gcs: Sequence[str] = (), state_dir: Path | None = None) -> Daemon:
+        return self._ended_at_last(Daemon(self.directory, fc, gcs, state_dir))
+
+    def bench(self, *options: str, gcs: Sequence[str] = ()) -> Bench:
+        """A board with `options`, and a daemon that has found it."""
+        board = self.board(*options)
+        daemon = self.daemon(str(board.link), gcs)
+        daemon.wait()
+        return Bench(board, daemon, self._stack)
+
+    def _ended_at_last(self, program: P) -> P:
+        self._stack.callback(program.end, signal.SIGKILL)
+        return program

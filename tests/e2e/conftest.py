@@ -1,0 +1,38 @@
+"""What the end-to-end tests start with."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from benches import Bench, Starter
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Starter]:
+    with ExitStack() as stack:
+        yield Starter(tmp_path, stack)
+
+
+@pytest.fixture
+def bench(start: Starter) -> Iterator[Bench]:
+    """A bench of one test's own, for tests that break things."""
+    bench = start.bench()
+    yield bench
+    bench.board.assert_was_treated_well()
+
+
+@pytest.fixture(scope="module")
+def lasting_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with ExitStack() as stack:
+        bench = Starter(tmp_path_factory.mktemp("shared"), stack).bench()
+        yield bench
+        bench.board.assert_was_treated_well()
+
+
+@pytest.fixture
+def shared(lasting_bench: Bench) -> Iterator[Bench]:
+    """The bench of all tests of a module that leave no trace but missions; the clients are one test's own."""
+    with ExitStack() as stack:
+        yield replace(lasting_bench, stack=stack)

@@ -1,0 +1,459 @@
+"""Mission Planner as a scripted client: what it sends, what it waits for and how long (clients.md; commit a2fcd74d6).
+
+Only its behaviour on the link is here. Its timers may be scaled down (`pace`); everything else is as it is there, the
+odd things above all: it takes any ack to MISSION_COUNT for "go on", it understands only MISSION_REQUEST (40) while it
+sends MISSION_ITEM_INT, and its own loops eat each other's packets (`appetite`).
+"""
+
+import random
+import socket
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+from plan import PlanRow
+
+from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import MissionResult
+
+SYSID, COMPID = 255, 190
+_PATIENCE_S = 20.0
+_DATAGRAM_SIZE = 2048
+_INT_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+#: Stream and rate, as it asks for them at the first heartbeat.
+_STREAMS = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
+
+
+class UploadFailed(Exception):
+    """The dialogue that its user sees. `result` is the code that its logic went by, None for a time-out."""
+
+    def __init__(self, text: str, result: MissionResult | None = None) -> None:
+        super().__init__(text)
+        self.result = result
+
+
+class TimedOut(UploadFailed):
+    """It gave up waiting."""
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """A message and when it came, seconds."""
+
+    at: float
+    message: Message
+
+
+class MissionPlanner:
+    """A ground station at a UDP client link to `address`; with `listen` it waits there to be spoken to instead.
+
+    pace: factor on all of its timers. appetite: probability that a packet goes to another of its loops than the one
+    that waits for it. mavlink_1_only: an old one, which never takes MAVLink 2 up.
+    """
+
+    def __init__(
+        self,
+        address: tuple[str, int],
+        *,
+        listen: bool = False,
+        pace: float = 0.3,
+        appetite: float = 0.0,
+        seed: float = 0,
+        mavlink_1_only: bool = False,
+    ) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        if listen:
+            self._socket.bind(address)
+        self._peer = None if listen else address
+        self._pace = pace
+        self._appetite = appetite
+        self._random = random.Random(seed)
+        self._mavlink_1_only = mavlink_1_only
+        self._sees_mavlink_2 = False
+        self._codec = messages.MAVLink(None, srcSystem=SYSID, srcComponent=COMPID)
+        self._codec.robust_parsing = True
+        self._inbox: deque[Message] = deque()
+        self._heartbeat_due = time.monotonic()
+        self.vehicle: tuple[int, int] | None = None
+        self.capabilities = 0
+        self.parameters: dict[str, float] = {}
+        self._parameter_count = 0
+        self.texts: list[str] = []
+        self.armed = False
+        #: Everything that came, whether one of its loops was waiting for it or not.
+        self.heard: list[Traffic] = []
+        self.unacked_commands: list[int] = []
+        # What "Write Fast" looks at; no loop can eat it.
+        self._requested, self._answer = 0, MissionResult.ACCEPTED
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._socket.close()
+
+    # -- the link --------------------------------------------------------------------------------------------
+
+    def send(self, message: Message) -> None:
+        """Send in MAVLink 1 until the vehicle has shown MAVLink 2."""
+        use_2 = self._sees_mavlink_2 and not self._mavlink_1_only
+        self._send_bytes(bytes(message.pack(self._codec, force_mavlink1=not use_2)))
+
+    def _send_bytes(self, frame: bytes) -> None:
+        self._codec.seq = (self._codec.seq + 1) % 256
+        if self._peer is not None:
+            self._socket.sendto(frame, self._peer)
+
+    def _send_signed(self, message: Message) -> None:
+        """Sign with the key of zeros that it has before a passphrase is set."""
+        signing = self._codec.signing
+        signing.secret_key, signing.link_id, signing.sign_outgoing = bytes(32), 1, True
+        self._send_bytes(bytes(message.pack(self._codec)))
+        signing.secret_key, signing.sign_outgoing = None, False
+
+    def _packets(self, seconds: float) -> Iterator[Message]:
+        """Yield what comes to the loop that waits, until `seconds` of its own time are over."""
+        deadline = time.monotonic() + seconds * self._pace
+        while True:
+            while self._inbox:
+                yield self._inbox.popleft()
+            if not self._receive(deadline):
+                return
+
+    def _receive(self, deadline: float) -> bool:
+        """Take one datagram; False at the deadline."""
+        now = time.monotonic()
+        if now >= self._heartbeat_due:
+            self._heartbeat_due = now + 1.0
+            self.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+        if now >= deadline:
+            return False
+        self._socket.settimeout(max(min(deadline, self._heartbeat_due) - now, 0.001))
+        try:
+            data, sender = self._socket.recvfrom(_DATAGRAM_SIZE)
+        except TimeoutError:
+            return True
+        self._peer = sender
+        for message in self._codec.parse_buffer(data) or []:
+            if message.get_type() != "BAD_DATA":
+                self._note(message)
+        return True
+
+    def _note(self, message: Message) -> None:
+        """What every packet does on its way, whichever loop gets it."""
+        self.heard.append(Traffic(time.monotonic(), message))
+        self._sees_mavlink_2 |= message.get_msgbuf()[0] == 0xFD
+        match message.get_type():
+            case "HEARTBEAT":
+                self.armed = bool(message.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED)
+            case "STATUSTEXT":
+                self.texts.append(message.text)
+            case "AUTOPILOT_VERSION":
+                self.capabilities = message.capabilities
+            case "PARAM_VALUE":
+                self.parameters[message.param_id] = message.param_value
+                self._parameter_count = message.param_count
+            case "MISSION_REQUEST" if self._is_for_me(message):
+                self._requested = message.seq
+            case "MISSION_ACK" if self._is_for_me(message):
+                self._answer = MissionResult(message.type)
+        if self._random.random() >= self._appetite:
+            self._inbox.append(message)
+
+    def _is_for_me(self, message: Message) -> bool:
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        return sender == self.vehicle and (message.target_system, message.target_component) == (SYSID, COMPID)
+
+    @property
+    def _target(self) -> tuple[int, int]:
+        assert self.vehicle is not None, "it has met no vehicle"
+        return self.vehicle
+
+    def look_around(self, seconds: float) -> None:
+        """Do nothing but listen, for real seconds."""
+        for _ in self._packets(seconds / self._pace):
+            pass
+
+    def said(self) -> str:
+        """Return all texts of the vehicle in one; long ones come in pieces."""
+        return " ".join(self.texts)
+
+    def wait_for_text(self, part: str) -> None:
+        """Wait until the vehicle has said `part`."""
+        self._wait_for(lambda: part in self.said(), f"the text {part!r}")
+
+    def wait_for_ack(self, result: MissionResult) -> None:
+        """Wait until a MISSION_ACK with `result` has come."""
+        self._wait_for(lambda: result in self.acks(), result.name)
+
+    def wait_for_armed(self, armed: bool) -> None:
+        """Wait for heartbeats that say so."""
+        self._wait_for(lambda: self.armed is armed, f"armed {armed}")
+
+    def _wait_for(self, condition: Callable[[], bool], what: str) -> None:
+        deadline = time.monotonic() + _PATIENCE_S
+        while not condition():
+            assert self._receive(deadline), f"{what} did not come, but {self.texts}, {self.acks()}"
+
+    # -- connecting ------------------------------------------------------------------------------------------
+
+    def meet(self) -> None:
+        """Wait for two heartbeats of an autopilot's component 1: nothing is addressed to anybody before."""
+        seen = 0
+        for message in self._packets(_PATIENCE_S / self._pace):
+            if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1 and message.type != 6:
+                seen += 1
+                self.vehicle = message.get_srcSystem(), message.get_srcComponent()
+                if seen == 2:
+                    return
+        raise TimedOut("No Heartbeat Packets Received")
+
+    def connect(self) -> None:
+        """All that it asks of a vehicle in its first seconds."""
+        m = messages
+        self.meet()
+        system, component = self._target
+        for _ in range(2):
+            self.send(m.MAVLink_statustext_message(6, b"Mission Planner"))
+        self._send_signed(m.MAVLink_statustext_message(6, b"Mission Planner"))
+        for stream, rate in (*_STREAMS, *_STREAMS):
+            self.send(m.MAVLink_request_data_stream_message(system, component, stream, rate, 1))
+        self.command(m.MAV_CMD_REQUEST_MESSAGE, 148)
+        self.command(m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1)
+        self.request_version()
+        self.command(42428)
+        self._request_parameters()
+        self._ask_for_files()
+        self.command(m.MAV_CMD_REQUEST_MESSAGE, 259, tries=4)
+        self.command(521, 1)
+        self.command(m.MAV_CMD_REQUEST_MESSAGE, 269)
+        self.command(m.MAV_CMD_REQUEST_MESSAGE, 280)
+        self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, 271)
+
+    def command(self, command: int, param1: float = 0.0, tries: int = 1) -> int | None:
+        """COMMAND_LONG, 2 s a try; the MAV_RESULT, None if no ack came."""
+        for confirmation in range(tries):
+            self.send(
+                messages.MAVLink_command_long_message(*self._target, command, confirmation, param1, 0, 0, 0, 0, 0, 0)
+            )
+            for message in self._packets(2.0):
+                if message.get_type() == "COMMAND_ACK" and message.command == command:
+                    result: int = message.result
+                    return result
+        self.unacked_commands.append(command)
+        return None
+
+    def arm(self) -> int | None:
+        """The Arm button; its user sees the texts that come meanwhile."""
+        return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
+    def request_version(self) -> None:
+        """AUTOPILOT_VERSION_REQUEST, 500 ms x 3; without an answer it goes on with no capabilities."""
+        for _ in range(3):
+            self.send(messages.MAVLink_autopilot_version_request_message(*self._target))
+            for message in self._packets(0.5):
+                if message.get_type() == "AUTOPILOT_VERSION":
+                    return
+
+    def _request_parameters(self) -> None:
+        """The list every 4 s, for ever if none comes; then the gaps, by index."""
+        deadline = time.monotonic() + _PATIENCE_S
+        while not self._parameter_count:
+            assert time.monotonic() < deadline, "it would ask for parameters for ever"
+            self.send(messages.MAVLink_param_request_list_message(*self._target))
+            for _ in self._packets(4.0):
+                if len(self.parameters) == self._parameter_count:
+                    break
+        while len(self.parameters) < self._parameter_count:
+            assert time.monotonic() < deadline, "a parameter does not come"
+            for index in range(self._parameter_count):
+                self.send(messages.MAVLink_param_request_read_message(*self._target, b"", index))
+                for message in self._packets(0.2):
+                    if message.get_type() == "PARAM_VALUE":
+                        break
+
+    def _ask_for_files(self) -> None:
+        """FTP: open a file to read, and look at the vehicle's NAK (opcode 129)."""
+        payload = bytes([1, 0, 0, 4, 15, 0, 0, 0, 0, 0, 0, 0]) + b"@PARAM/param.pck"
+        self.send(messages.MAVLink_file_transfer_protocol_message(0, *self._target, list(payload.ljust(251, b"\0"))))
+        for message in self._packets(2.0):
+            if message.get_type() == "FILE_TRANSFER_PROTOCOL" and message.payload[3] == 129:
+                return
+        raise TimedOut("no answer to a file request")
+
+    # -- writing ---------------------------------------------------------------------------------------------
+
+    def write(self, rows: Sequence[PlanRow], *, use_int: bool = True) -> None:
+        """Its Write button: rows[0] is home. UploadFailed is the dialogue that its user would see."""
+        self._start_upload(len(rows))
+        self.go_on(rows, 0, use_int=use_int)
+
+    def go_on(self, rows: Sequence[PlanRow], at: int, *, use_int: bool = True) -> None:
+        """Write the rest of a list whose upload has begun."""
+        while at < len(rows):
+            result = self._write_item(rows, at, use_int)
+            if result is MissionResult.ERROR:
+                self.send(messages.MAVLink_mission_write_partial_list_message(*self._target, at, len(rows)))
+                result = self._write_item(rows, at, use_int)
+            if result is MissionResult.NO_SPACE:
+                raise UploadFailed("Upload failed, please reduce the number of wp's", result)
+            if result is MissionResult.INVALID:
+                raise UploadFailed(f"mission was rejected by the Mav, item had a bad option wp# {at}", result)
+            if result is MissionResult.INVALID_SEQUENCE:
+                at = self._requested_seq(at) - 1
+            elif result is not MissionResult.ACCEPTED:
+                raise UploadFailed(f"Upload MISSION failed {result.name}", result)
+            at += 1
+        self._send_ack()
+
+    def after_write(self, radius_m: float | None = None) -> None:
+        """What follows a Write that went well: home, and the radius of its text box if the vehicle's differs."""
+        self.get_home()
+        if radius_m is not None:
+            self.set_parameter("WPNAV_RADIUS", radius_m * 100)
+
+    def get_home(self) -> None:
+        """Command 410, 700 ms a try; without an answer it reads item 0 instead."""
+        for _ in range(4):
+            self.send(
+                messages.MAVLink_command_long_message(
+                    *self._target, messages.MAV_CMD_GET_HOME_POSITION, 0, 0, 0, 0, 0, 0, 0, 0
+                )
+            )
+            for message in self._packets(0.7):
+                if message.get_type() == "HOME_POSITION":
+                    return
+        self.read_item(0)
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """PARAM_SET if it differs, 700 ms a try."""
+        if name not in self.parameters or self.parameters[name] == value:
+            return
+        for _ in range(4):
+            self.send(messages.MAVLink_param_set_message(*self._target, name.encode(), value, 9))
+            for message in self._packets(0.7):
+                if message.get_type() == "PARAM_VALUE" and message.param_id == name:
+                    return
+        raise TimedOut(f"set {name} failed")
+
+    def write_fast(self, rows: Sequence[PlanRow], *, cancel_at: int | None = None) -> None:
+        """Its "Write Fast": bursts of ten. With `cancel_at` its user presses Cancel before that item is sent.
+
+        It does not wait after the last item, whatever becomes of it.
+        """
+        self._start_upload(len(rows))
+        self._requested, self._answer = 0, MissionResult.ACCEPTED
+        at = 0
+        while at < len(rows):
+            if at % 10 == 0 and at:
+                for _ in self._packets(1.1):
+                    if self._requested == at or self._answer is not MissionResult.ACCEPTED:
+                        break
+                if self._answer is not MissionResult.ACCEPTED:
+                    text = f"Upload wps failed {self._requested} {self._answer.name}"
+                    raise UploadFailed(text, self._answer)
+                at = self._requested
+            if cancel_at is not None and at >= cancel_at:
+                self.cancel()
+                return
+            self.send(rows[at].int_message(*self._target, at))
+            at += 1
+        self._send_ack()
+
+    def cancel(self) -> None:
+        """Its Cancel button: a count of nothing."""
+        self.send(messages.MAVLink_mission_count_message(*self._target, 0, 0))
+
+    def write_begun(self, rows: Sequence[PlanRow], count: int) -> None:
+        """Write the first `count` items of a list and then nothing: its user has pulled the plug, say."""
+        self._start_upload(len(rows))
+        for at in range(count):
+            self._write_item(rows, at, use_int=True)
+
+    def _start_upload(self, count: int) -> None:
+        """MISSION_COUNT, 700 ms x 4. A request for item 0 or 1 means "go on", and so does ANY ack."""
+        for _ in range(4):
+            self.send(messages.MAVLink_mission_count_message(*self._target, count, 0))
+            for message in self._packets(0.7):
+                if message.get_type() in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+                    if self._is_for_me(message) and message.seq in (0, 1):
+                        return
+                elif message.get_type() == "MISSION_ACK" and self._is_for_me(message):
+                    return
+        raise TimedOut("Timeout on read - setWPTotal")
+
+    def _write_item(self, rows: Sequence[PlanRow], at: int, use_int: bool) -> MissionResult:
+        """One item, 450 ms x 11. A request for another seq than the next costs one of the tries, at once."""
+        row = rows[at]
+        message_of = row.int_message if use_int else row.float_message
+        # While it sends MISSION_ITEM_INT it does not understand MISSION_REQUEST_INT.
+        understood = ("MISSION_REQUEST",) if use_int else ("MISSION_REQUEST", "MISSION_REQUEST_INT")
+        for _ in range(11):
+            self.send(message_of(*self._target, at))
+            for message in self._packets(0.45):
+                if message.get_type() == "MISSION_ACK" and self._is_for_me(message):
+                    return MissionResult(message.type)
+                if message.get_type() in understood and self._is_for_me(message):
+                    if message.seq == at + 1:
+                        return MissionResult.ACCEPTED
+                    break
+        raise TimedOut("Timeout on read - setWP")
+
+    def _requested_seq(self, at: int) -> int:
+        """After INVALID_SEQUENCE: go on where the vehicle asks next; if it asks for nothing, skip silently."""
+        for message in self._packets(1.5):
+            if message.get_type() == "MISSION_REQUEST":
+                seq: int = message.seq
+                return seq
+        return at + 1
+
+    def _send_ack(self) -> None:
+        self.send(messages.MAVLink_mission_ack_message(*self._target, 0, 0))
+
+    # -- reading ---------------------------------------------------------------------------------------------
+
+    def read(self) -> list[Message]:
+        """Its Read button: REQUEST_LIST 700 ms x 7, then item by item. A MISSION_ACK error is not looked at."""
+        items = [self.read_item(seq) for seq in range(self._read_count())]
+        self._send_ack()
+        return items
+
+    def read_item(self, seq: int) -> Message:
+        """One item, 2.5 s x 6, in the form that the capabilities lead to. Another item is answered by asking again."""
+        as_int = bool(self.capabilities & _INT_CAPABILITY)
+        m = messages
+        request = (m.MAVLink_mission_request_int_message if as_int else m.MAVLink_mission_request_message)(
+            *self._target, seq, 0
+        )
+        for _ in range(6):
+            self.send(request)
+            for message in self._packets(2.5):
+                if message.get_type() in ("MISSION_ITEM", "MISSION_ITEM_INT") and self._is_for_me(message):
+                    if message.seq == seq:
+                        return message
+                    self.send(request)
+        raise TimedOut("Timeout on read - getWP")
+
+    def _read_count(self) -> int:
+        for _ in range(7):
+            self.send(messages.MAVLink_mission_request_list_message(*self._target, 0))
+            for message in self._packets(0.7):
+                if message.get_type() == "MISSION_COUNT" and self._is_for_me(message):
+                    count: int = message.count
+                    return count
+        raise TimedOut("Timeout on read - getWPCount")
+
+    # -- what a test may look at -----------------------------------------------------------------------------
+
+    def heard_of(self, kind: str) -> list[Any]:
+        """Return all messages of one type that came, eaten ones included."""
+        return [traffic.message for traffic in self.heard if traffic.message.get_type() == kind]
+
+    def acks(self) -> list[MissionResult]:
+        """Return the results of all MISSION_ACKs that came."""
+        return [MissionResult(message.type) for message in self.heard_of("MISSION_ACK")]

@@ -1,0 +1,188 @@
+"""The daemon and the simulated Naze as programs of their own, as a user starts them."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import IO, Any, TypeVar
+
+from service.control import ControlError, ask_daemon
+
+#: Seconds after which something that must come at all counts as not coming.
+PATIENCE = 20.0
+_REPOSITORY = Path(__file__).resolve().parents[2]
+_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')"]
+T = TypeVar("T")
+
+
+def until(condition: Callable[[], T | None], what: str) -> T:
+    """Wait for something to be there (true), and return it."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        found = condition()
+        if found:
+            return found
+        assert time.monotonic() < deadline, f"{what} did not come"
+        time.sleep(0.02)
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
+    """Return a port that nobody has at this moment."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def run_naze_bridge(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a subcommand to its end."""
+    return subprocess.run(
+        [*_NAZE_BRIDGE, *arguments], cwd=_REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+
+
+class Program:
+    """One `naze-bridge` that goes on until it is told to end; what it prints is kept in a file."""
+
+    def __init__(self, output: Path, *arguments: str) -> None:
+        self._output = output
+        self._arguments = arguments
+        self.process = self._start()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        with self._output.open("ab") as file:
+            return subprocess.Popen([*_NAZE_BRIDGE, *self._arguments], cwd=_REPOSITORY, stdout=file, stderr=file)
+
+    @property
+    def printed(self) -> str:
+        return self._output.read_text()
+
+    @property
+    def is_alive(self) -> bool:
+        return self.process.poll() is None
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """Send a signal and return the exit status."""
+        if self.is_alive:
+            self.process.send_signal(number)
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+
+
+class Board(Program):
+    """`naze-bridge sim`. `line` obeys its control socket (service/simulator/control.py)."""
+
+    def __init__(self, directory: Path, *options: str) -> None:
+        self.link = directory / "naze"
+        self._control = directory / "naze.sock"
+        super().__init__(
+            directory / "board.log", "sim", "--link", str(self.link), "--control", str(self._control), *options
+        )
+
+    def wait(self) -> None:
+        until(lambda: "Simulated Naze at" in self.printed or not self.is_alive, "the simulated board")
+        assert self.is_alive, self.printed
+
+    def line(self, line: str) -> str:
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(self._control))
+            connection.sendall(f"{line}\n".encode())
+            with connection.makefile() as answers:
+                return answers.readline().strip()
+
+    def set(self, line: str) -> None:
+        answer = self.line(line)
+        assert answer == "ok", answer
+
+    def stats(self) -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(self.line("stats"))
+        return found
+
+    def records(self) -> list[str]:
+        """Return the stored list, each record in hex."""
+        records: list[str] = self.stats()["records"]
+        return records
+
+    def assert_was_treated_well(self) -> None:
+        """Assert that nothing was ever sent to the board that a real one would have suffered from."""
+        stats = self.stats()
+        assert stats["hazard_runs"] == stats["rx_overflows"] == stats["tx_overflows"] == 0, stats
+        assert stats["max_outstanding_reply_bytes"] <= 255, stats
+        assert not stats["cli_entered"]
+
+
+class Daemon(Program):
+    """`naze-bridge run`. Without `gcs` it listens for UDP on a free port, `port`."""
+
+    def __init__(self, directory: Path, fc: str, gcs: Sequence[str] = (), state_dir: Path | None = None) -> None:
+        self.port = 0 if gcs else free_port()
+        self.state_dir = state_dir or directory / "state"
+        links = [word for link in gcs or (f"udpin:127.0.0.1:{self.port}",) for word in ("--gcs", link)]
+        super().__init__(directory / "daemon.log", "run", "--fc", fc, *links, "--state-dir", str(self.state_dir))
+
+    @property
+    def address(self) -> tuple[str, int]:
+        return "127.0.0.1", self.port
+
+    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        return ask_daemon(self.state_dir, request)
+
+    def status(self) -> dict[str, Any] | None:
+        """Return the status; None if the daemon does not answer (yet)."""
+        try:
+            return self.ask({"do": "status"})
+        except (ControlError, OSError):
+            return None
+
+    def wait(self, state: str = "MSP") -> None:
+        """Wait until the flight controller is found."""
+
+        def arrived() -> bool:
+            assert self.is_alive, self.printed
+            status = self.status()
+            return status is not None and status["state"] == state
+
+        until(arrived, f"a daemon in state {state}")
+
+    def wait_up(self) -> None:
+        """Wait until the daemon runs, flight controller or not."""
+        until(lambda: self.status() or not self.is_alive, "the daemon")
+        assert self.is_alive, self.printed
+
+    def missions(self) -> list[dict[str, Any]]:
+        """Return what came in, newest first."""
+        missions: list[dict[str, Any]] = self.ask({"do": "missions", "limit": 100})["missions"]
+        return missions
+
+    def held(self) -> dict[str, Any]:
+        """Return what the flight controller holds, read by the daemon."""
+        return self.ask({"do": "pull"})
+
+    def kill_and_restart(self) -> None:
+        """Die as by a power cut, and start again as by systemd."""
+        os.kill(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+        self.process = self._start()
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return the log."""
+        return [json.loads(line) for line in self.printed.splitlines() if line.startswith("{")]
+
+    def has_logged(self, event: str) -> dict[str, Any] | None:
+        """Return the last event of that name."""
+        found = [entry for entry in self.events() if entry["event"] == event]
+        return found[-1] if found else None
+
+
+def close_quietly(*streams: IO[Any]) -> None:
+    for stream in streams:
+        stream.close()

@@ -1,0 +1,374 @@
+"""Mission Planner writes, reads, cancels and is refused, on clean links and on bad ones."""
+
+from collections.abc import Sequence
+
+import pytest
+from benches import Bench
+from lossy_udp import Way
+from mission_planner import MissionPlanner, UploadFailed
+from plan import HOME, PlanRow, judge, mixed_plan, plain_plan, records_of, single, waypoint
+from programs import until
+
+from bridge.mission_check import Result
+from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import Command, MissionItem, MissionResult
+
+#: What a long-range radio does to a link.
+BAD_RADIO = {"loss": 0.1, "repeats": 0.05, "delay_s": 0.2}
+
+
+def as_read(message: Message) -> tuple[float, ...]:
+    return (
+        message.seq,
+        message.command,
+        message.frame,
+        message.param1,
+        message.param2,
+        message.param3,
+        message.param4,
+        message.x,
+        message.y,
+        message.z,
+        message.autocontinue,
+        message.current,
+    )
+
+
+def as_stored(item: MissionItem) -> tuple[float, ...]:
+    parameters = (item.p1, item.p2, item.p3, item.p4)
+    assert item.lat_e7 is not None
+    assert item.lon_e7 is not None
+    return (item.seq, item.command, item.frame, *parameters, item.lat_e7, item.lon_e7, item.alt_m, 1, 0)
+
+
+def assert_reads(planner: MissionPlanner, plan: Sequence[PlanRow], *, use_int: bool = True) -> None:
+    """Assert that a Read shows what the rules say that became of `plan`."""
+    read = [as_read(message) for message in planner.read()]
+    assert read == [as_stored(item) for item in judge(plan, use_int=use_int).items]
+
+
+# -- connecting ----------------------------------------------------------------------------------------------
+
+
+def test_connecting_leaves_nothing_unanswered(shared: Bench) -> None:
+    planner = shared.mission_planner()
+    planner.connect()
+    assert planner.vehicle == (1, 1)
+    assert planner.unacked_commands == []
+    assert planner.capabilities & messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    assert not planner.capabilities & messages.MAV_PROTOCOL_CAPABILITY_FTP
+    assert planner.parameters["WPNAV_RADIUS"] == 200
+    assert not {"FENCE_TOTAL", "RALLY_TOTAL"} & planner.parameters.keys()
+    heartbeat = planner.heard_of("HEARTBEAT")[-1]
+    assert (heartbeat.autopilot, heartbeat.type) == (messages.MAV_AUTOPILOT_ARDUPILOTMEGA, 2)
+    assert planner.texts
+
+
+def test_the_vehicle_moves_on_its_map(shared: Bench) -> None:
+    planner = shared.mission_planner()
+    wanted = {"ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "SYS_STATUS", "MISSION_CURRENT"}
+    planner.look_around(2.5)
+    assert wanted <= {traffic.message.get_type() for traffic in planner.heard}
+
+
+def test_it_speaks_mavlink_1_until_it_has_seen_mavlink_2(shared: Bench) -> None:
+    planner = shared.mission_planner(mavlink_1_only=True)
+    planner.look_around(1.2)
+    versions = {traffic.message.get_msgbuf()[0] for traffic in planner.heard}
+    assert versions == {0xFE, 0xFD}
+    plan = plain_plan(12)
+    planner.connect()
+    planner.write(plan)
+    assert_reads(planner, plan)
+
+
+# -- writing and reading -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("use_int", [True, False], ids=["int", "float"])
+@pytest.mark.parametrize("count", [12, 146])
+def test_a_write_reaches_the_board_as_the_rules_say(shared: Bench, count: int, use_int: bool) -> None:
+    planner = shared.mission_planner()
+    planner.connect()
+    plan = mixed_plan(count)
+    planner.write(plan, use_int=use_int)
+    planner.after_write(radius_m=2.0)
+    verdict = judge(plan, use_int=use_int)
+    assert shared.board.records() == records_of(verdict)
+    assert shared.daemon.missions()[0]["outcome"] == "VERIFIED"
+    assert_reads(planner, plan, use_int=use_int)
+    # Every change and drop was said.
+    assert verdict.findings
+    assert all(finding.text() in planner.said() for finding in verdict.findings)
+
+
+def test_a_read_in_float_shows_the_same_list(shared: Bench) -> None:
+    planner = shared.mission_planner()
+    plan = mixed_plan(13)
+    planner.write(plan)
+    assert planner.capabilities == 0
+    read = planner.read()
+    assert {message.get_type() for message in read} == {"MISSION_ITEM"}
+    expected = [as_stored(item) for item in judge(plan).items]
+    for message, stored in zip(read, expected, strict=True):
+        lat, lon = (single(value / 1e7) for value in stored[7:9])
+        assert as_read(message) == (*stored[:7], lat, lon, *stored[9:])
+
+
+@pytest.mark.parametrize("use_int", [True, False], ids=["int", "float"])
+@pytest.mark.parametrize("count", [12, 146])
+def test_a_write_survives_that_it_eats_its_own_packets(shared: Bench, count: int, use_int: bool) -> None:
+    planner = shared.mission_planner(appetite=0.2, seed=count + use_int)
+    plan = plain_plan(count, start=count)
+    planner.write(plan, use_int=use_int)
+    assert shared.board.records() == records_of(judge(plan, use_int=use_int))
+    assert MissionResult.INVALID_SEQUENCE not in planner.acks()
+
+
+def test_a_write_and_a_read_survive_a_bad_radio(shared: Bench) -> None:
+    link = shared.lossy_link(**BAD_RADIO, seed=1)
+    plan = mixed_plan(12)
+    shared.mission_planner(link.address, pace=1.0).write(plan)
+    assert shared.board.records() == records_of(judge(plan))
+    reader = shared.mission_planner(link.address)
+    reader.request_version()
+    assert_reads(reader, plan)
+    assert link.lost
+
+
+@pytest.mark.parametrize("use_int", [True, False], ids=["int", "float"])
+def test_a_long_write_survives_loss_repeats_and_reordering(shared: Bench, use_int: bool) -> None:
+    link = shared.lossy_link(loss=0.1, repeats=0.05, delay_s=0.005, jitter_s=0.02, seed=use_int)
+    planner = shared.mission_planner(link.address)
+    plan = mixed_plan(146)
+    planner.write(plan, use_int=use_int)
+    assert shared.board.records() == records_of(judge(plan, use_int=use_int))
+
+
+@pytest.mark.parametrize("count", [12, 20, 146])
+def test_write_fast(shared: Bench, count: int) -> None:
+    planner = shared.mission_planner()
+    plan = plain_plan(count, start=2 * count)
+    planner.write_fast(plan)
+    until(lambda: shared.board.records() == records_of(judge(plan)), "the list on the board")
+    planner.wait_for_text("Mission verified")
+    requested = [message.seq for message in planner.heard_of("MISSION_REQUEST")]
+    assert max(requested) < count
+    assert MissionResult.INVALID_SEQUENCE not in planner.acks()
+
+
+def test_write_fast_over_a_bad_radio_is_whole_or_not_at_all(shared: Bench) -> None:
+    """It does not look whether its last burst arrived: then the list that was there stays, and the user is told."""
+    shared.mission_planner().write(plain_plan(12))
+    before = shared.board.records()
+    link = shared.lossy_link(**BAD_RADIO, seed=4)
+    planner = shared.mission_planner(link.address, pace=1.0)
+    plan = plain_plan(33, start=300)
+    planner.write_fast(plan)
+    mission = until(lambda: _ended_with(shared, len(plan)), "the end of the upload")
+    expected = {"VERIFIED": records_of(judge(plan)), "CANCELLED": before}
+    assert shared.board.records() == expected[mission]
+
+
+def _ended_with(bench: Bench, most: int) -> str | None:
+    """Return the outcome of the mission that came in last, if it is one of 20 to `most` items."""
+    newest = bench.daemon.missions()[0]
+    ended = newest["outcome"] != "PENDING" and 20 <= newest["item_count"] <= most
+    return str(newest["outcome"]) if ended else None
+
+
+def test_a_second_write_right_behind_the_radius_waits_for_the_flash(bench: Bench) -> None:
+    planner = bench.mission_planner(pace=1.0)
+    planner.connect()
+    planner.write(plain_plan(12))
+    planner.after_write(radius_m=4.0)
+    assert planner.parameters["WPNAV_RADIUS"] == 400
+    # The radius is written to flash a second later; this list comes meanwhile and is judged by the new one.
+    plan = plain_plan(12, start=50)
+    planner.write(plan)
+    planner.wait_for_text("p2 3 -> 4")
+    assert [record[26:28] for record in bench.board.records()] == ["04"] * 12
+
+
+def test_a_list_of_home_and_nothing_that_flies_clears(shared: Bench) -> None:
+    planner = shared.mission_planner()
+    planner.write(plain_plan(12))
+    planner.write([HOME, PlanRow(178, p2=5.0)])
+    assert shared.board.records() == []
+    planner.wait_for_text("cleared")
+    assert planner.read() == []
+
+
+# -- refusals ------------------------------------------------------------------------------------------------
+
+
+def refusal_of(planner: MissionPlanner, plan: Sequence[PlanRow]) -> MissionResult | None:
+    with pytest.raises(UploadFailed) as refused:
+        planner.write(plan)
+    assert MissionResult.INVALID_SEQUENCE not in planner.acks()
+    assert MissionResult.ERROR not in planner.acks()
+    return refused.value.result
+
+
+@pytest.fixture
+def kept(shared: Bench) -> list[str]:
+    """What the board holds before a refusal, and must hold after it."""
+    shared.mission_planner().write(plain_plan(12))
+    return shared.board.records()
+
+
+def test_too_long_a_list(shared: Bench, kept: list[str]) -> None:
+    planner = shared.mission_planner()
+    assert refusal_of(planner, plain_plan(147)) is MissionResult.NO_SPACE
+    planner.wait_for_text("147 items, 146 fit")
+    assert shared.board.records() == kept
+
+
+def test_an_empty_write(shared: Bench, kept: list[str]) -> None:
+    planner = shared.mission_planner()
+    assert refusal_of(planner, [HOME]) is MissionResult.INVALID
+    planner.wait_for_text("only a home point")
+    assert shared.board.records() == kept
+
+
+BAD_LISTS = {
+    "land in the middle": ([HOME, PlanRow(Command.NAV_LAND), waypoint(1)], MissionResult.INVALID, "LAND"),
+    "take-off alone": ([HOME, PlanRow(Command.NAV_TAKEOFF, alt=10.0)], MissionResult.INVALID, "alone"),
+    "a frame of its own": ([HOME, waypoint(1), waypoint(2, frame=7)], MissionResult.UNSUPPORTED_FRAME, "frame 7"),
+    "beyond the pole": ([HOME, waypoint(1), waypoint(2, lat=91.0)], MissionResult.INVALID_PARAM5_X, "90 degrees"),
+    "home nowhere": ([PlanRow(80), waypoint(1), waypoint(2)], MissionResult.INVALID, "WAYPOINT"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_LISTS)
+def test_a_list_that_breaks_a_rule(shared: Bench, kept: list[str], name: str) -> None:
+    plan, ack, reason = BAD_LISTS[name]
+    planner = shared.mission_planner()
+    assert judge(plan).result is Result.REJECTED
+    assert refusal_of(planner, plan) is ack
+    planner.wait_for_text(reason)
+    assert shared.board.records() == kept
+    newest = shared.daemon.missions()[0]
+    assert (newest["outcome"], newest["ack"]) == ("REJECTED", f"MAV_MISSION_{ack.name}")
+
+
+def test_a_refusal_reaches_a_user_whose_packets_are_eaten(shared: Bench, kept: list[str]) -> None:
+    planner = shared.mission_planner(appetite=0.3, seed=5)
+    assert refusal_of(planner, plain_plan(147)) is MissionResult.NO_SPACE
+    assert refusal_of(planner, BAD_LISTS["land in the middle"][0]) is MissionResult.INVALID
+    assert shared.board.records() == kept
+
+
+def test_fence_and_rally_points_are_refused_in_their_own_type(shared: Bench, kept: list[str]) -> None:
+    planner = shared.mission_planner()
+    for mission_type in (1, 2):
+        planner.send(messages.MAVLink_mission_count_message(1, 1, 5, mission_type))
+        planner.send(messages.MAVLink_mission_request_list_message(1, 1, mission_type))
+        planner.send(messages.MAVLink_mission_clear_all_message(1, 1, mission_type))
+    planner.look_around(0.5)
+    acks = [(message.type, message.mission_type) for message in planner.heard_of("MISSION_ACK")]
+    assert acks == [(MissionResult.UNSUPPORTED, 1)] * 3 + [(MissionResult.UNSUPPORTED, 2)] * 3
+    assert shared.board.records() == kept
+
+
+def test_armed(bench: Bench) -> None:
+    planner = bench.mission_planner()
+    planner.connect()
+    plan = plain_plan(12)
+    planner.write(plan)
+    kept = bench.board.records()
+    bench.board.set("armed 1")
+    planner.wait_for_armed(True)
+    assert refusal_of(planner, plain_plan(12, start=70)) is MissionResult.DENIED
+    planner.wait_for_text("disarm to change the mission")
+    # It asks for home when the pilot arms.
+    assert as_read(planner.read_item(0)) == as_stored(judge(plan).items[0])
+    bench.board.set("armed 0")
+    planner.wait_for_armed(False)
+    assert bench.board.records() == kept
+    planner.write(plain_plan(12, start=70))
+    assert bench.board.records() != kept
+
+
+def test_arming_in_the_middle_ends_the_upload(bench: Bench) -> None:
+    planner = bench.mission_planner()
+    planner.write(plain_plan(12))
+    kept = bench.board.records()
+    plan = plain_plan(30, start=70)
+    planner.write_begun(plan, 9)
+    bench.board.set("armed 1")
+    planner.wait_for_ack(MissionResult.DENIED)
+    planner.wait_for_text("disarm to change the mission")
+    assert bench.board.records() == kept
+
+
+def test_its_arm_button_is_answered_with_a_reason(shared: Bench) -> None:
+    planner = shared.mission_planner()
+    assert planner.arm() == messages.MAV_RESULT_DENIED
+    planner.wait_for_text("transmitter sticks")
+    assert not shared.board.stats()["armed"]
+
+
+# -- what else goes wrong ------------------------------------------------------------------------------------
+
+
+def test_a_lost_final_ack_is_given_again(shared: Bench) -> None:
+    link = shared.lossy_link()
+    planner = shared.mission_planner(link.address)
+    swallowed: list[bytes] = []
+
+    def first_two_acks(way: Way, data: bytes) -> bool:
+        if way is Way.TO_CLIENT and data[0] == 0xFD and data[7] == messages.MAVLINK_MSG_ID_MISSION_ACK:
+            swallowed.append(data)
+            return len(swallowed) <= 2
+        return False
+
+    link.swallow = first_two_acks
+    writes = shared.board.stats()["flash_writes"]
+    plan = plain_plan(12, start=90)
+    planner.write(plan)
+    assert len(swallowed) >= 3
+    assert shared.board.records() == records_of(judge(plan))
+    assert shared.board.stats()["flash_writes"] == writes + 1
+    assert set(planner.acks()) == {MissionResult.ACCEPTED}
+
+
+def test_cancel_keeps_the_list_that_was_there(shared: Bench, kept: list[str]) -> None:
+    planner = shared.mission_planner()
+    planner.write_fast(plain_plan(40, start=100), cancel_at=20)
+    planner.wait_for_ack(MissionResult.OPERATION_CANCELLED)
+    planner.wait_for_text("old mission kept")
+    assert shared.board.records() == kept
+    # And what was not cancelled in time is written: the next Write goes through at once.
+    plan = plain_plan(12, start=100)
+    planner.write(plan)
+    assert shared.board.records() == records_of(judge(plan))
+
+
+def test_a_user_who_goes_away_blocks_nobody(shared: Bench, kept: list[str]) -> None:
+    gone = shared.mission_planner()
+    gone.write_begun(plain_plan(30, start=100), 9)
+    planner = shared.mission_planner()
+    planner.wait_for_text("no item came for 5 s")
+    assert shared.board.records() == kept
+    planner.write(plain_plan(12, start=100))
+
+
+@pytest.mark.parametrize("count", [12, 30])
+def test_a_write_that_is_begun_again_starts_anew(shared: Bench, count: int) -> None:
+    planner = shared.mission_planner()
+    planner.write_begun(plain_plan(30, start=100), 9)
+    plan = plain_plan(count, start=120)
+    planner.write(plan)
+    assert shared.board.records() == records_of(judge(plan))
+
+
+def test_a_count_that_the_network_repeats_late_does_no_harm(shared: Bench) -> None:
+    """It would have to go back to item 0, which it never does: each wrong request costs it one of ten tries."""
+    planner = shared.mission_planner()
+    plan = plain_plan(30, start=140)
+    planner.write_begun(plan, 6)
+    planner.send(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))
+    planner.look_around(0.1)
+    planner.go_on(plan, 6)
+    assert shared.board.records() == records_of(judge(plan))
