@@ -15,6 +15,7 @@ from bridge.commands import Commands
 from bridge.fc_session import FcSession
 from bridge.flight_controller import FlightController
 from bridge.harakiri import HarakiriMissions
+from bridge.inbox import Inbox
 from bridge.journal import Journal
 from bridge.mission_check import check_list
 from bridge.mission_desk import Delivery, HeldMission, MissionDesk, Refusal
@@ -30,8 +31,6 @@ from bridge.stations import Stations
 from protocols.mavlink.codec import MavlinkDecoder, MavlinkEncoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mavlink.ftp import refuse
-from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import MissionItem
 
 _HEARTBEAT_INTERVAL_S = 1.0
@@ -72,9 +71,9 @@ class Bridge:
         self.desk = MissionDesk()
         self._uploads = MissionUploads(self.desk, self.runner, self, journal, self._home)
         self._downloads = MissionDownloads(self.desk, self.runner, self, self._is_armed, self._home)
-        self._parameters = Parameters(self.desk, self.runner, self, config.sysid)
-        self._commands = Commands(self, self._on_demand(), self._banner)
-        self._handlers = self._make_handlers()
+        parameters = Parameters(self.desk, self.runner, self, config.sysid)
+        commands = Commands(self, self._on_demand(), self._banner)
+        self._inbox = Inbox(self, self._uploads, self._downloads, parameters, commands)
 
     # The flight controller's side.
 
@@ -136,12 +135,11 @@ class Bridge:
                 if not self._stations.add(peer, frame.version, now):
                     return
                 self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
-            handler = self._handlers.get(frame.msgid)
-            if handler is None:
+            if not self._inbox.understands(frame.msgid):
                 continue
             message = self._decoder.decode(frame)
             if message is not None and self._is_for_us(message):
-                handler(Station(peer, frame.sysid, frame.compid), message)
+                self._inbox.take(Station(peer, frame.sysid, frame.compid), message, now)
 
     def gcs_gone(self, peer: Peer) -> None:
         """A ground station's connection is closed."""
@@ -343,78 +341,6 @@ class Bridge:
             messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
             messages.MAVLINK_MSG_ID_SYS_STATUS: lambda: vehicle_messages.sys_status(self.session.vehicle),
         }
-
-    def _make_handlers(self) -> dict[int, Callable[[Station, Message], None]]:
-        """Which message is whose business."""
-        uploads, downloads, parameters, commands = (
-            self._uploads,
-            self._downloads,
-            self._parameters,
-            self._commands,
-        )
-        m = messages
-        return {
-            m.MAVLINK_MSG_ID_MISSION_COUNT: self._mission_count,
-            m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg: uploads.item(
-                s, item_from_float_message(msg), msg.mission_type, self._now
-            ),
-            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg: uploads.item(
-                s, item_from_int_message(msg), msg.mission_type, self._now
-            ),
-            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg: uploads.ack(s, msg.type, self._now),
-            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
-            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _: uploads.partial_list(s, self._now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, msg: downloads.request_list(
-                s, msg.mission_type, self._now
-            ),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg: downloads.request(
-                s, msg.seq, msg.mission_type, self._now, as_int=False
-            ),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg: downloads.request(
-                s, msg.seq, msg.mission_type, self._now, as_int=True
-            ),
-            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda _s, _msg: self.say(
-                Severity.ERROR, "The current waypoint cannot be set"
-            ),
-            m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg: commands.take(s, msg.command, msg.param1),
-            m.MAVLINK_MSG_ID_COMMAND_INT: lambda s, msg: commands.take(s, msg.command, msg.param1),
-            m.MAVLINK_MSG_ID_SET_MODE: lambda _s, _msg: commands.refuse_mode(),
-            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _: self.to(s, vehicle_messages.autopilot_version()),
-            m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _: parameters.send_all(s),
-            m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg: parameters.send_one(s, msg.param_id, msg.param_index),
-            m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg: parameters.set(s, msg.param_id, msg.param_value, self._now),
-            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._ftp,
-            m.MAVLINK_MSG_ID_PING: self._ping,
-            m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
-        }
-
-    def _mission_count(self, station: Station, message: Message) -> None:
-        self._downloads.forget(station)
-        self._uploads.count(station, message.count, message.mission_type, self._now)
-
-    def _mission_clear(self, station: Station, message: Message) -> None:
-        self._downloads.forget(station)
-        self._uploads.clear_all(station, message.mission_type, self._now)
-
-    def _ftp(self, station: Station, message: Message) -> None:
-        answer = refuse(message.payload)
-        if answer is not None:
-            self.to(
-                station,
-                messages.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer),
-            )
-
-    def _ping(self, station: Station, message: Message) -> None:
-        # A PING with targets is the answer to somebody's question.
-        if message.target_system == 0:
-            self.to(
-                station,
-                messages.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid),
-            )
-
-    def _timesync(self, station: Station, message: Message) -> None:
-        if message.tc1 == 0:
-            self.to(station, messages.MAVLink_timesync_message(int(self._now * 1e9), message.ts1))
 
 
 def split_text(text: str) -> list[str]:

@@ -1,0 +1,101 @@
+"""Which message from a ground station is whose business: one table."""
+
+from collections.abc import Callable
+
+from bridge import vehicle_messages
+from bridge.commands import Commands
+from bridge.mission_download import MissionDownloads
+from bridge.mission_upload import MissionUploads
+from bridge.parameters import Parameters
+from bridge.station import Post, Severity, Station
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.ftp import refuse
+from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
+
+_Handler = Callable[[Station, Message, float], None]
+
+
+class Inbox:
+    """Hands each message that the bridge understands to the part that answers it."""
+
+    def __init__(
+        self,
+        post: Post,
+        uploads: MissionUploads,
+        downloads: MissionDownloads,
+        parameters: Parameters,
+        commands: Commands,
+    ) -> None:
+        self._post = post
+        self._uploads = uploads
+        self._downloads = downloads
+        self._handlers: dict[int, _Handler] = {
+            m.MAVLINK_MSG_ID_MISSION_COUNT: self._mission_count,
+            m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: uploads.item(
+                s, item_from_float_message(msg), msg.mission_type, now
+            ),
+            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: uploads.item(
+                s, item_from_int_message(msg), msg.mission_type, now
+            ),
+            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
+            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
+            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.partial_list(s, now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, msg, now: downloads.request_list(s, msg.mission_type, now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(
+                s, msg.seq, msg.mission_type, now, as_int=False
+            ),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(
+                s, msg.seq, msg.mission_type, now, as_int=True
+            ),
+            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
+            m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, _: commands.take(s, msg.command, msg.param1),
+            m.MAVLINK_MSG_ID_COMMAND_INT: lambda s, msg, _: commands.take(s, msg.command, msg.param1),
+            m.MAVLINK_MSG_ID_SET_MODE: lambda _s, _msg, _now: commands.refuse_mode(),
+            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, _now: post.to(
+                s, vehicle_messages.autopilot_version()
+            ),
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _msg, _now: parameters.send_all(s),
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg, _: parameters.send_one(
+                s, msg.param_id, msg.param_index
+            ),
+            m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg, now: parameters.set(s, msg.param_id, msg.param_value, now),
+            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._ftp,
+            m.MAVLINK_MSG_ID_PING: self._ping,
+            m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
+        }
+
+    def understands(self, msgid: int) -> bool:
+        """Tell whether a message is worth decoding."""
+        return msgid in self._handlers
+
+    def take(self, station: Station, message: Message, now: float) -> None:
+        """Deal with a message that `understands` said yes to."""
+        self._handlers[message.get_msgId()](station, message, now)
+
+    def _mission_count(self, station: Station, message: Message, now: float) -> None:
+        self._downloads.forget(station)
+        self._uploads.count(station, message.count, message.mission_type, now)
+
+    def _mission_clear(self, station: Station, message: Message, now: float) -> None:
+        self._downloads.forget(station)
+        self._uploads.clear_all(station, message.mission_type, now)
+
+    def _set_current(self, _station: Station, _message: Message, _now: float) -> None:
+        self._post.say(Severity.ERROR, "The current waypoint cannot be set")
+
+    def _ftp(self, station: Station, message: Message, _now: float) -> None:
+        answer = refuse(message.payload)
+        if answer is not None:
+            self._post.to(station, m.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer))
+
+    def _ping(self, station: Station, message: Message, _now: float) -> None:
+        # A PING with targets is the answer to somebody's question.
+        if message.target_system == 0:
+            self._post.to(
+                station, m.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid)
+            )
+
+    def _timesync(self, station: Station, message: Message, now: float) -> None:
+        if message.tc1 == 0:
+            self._post.to(station, m.MAVLink_timesync_message(int(now * 1e9), message.ts1))
