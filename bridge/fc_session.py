@@ -117,10 +117,10 @@ class FcSession:
             self.link.tick(now)
             if self.state is State.MSP:
                 self._poll(now)
-                if now - self.link.last_heard_at >= MSP_SILENCE_S:
+                if now >= self.link.last_heard_at + MSP_SILENCE_S:
                     self._begin_search(now, f"no answer for {MSP_SILENCE_S} s")
         if self.state is State.MAVLINK:
-            if now - self._heard_at >= MAVLINK_SILENCE_S:
+            if now >= self._heard_at + MAVLINK_SILENCE_S:
                 self._begin_search(now, f"no MAVLink for {MAVLINK_SILENCE_S} s")
             elif now >= self._probe_due:
                 self._probe_due = now + _MSP_PROBE_INTERVAL_S

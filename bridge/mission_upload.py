@@ -205,7 +205,7 @@ class MissionUploads:
         transfer = self._transfer
         if transfer is None or transfer.phase is not Phase.RECEIVING:
             return
-        if now - transfer.progress_at >= _GIVE_UP_S:
+        if now >= transfer.progress_at + _GIVE_UP_S:
             self._cancel(now, f"no item came for {_GIVE_UP_S:.0f} s")
         elif now >= transfer.request_due:
             transfer.patience_s = min(transfer.patience_s * 2, _MAX_PATIENCE_S)
