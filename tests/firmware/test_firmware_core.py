@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,19 +11,19 @@ FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 
 def make(*arguments: str) -> str:
-    """Run make in firmware/ and return what it printed; empty if the tools for it cannot be had on this machine."""
-    run = subprocess.run(["make", "-s", "-C", FIRMWARE, *arguments], capture_output=True, text=True)
+    """Run make in firmware/ and return what it printed; empty if the tools for it are not on this machine."""
+    run = subprocess.run(["make", "-s", "-C", FIRMWARE, "APT=no", *arguments], capture_output=True, text=True)
     printed = run.stdout + run.stderr
     assert run.returncode == 0, printed
     if "NOT RUN" in printed:
-        print(printed)
+        sys.stderr.write(printed)
         assert "apt-get install" in printed
         return ""
     return printed
 
 
-# Four of the eight variants that `make test` runs hold every compiler, standard and word size.
-@pytest.mark.parametrize("variant", ["gcc-c99-64", "gcc-c11-32", "clang-c11-64", "clang-c99-32"])
+# Two of the eight variants that `make -C firmware test` runs hold every compiler, standard and word size.
+@pytest.mark.parametrize("variant", ["gcc-c99-32", "clang-c11-64"])
 def test_core_survives_every_power_cut_under_sanitizers(variant: str) -> None:
     printed = make(variant)
     if not printed:
