@@ -22,17 +22,15 @@ from protocols.msp.frame import Direction, MspFrame, MspParser, request
 PROBE = request(Msp.IDENT)
 
 #: Tried in this order; 115200 is Harakiri's default and comes back in between, for a board that was still booting.
-SPEEDS = (115200, 57600, 38400, 115200, 19200, 9600, 115200, 4800, 2400, 1200)
-#: At these a MAVLink heartbeat a second is waited for; elsewhere only an answer to a probe.
+SPEEDS = (115200, 57600, 38400, 115200, 19200, 9600, 4800, 2400, 1200)
+#: At these a MAVLink heartbeat a second is waited for; elsewhere only an answer to one of two probes.
 _HEARTBEAT_SPEEDS = (115200, 57600)
 _FULL_VISIT_S = 1.1
-_SHORT_VISIT_S = 0.65
-_LISTEN_S = 0.2
-_PROBE_INTERVAL_S = 0.2
+_LISTEN_S = 0.1
+_PROBE_INTERVAL_S = 0.15
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
-#: How long MSP may still answer after MAVLink was heard.
-_MSP_CHANCE_S = 0.45
+_HEARTBEAT_SIZE = 9
 
 
 class Phase(Enum):
@@ -62,12 +60,12 @@ class Found:
 
 def visit_order(known: int | None, speeds: Sequence[int | None]) -> Iterator[int | None]:
     """Yield speeds for ever; the last good one takes every other turn: a rebooting board comes back to it."""
+    others = [speed for speed in speeds if speed != known] or [known]
     while True:
-        for speed in speeds:
+        for speed in others:
             if known is not None:
                 yield known
-            if known is None or speed != known:
-                yield speed
+            yield speed
 
 
 @dataclass(slots=True)
@@ -134,13 +132,22 @@ class Autosense:
             visit.phase_ends = now + self._ask(PROBE if visit.probes % 2 == 0 else RESYNC) + _PROBE_INTERVAL_S
 
     def _new_visit(self, now: float) -> _Visit:
+        listened = now + _LISTEN_S
         full = self.speed is None or self.speed in _HEARTBEAT_SPEEDS
-        return _Visit(now + _LISTEN_S, now + (_FULL_VISIT_S if full else _SHORT_VISIT_S))
+        return _Visit(listened, now + _FULL_VISIT_S if full else listened + self._two_probes_s())
+
+    def _two_probes_s(self) -> float:
+        """Return how long it takes to ask both ways and to hear the answers."""
+        return self._on_wire_s(PROBE) + self._on_wire_s(RESYNC) + 2 * _PROBE_INTERVAL_S
 
     def _ask(self, frame: bytes) -> float:
-        """Send; return how long the question and its answer are on the wire: at 1200 baud that is long."""
+        """Send; return how long the question and its answer are on the wire."""
         self._visit.probes += 1
         self._output.append(frame)
+        return self._on_wire_s(frame)
+
+    def _on_wire_s(self, frame: bytes) -> float:
+        """Return how long a question and one answer take: at 1200 baud that is long."""
         return (len(frame) + _ANSWER_SIZE) * 10 / self.speed if self.speed else 0.0
 
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
@@ -169,7 +176,8 @@ class Autosense:
             visit.heartbeat = frame
             if self.phase is Phase.LISTEN:
                 visit.phase_ends = now
-            visit.ends = now + _MSP_CHANCE_S
+            # MSP still has its chance, and an answer that is being confirmed all of its time.
+            visit.ends = max(now + self._two_probes_s(), visit.phase_ends)
 
     def _conclude(self, spoken: Spoken, why: str) -> None:
         self.phase = Phase.FOUND
@@ -177,11 +185,9 @@ class Autosense:
 
 
 def _is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
-    """Check the fields that have few legal values: type, autopilot, MAVLink version."""
-    if frame.msgid != 0:
+    """Check the length, and the fields that have few legal values: type, autopilot, state, MAVLink version."""
+    if frame.msgid != 0 or frame.raw[1] != _HEARTBEAT_SIZE:
         return False
-    payload = frame.raw[6:-2] if frame.version == 1 else frame.raw[10:19]
-    if len(payload) < 9:
-        return False
-    vehicle_type, autopilot, version = payload[4], payload[5], payload[8]
-    return version == 3 and vehicle_type <= 45 and autopilot <= 20 and frame.sysid != 0
+    payload = frame.raw[6:15] if frame.version == 1 else frame.raw[10:19]
+    vehicle_type, autopilot, _, state, version = payload[4:]
+    return version == 3 and vehicle_type <= 45 and autopilot <= 20 and state <= 8 and frame.sysid != 0
