@@ -114,11 +114,12 @@ class FcSession:
             self._search.tick(now)
             self._follow_search(now)
         if self.link is not None:
-            self.link.tick(now)
-            if self.state is State.MSP:
-                self._poll(now)
-                if now >= self.link.last_heard_at + MSP_SILENCE_S:
-                    self._begin_search(now, f"no answer for {MSP_SILENCE_S} s")
+            for frame in self.link.tick(now):
+                self._msp_frame(frame, now)
+        if self.link is not None and self.state is State.MSP:
+            self._poll(now)
+            if now >= self.link.last_heard_at + MSP_SILENCE_S:
+                self._begin_search(now, f"no answer for {MSP_SILENCE_S} s")
         if self.state is State.MAVLINK:
             if now >= self._heard_at + MAVLINK_SILENCE_S:
                 self._begin_search(now, f"no MAVLink for {MAVLINK_SILENCE_S} s")

@@ -1,7 +1,9 @@
 """The request side of an MSP line: what may be sent when, how long to wait, what is still unanswered.
 
 Harakiri's send ring holds 255 bytes and has no overflow check, so the sum of the replies that are still to come
-is bounded. Waiting time follows the measured round trip, as in TCP: 7/8 old + 1/8 measured, doubled on a loss.
+is bounded. A flight controller that was writing its flash answers all at once what was asked meanwhile, so a request
+that timed out counts until it is certain that no reply comes any more: requests are answered in their order.
+Waiting time follows the measured round trip, as in TCP: 7/8 old + 1/8 measured, doubled on a loss.
 """
 
 from collections import deque
@@ -9,7 +11,7 @@ from dataclasses import dataclass
 
 from bridge.procedure import Send
 from protocols.msp.commands import Msp
-from protocols.msp.frame import FRAME_OVERHEAD, MspFrame, MspParser, request
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from protocols.msp.hazards import is_clean
 
 #: Harakiri's ring less one heartbeat (25 bytes) that it may send of its own accord in AUTOSENSE, and some air.
@@ -18,21 +20,29 @@ MIN_TIMEOUT_S = 0.06
 MAX_TIMEOUT_S = 1.0
 #: BEGIN and COMMIT erase and write flash: 100 ms and more during which the board does nothing else.
 EXCLUSIVE_TIMEOUT_S = 1.0
+#: A stalled flight controller answers after this long at the latest.
+_LONGEST_STALL_S = 1.0
 _FIRST_GUESS_S = 0.03
+#: After so long without a byte nothing more comes of a frame that has begun.
+_LINE_SILENCE_S = 0.05
 
 #: Fills a parser that waits for the rest of a cut frame (64 payload bytes and a checksum on an unpatched Harakiri),
 #: with whole harmless frames. Their replies, should all be understood, fit the send ring: 11 * 13 = 143 bytes.
-RESYNC = request(Msp.IDENT) * 11
-RESYNC_REPLY_SIZE = 11 * (7 + FRAME_OVERHEAD)
+_RESYNC_REQUESTS = 11
+RESYNC = request(Msp.IDENT) * _RESYNC_REQUESTS
+_QUESTION = Send(request(Msp.IDENT), Msp.IDENT, 7 + FRAME_OVERHEAD)
 
 
 @dataclass(slots=True)
-class _Pending:
+class _Request:
+    """A request that was sent. No longer `awaited`, it may still be answered until the deadline."""
+
     command: int
     reply_size: int
     sent_at: float
     deadline: float
     exclusive: bool
+    awaited: bool = True
 
 
 class MspLink:
@@ -42,12 +52,14 @@ class MspLink:
         self._byte_s = 10 / baud if baud else 0.0
         self._parser = MspParser()
         self._waiting: deque[Send] = deque()
-        self._pending: list[_Pending] = []
+        self._sent: list[_Request] = []  # in the order in which they went out
         self._output: list[bytes] = []
         self._line_free_at = now
         self._round_trip_s = _FIRST_GUESS_S
         self._backoff = 1.0
         self._losses_in_a_row = 0
+        self._resync_due = False
+        self._last_byte_at = now
         self.last_heard_at = now
         #: Set from the flight controller's INFO; 0: its parser never gives up on a cut frame.
         self.receiver_timeout_s = 0.0
@@ -55,8 +67,8 @@ class MspLink:
 
     @property
     def outstanding_bytes(self) -> int:
-        """Reply bytes that are still to come."""
-        return sum(pending.reply_size for pending in self._pending)
+        """Reply bytes that may still come."""
+        return sum(sent.reply_size for sent in self._sent)
 
     @property
     def round_trip_s(self) -> float:
@@ -69,14 +81,12 @@ class MspLink:
         return self._parser.bad_checksums
 
     def awaits(self, commands: frozenset[int]) -> bool:
-        """Tell whether a reply to one of `commands` is still to come."""
-        return any(pending.command in commands for pending in self._pending)
+        """Tell whether a reply to one of `commands` is waited for."""
+        return any(sent.awaited and sent.command in commands for sent in self._sent)
 
     def may_send(self, reply_size: int) -> bool:
         """Tell whether a request with such a reply may go out now."""
-        if any(pending.exclusive for pending in self._pending) or self._waiting:
-            return False
-        return self.outstanding_bytes + reply_size <= MAX_OUTSTANDING_BYTES
+        return not self._waiting and not self._is_exclusive() and self._has_room(reply_size)
 
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""
@@ -92,74 +102,115 @@ class MspLink:
         return output
 
     def receive(self, data: bytes, now: float) -> list[MspFrame]:
-        """Take bytes from the port; return the frames found, replies matched with their requests."""
-        frames = self._parser.feed(data)
-        for frame in frames:
-            self.last_heard_at = now
-            self._settle(frame, now)
-        if frames:
-            self._flush(now)
-        return frames
+        """Take bytes from the port; return the replies found, matched with their requests."""
+        self._last_byte_at = now
+        return self._take(self._parser.feed(data), now)
 
-    def tick(self, now: float) -> None:
-        """Give up on requests whose time is over."""
-        expired = [pending for pending in self._pending if now >= pending.deadline]
-        if not expired:
-            return
-        self._pending = [pending for pending in self._pending if now < pending.deadline]
-        self._parser.reset()
-        self.requests_lost += len(expired)
-        self._losses_in_a_row += 1
-        self._backoff = min(self._backoff * 2, 8.0)
-        if self._losses_in_a_row % 2 == 0 and not self.receiver_timeout_s:
-            self._write(RESYNC, now)
-            self._pending.append(
-                _Pending(Msp.IDENT, RESYNC_REPLY_SIZE, now, self._line_free_at + MIN_TIMEOUT_S, exclusive=True)
-            )
+    def tick(self, now: float) -> list[MspFrame]:
+        """Give up on requests whose time is over; return replies that were hidden behind a false header."""
+        if not any(now >= sent.deadline for sent in self._sent):
+            return []
+        hidden = self._parser.reset() if now >= self._last_byte_at + _LINE_SILENCE_S else []
+        replies = self._take(hidden, now)
+        self._sent = [sent for sent in self._sent if sent.awaited or now < sent.deadline]
+        lost = [sent for sent in self._sent if now >= sent.deadline]
+        for sent in lost:
+            sent.awaited = False
+            sent.deadline = now + _LONGEST_STALL_S
+        if lost:
+            self.requests_lost += len(lost)
+            self._losses_in_a_row += 1
+            self._backoff = min(self._backoff * 2, 8.0)
+            if self._losses_in_a_row % 2 == 0 and not self.receiver_timeout_s:
+                self._resync_due = True
         self._flush(now)
+        return replies
 
     def reply_deadline(self, commands: frozenset[int], now: float) -> float:
         """Return when to stop waiting for a reply to one of `commands`."""
-        deadlines = [pending.deadline for pending in self._pending if pending.command in commands]
+        deadlines = [sent.deadline for sent in self._sent if sent.awaited and sent.command in commands]
         queued = any(message.command in commands for message in self._waiting)
         return max(deadlines, default=now + self._timeout_s() if queued else now)
 
     def next_deadline(self) -> float | None:
         """Return when `tick` has something to do."""
-        return min((pending.deadline for pending in self._pending), default=None)
+        return min((sent.deadline for sent in self._sent), default=None)
 
     def _timeout_s(self) -> float:
         floor = max(MIN_TIMEOUT_S, self.receiver_timeout_s + 0.02 if self.receiver_timeout_s else 0.0)
         return min(max(2 * self._round_trip_s, floor) * self._backoff, MAX_TIMEOUT_S)
 
+    def _is_exclusive(self) -> bool:
+        return any(sent.awaited and sent.exclusive for sent in self._sent)
+
+    def _has_room(self, reply_size: int) -> bool:
+        return not self._sent or self.outstanding_bytes + reply_size <= MAX_OUTSTANDING_BYTES
+
     def _flush(self, now: float) -> None:
+        if self._resync_due and not self._is_exclusive() and self._has_room(_RESYNC_REQUESTS * _QUESTION.reply_size):
+            self._resync(now)
         while self._waiting:
             message = self._waiting[0]
-            if any(pending.exclusive for pending in self._pending):
+            if self._is_exclusive():
                 return
-            if self._pending and self.outstanding_bytes + message.reply_size > MAX_OUTSTANDING_BYTES:
+            if not self._has_room(message.reply_size):
+                if not any(sent.awaited for sent in self._sent) and self._has_room(_QUESTION.reply_size):
+                    # Only what was given up is in the way: the answer to a short question behind it says it is over.
+                    self._ask(_QUESTION, now)
                 return
             self._waiting.popleft()
-            self._write(message.frame, now)
-            patience = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
-            reply_time = (self.outstanding_bytes + message.reply_size) * self._byte_s
-            deadline = self._line_free_at + reply_time + patience
-            self._pending.append(
-                _Pending(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
-            )
+            self._ask(message, now)
+
+    def _ask(self, message: Send, now: float) -> None:
+        self._write(message.frame, now)
+        patience = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
+        reply_time = (self.outstanding_bytes + message.reply_size) * self._byte_s
+        deadline = self._line_free_at + reply_time + patience
+        self._sent.append(
+            _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
+        )
+
+    def _resync(self, now: float) -> None:
+        self._resync_due = False
+        self._write(RESYNC, now)
+        reply_time = (self.outstanding_bytes + _RESYNC_REQUESTS * _QUESTION.reply_size) * self._byte_s
+        deadline = self._line_free_at + reply_time + MIN_TIMEOUT_S
+        self._sent += [
+            _Request(Msp.IDENT, _QUESTION.reply_size, self._line_free_at, deadline, exclusive=True)
+            for _ in range(_RESYNC_REQUESTS)
+        ]
 
     def _write(self, data: bytes, now: float) -> None:
         self._line_free_at = max(self._line_free_at, now) + len(data) * self._byte_s
         self._output.append(data)
 
-    def _settle(self, frame: MspFrame, now: float) -> None:
-        for index, pending in enumerate(self._pending):
-            if pending.command != frame.command:
-                continue
-            del self._pending[index]
-            self._losses_in_a_row = 0
-            self._backoff = 1.0
-            if not pending.exclusive:
-                measured = max(now - pending.sent_at, 0.0)
-                self._round_trip_s += (measured - self._round_trip_s) / 8
+    def _take(self, frames: list[MspFrame], now: float) -> list[MspFrame]:
+        """Settle replies; a request that is heard is our own, from a line that is looped back."""
+        replies = [frame for frame in frames if frame.direction is not Direction.REQUEST]
+        for reply in replies:
+            self.last_heard_at = now
+            self._settle(reply, now)
+        if replies:
+            self._flush(now)
+        return replies
+
+    def _settle(self, reply: MspFrame, now: float) -> None:
+        """Match a reply with its request. What was sent before that one is not answered any more."""
+        alike = [sent for sent in self._sent if sent.command == reply.command]
+        if not alike:
             return
+        oldest = alike[0]
+        earlier = self._sent.index(oldest)
+        self.requests_lost += sum(sent.awaited for sent in self._sent[:earlier])
+        del self._sent[: earlier + 1]
+        answered = next((sent for sent in alike if sent.awaited), None)
+        if answered is None:
+            return
+        self._losses_in_a_row = 0
+        self._backoff = 1.0
+        if answered is not oldest:
+            # Either may have been answered: this one is not waited for any more, and counts on.
+            answered.awaited = False
+        elif not answered.exclusive:
+            measured = max(now - answered.sent_at, 0.0)
+            self._round_trip_s += (measured - self._round_trip_s) / 8
