@@ -15,6 +15,8 @@ _HARAKIRI_CAPABILITY = 0x80000000
 _HARAKIRI_BOX = "GTUNE"
 _ARM_BOX = "ARM"
 _MAX_REPLY_PAYLOAD = 200
+#: How often a question is asked for two answers that are equal.
+_MAX_ASKS = 5
 
 
 class Kind(Enum):
@@ -71,8 +73,16 @@ def _identify() -> Procedure[FlightController]:
 
 
 def _question(command: int, reply_payload: int) -> Procedure[MspFrame]:
-    """Ask, and take an error frame for an answer too: it says that the command is not known."""
-    reply = yield from ask(request(command), command, reply_payload)
-    if reply is None:
-        raise _Silence
-    return reply
+    """Ask until two answers in a row are equal: a checksum of 8 bits lets some damage through, of long answers most.
+
+    An error frame is an answer too: it says that the command is not known.
+    """
+    before: MspFrame | None = None
+    for _ in range(_MAX_ASKS):
+        reply = yield from ask(request(command), command, reply_payload)
+        if reply is None:
+            break
+        if reply == before:
+            return reply
+        before = reply
+    raise _Silence
