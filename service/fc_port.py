@@ -2,19 +2,14 @@
 
 import asyncio
 import os
-import socket
 import termios
 from collections.abc import Callable
-from typing import Protocol
 
 import serial
 import structlog
 
-from service.connection import FcAddress, SerialFc, SimulatedFc, TcpFc
-from service.port_holder import explain_port_error, find_console
-from service.simulator.naze import SimulatedNaze
-from service.simulator.options import SimOptions
-from service.simulator.pipe_link import SimLink
+from service.connection import FcAddress
+from service.fc_device import Device, PortError, device_opener
 
 _READ_SIZE = 4096
 _RETRY_S = 0.25
@@ -22,17 +17,6 @@ _RETRY_S = 0.25
 _MAX_UNSENT = 8192
 
 _log = structlog.get_logger()
-
-
-class _Device(Protocol):
-    """An open port: a file descriptor, and a speed where it has one."""
-
-    def fileno(self) -> int: ...
-    def close(self) -> None: ...
-
-
-class PortError(Exception):
-    """The port cannot be opened now; the text is one sentence for the user."""
 
 
 class FcPort:
@@ -48,18 +32,16 @@ class FcPort:
         on_data: Callable[[bytes], None],
         on_close: Callable[[str], None],
     ) -> None:
-        self._address = address
+        self._open = device_opener(address)
         self._on_open = on_open
         self._on_data = on_data
         self._on_close = on_close
         self._loop = asyncio.get_running_loop()
-        self._device: _Device | None = None
+        self._device: Device | None = None
         self._speed: int | None = None
         self._unsent = bytearray()
         self._closed = asyncio.Event()
         self._last_complaint = ""
-        #: Its list outlives a reopened port, as the real board's does.
-        self._simulated = SimulatedNaze(SimOptions()) if isinstance(address, SimulatedFc) else None
 
     async def run(self) -> None:
         """Open the port and open it again for ever; cancel to end."""
@@ -151,45 +133,3 @@ class FcPort:
         level = _log.debug if why == self._last_complaint else _log.warning
         level("fc.port_unavailable", why=why)
         self._last_complaint = why
-
-    async def _open(self) -> _Device:
-        if self._simulated is not None:
-            return await SimLink(self._simulated, self._loop).start()
-        if isinstance(self._address, TcpFc):
-            return await _open_tcp(self._address.host, self._address.port)
-        assert isinstance(self._address, SerialFc)
-        return open_serial(self._address.path)
-
-
-def open_serial(path: str) -> serial.Serial:
-    """Open a serial port for us alone; PortError says why not."""
-    console = find_console(path)
-    if console:
-        raise PortError(
-            f"{path} is taken by a login console: sudo systemctl disable --now serial-getty@{console}.service,"
-            " and take console=... for it out of cmdline.txt"
-        )
-    try:
-        port = serial.Serial(path, 115200, timeout=0, write_timeout=0, exclusive=True)
-    except (serial.SerialException, OSError) as error:
-        raise PortError(explain_port_error(path, error)) from error
-    except termios.error as error:
-        raise PortError(f"{path} is no serial port") from error
-    os.set_blocking(port.fileno(), False)
-    return port
-
-
-async def _open_tcp(host: str, port: int) -> socket.socket:
-    connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    connection.setblocking(False)
-    loop = asyncio.get_running_loop()
-    try:
-        async with asyncio.timeout(3):
-            found = await loop.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_STREAM)
-            await loop.sock_connect(connection, found[0][4])
-    except (OSError, TimeoutError) as error:
-        connection.close()
-        reason = error.strerror or str(error) or "no answer"
-        raise PortError(f"tcp:{host}:{port} cannot be reached: {reason}") from error
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return connection

@@ -30,6 +30,9 @@ def find_console(path: str) -> str | None:
 
     A getty takes no lock: both could open the port, and each would eat half of what the other is sent.
     """
+    if not Path(path).exists():
+        # It is looked for four times a second: no search through all processes for that.
+        return None
     terminal = Path(path).resolve().name
     for process in _processes():
         try:

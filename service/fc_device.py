@@ -1,0 +1,77 @@
+"""Opens what a flight controller hangs on: a serial port, a TCP connection, or the simulated Naze."""
+
+import asyncio
+import os
+import socket
+import termios
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+import serial
+
+from service.connection import FcAddress, SerialFc, TcpFc
+from service.port_holder import explain_port_error, find_console
+
+_TCP_PATIENCE_S = 3.0
+
+
+class Device(Protocol):
+    """What is open: a non-blocking file descriptor."""
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
+class PortError(Exception):
+    """The device cannot be opened now; the text is one sentence for the user."""
+
+
+def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
+    """Return what opens the device, and opens it again after it was lost."""
+    if isinstance(address, SerialFc):
+        return lambda: _open_serial(address.path)
+    if isinstance(address, TcpFc):
+        return lambda: _open_tcp(address.host, address.port)
+    # Only here, because a daemon on a real flight controller need not carry a simulated one in its memory.
+    from service.simulator.naze import SimulatedNaze
+    from service.simulator.pipe_link import SimLink
+
+    # One board for all openings: its list outlives a lost port, as the real one's does.
+    return SimLink(SimulatedNaze(), asyncio.get_running_loop()).start
+
+
+async def _open_serial(path: str) -> serial.Serial:
+    """Open a serial port for us alone."""
+    console = find_console(path)
+    if console is not None:
+        raise PortError(
+            f"{path} is taken by a login console: sudo systemctl disable --now serial-getty@{console}.service,"
+            " and take console=... for it out of cmdline.txt"
+        )
+    try:
+        port = serial.Serial(path, 115200, timeout=0, write_timeout=0, exclusive=True)
+    except (serial.SerialException, OSError) as error:
+        raise PortError(explain_port_error(path, error)) from error
+    except termios.error as error:
+        raise PortError(f"{path} is no serial port") from error
+    os.set_blocking(port.fileno(), False)
+    return port
+
+
+async def _open_tcp(host: str, port: int) -> socket.socket:
+    connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    connection.setblocking(False)
+    loop = asyncio.get_running_loop()
+    try:
+        async with asyncio.timeout(_TCP_PATIENCE_S):
+            found = await loop.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_STREAM)
+            await loop.sock_connect(connection, found[0][4])
+    except (OSError, TimeoutError) as error:
+        connection.close()
+        reason = error.strerror or str(error) or "no answer"
+        raise PortError(f"tcp:{host}:{port} cannot be reached: {reason}") from error
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return connection
