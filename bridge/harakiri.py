@@ -122,10 +122,16 @@ class HarakiriMissions:
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
         """Set gps_wp_radius, 0..2000 cm."""
         frame = ext.encode_radius(wp_radius_cm)
-        reply = yield from ask(frame, MissionCommand.RADIUS, 3)
-        answer = None if reply is None else ext.decode_radius(reply.payload)
-        if answer is None:
-            return None
+        waited_s = 0.0
+        while True:
+            reply = yield from ask(frame, MissionCommand.RADIUS, 3)
+            answer = None if reply is None else ext.decode_radius(reply.payload)
+            if answer is None:
+                return None
+            if answer.status is not Status.BUSY or waited_s >= _BUSY_PATIENCE_S:
+                break
+            yield from pause(_BUSY_INTERVAL_S)
+            waited_s += _BUSY_INTERVAL_S
         self.info = replace(self.info, wp_radius_cm=answer.wp_radius_cm)
         return answer.wp_radius_cm
 

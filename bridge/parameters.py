@@ -51,7 +51,7 @@ class Parameters:
             if radius_cm is None:
                 self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer")
             elif radius_cm != int(value):
-                self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: disarm first")
+                self._post.say(Severity.ERROR, f"{WP_RADIUS} stays {radius_cm}: disarm, or try again")
             self._send(station, name)
 
         self._runner.start(dialect.set_wp_radius(int(value)), done, now)
