@@ -59,6 +59,24 @@ def judge(rows: Sequence[PlanRow], *, use_int: bool = True, profile: RuleProfile
     return check_list([row.as_sent(seq, use_int=use_int) for seq, row in enumerate(rows)], profile)
 
 
+def stored_fields(item: MissionItem) -> tuple[float, ...]:
+    """What a reader must get of a stored item: seq, command, frame, param1..4, lat_e7, lon_e7, height."""
+    assert item.lat_e7 is not None
+    assert item.lon_e7 is not None
+    return (
+        item.seq,
+        item.command,
+        item.frame,
+        item.p1,
+        item.p2,
+        item.p3,
+        item.p4,
+        item.lat_e7,
+        item.lon_e7,
+        item.alt_m,
+    )
+
+
 def records_of(verdict: Verdict) -> list[str]:
     """Return a verdict's records in hex, as the simulated board tells its own."""
     return [pack_records([record]).hex() for record in verdict.records]

@@ -6,12 +6,12 @@ import pytest
 from benches import Bench
 from lossy_udp import Way
 from mission_planner import MissionPlanner, UploadFailed
-from plan import HOME, PlanRow, judge, mixed_plan, plain_plan, records_of, single, waypoint
+from plan import HOME, PlanRow, judge, mixed_plan, plain_plan, records_of, single, stored_fields, waypoint
 from programs import until
 
 from bridge.mission_check import Result
 from protocols.mavlink.dialect import Message, messages
-from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.mission_item import Command, MissionResult
 
 #: What a long-range radio does to a link.
 BAD_RADIO = {"loss": 0.1, "repeats": 0.05, "delay_s": 0.2}
@@ -29,22 +29,16 @@ def as_read(message: Message) -> tuple[float, ...]:
         message.x,
         message.y,
         message.z,
-        message.autocontinue,
-        message.current,
     )
-
-
-def as_stored(item: MissionItem) -> tuple[float, ...]:
-    parameters = (item.p1, item.p2, item.p3, item.p4)
-    assert item.lat_e7 is not None
-    assert item.lon_e7 is not None
-    return (item.seq, item.command, item.frame, *parameters, item.lat_e7, item.lon_e7, item.alt_m, 1, 0)
 
 
 def assert_reads(planner: MissionPlanner, plan: Sequence[PlanRow], *, use_int: bool = True) -> None:
     """Assert that a Read shows what the rules say that became of `plan`."""
-    read = [as_read(message) for message in planner.read()]
-    assert read == [as_stored(item) for item in judge(plan, use_int=use_int).items]
+    read = planner.read()
+    assert all((message.autocontinue, message.current) == (1, 0) for message in read)
+    assert [as_read(message) for message in read] == [
+        stored_fields(item) for item in judge(plan, use_int=use_int).items
+    ]
 
 
 # -- connecting ----------------------------------------------------------------------------------------------
@@ -109,7 +103,7 @@ def test_a_read_in_float_shows_the_same_list(shared: Bench) -> None:
     assert planner.capabilities == 0
     read = planner.read()
     assert {message.get_type() for message in read} == {"MISSION_ITEM"}
-    expected = [as_stored(item) for item in judge(plan).items]
+    expected = [stored_fields(item) for item in judge(plan).items]
     for message, stored in zip(read, expected, strict=True):
         lat, lon = (single(value / 1e7) for value in stored[7:9])
         assert as_read(message) == (*stored[:7], lat, lon, *stored[9:])
@@ -282,7 +276,7 @@ def test_armed(bench: Bench) -> None:
     assert refusal_of(planner, plain_plan(12, start=70)) is MissionResult.DENIED
     planner.wait_for_text("disarm to change the mission")
     # It asks for home when the pilot arms.
-    assert as_read(planner.read_item(0)) == as_stored(judge(plan).items[0])
+    assert as_read(planner.read_item(0)) == stored_fields(judge(plan).items[0])
     bench.board.set("armed 0")
     planner.wait_for_armed(False)
     assert bench.board.records() == kept

@@ -1,0 +1,186 @@
+"""The real MAVSDK as a ground station (what QGroundControl does, as far as missions go)."""
+
+import math
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from benches import Bench
+from mavsdk import ComponentType
+from mavsdk.asyncio import Configuration, Mavsdk
+from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
+from mavsdk.asyncio.plugins.mission_raw import (
+    MissionItem,
+    MissionPlan,
+    MissionRawAsync,
+    MissionRawError,
+    MissionRawResult,
+)
+from mavsdk.asyncio.plugins.param.param import ParamAsync
+from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
+from plan import HOME, PlanRow, judge, mixed_plan, plain_plan, records_of, stored_fields, waypoint
+from programs import until
+
+from protocols.mission_item import Command
+
+_PATIENCE_S = 20.0
+
+
+@asynccontextmanager
+async def vehicle_at(port: int) -> AsyncIterator[Any]:
+    """Connect MAVSDK; the vehicle that it finds."""
+    async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
+        await mavsdk.add_any_connection(f"udpout://127.0.0.1:{port}")
+        system = await mavsdk.first_autopilot(timeout_s=_PATIENCE_S)
+        assert system is not None
+        yield system
+
+
+def raw_items(plan: Sequence[PlanRow]) -> list[Any]:
+    items = [row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]
+    return [
+        MissionItem(
+            item.seq,
+            item.frame,
+            item.command,
+            int(item.seq == 0),
+            1,
+            item.p1,
+            item.p2,
+            item.p3,
+            item.p4,
+            item.lat_e7,
+            item.lon_e7,
+            item.alt_m,
+            0,
+        )
+        for item in items
+    ]
+
+
+def fields(item: Any) -> tuple[float, ...]:
+    parameters = (item.param1, item.param2, item.param3, item.param4)
+    return (item.seq, item.command, item.frame, *parameters, item.x, item.y, item.z)
+
+
+def expected_fields(plan: Sequence[PlanRow]) -> list[tuple[float, ...]]:
+    return [stored_fields(item) for item in judge(plan).items]
+
+
+async def refusal_of(missions: Any, plan: Sequence[PlanRow]) -> Any:
+    with pytest.raises(MissionRawError) as refused:
+        await missions.upload_mission(raw_items(plan))
+    return refused.value.result
+
+
+@pytest.mark.parametrize("count", [12, 146])
+async def test_a_round_trip(shared: Bench, count: int) -> None:
+    plan = mixed_plan(count)
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        await missions.upload_mission(raw_items(plan))
+        assert shared.board.records() == records_of(judge(plan))
+        assert [fields(item) for item in await missions.download_mission()] == expected_fields(plan)
+
+
+async def test_parameters_that_are_not_given_are_not_a_number(shared: Bench) -> None:
+    plan = [replace(row, p1=math.nan, p3=math.nan, p4=math.nan) for row in plain_plan(20, start=3)]
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        await MissionRawAsync(vehicle).upload_mission(raw_items(plan))
+    assert shared.board.records() == records_of(judge(plain_plan(20, start=3)))
+
+
+async def test_a_round_trip_over_a_bad_link(shared: Bench) -> None:
+    link = shared.lossy_link(loss=0.1, repeats=0.05, delay_s=0.03, jitter_s=0.04, seed=2)
+    plan = mixed_plan(20)
+    async with vehicle_at(link.address[1]) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        await missions.upload_mission(raw_items(plan))
+        assert shared.board.records() == records_of(judge(plan))
+        assert [fields(item) for item in await missions.download_mission()] == expected_fields(plan)
+    assert link.lost
+
+
+async def test_refusals(shared: Bench) -> None:
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        plan = plain_plan(12, start=20)
+        await missions.upload_mission(raw_items(plan))
+        landing = [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]
+        assert await refusal_of(missions, landing) == MissionRawResult.INVALID_ARGUMENT
+        assert await refusal_of(missions, plain_plan(147)) == MissionRawResult.TOO_MANY_MISSION_ITEMS
+        assert await refusal_of(missions, [HOME, waypoint(1, frame=7)]) == MissionRawResult.UNSUPPORTED
+        assert shared.board.records() == records_of(judge(plan))
+
+
+async def test_armed(bench: Bench) -> None:
+    async with vehicle_at(bench.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        plan = plain_plan(12, start=20)
+        await missions.upload_mission(raw_items(plan))
+        bench.board.set("armed 1")
+        async for armed in TelemetryAsync(vehicle).subscribe_armed():
+            if armed:
+                break
+        assert await refusal_of(missions, plain_plan(12)) == MissionRawResult.DENIED
+        with pytest.raises(MissionRawError):
+            await missions.download_mission()
+        assert bench.board.records() == records_of(judge(plan))
+
+
+async def test_clearing(shared: Bench) -> None:
+    """To an ArduPilot its clear_mission writes a list of one item, which is none by the rules: the list is kept."""
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        plan = plain_plan(12, start=20)
+        await missions.upload_mission(raw_items(plan))
+        with pytest.raises(MissionRawError) as refused:
+            await missions.clear_mission()
+        assert refused.value.result == MissionRawResult.INVALID_ARGUMENT
+        assert shared.board.records() == records_of(judge(plan))
+        clear_all = '{"target_system": 1, "target_component": 1, "mission_type": 0}'
+        message = MavlinkMessage("MISSION_CLEAR_ALL", 245, 190, 1, 1, clear_all)
+        await MavlinkDirectAsync(vehicle).send_message(message)
+        until(lambda: shared.board.records() == [], "an empty board")
+        assert await missions.download_mission() == []
+
+
+async def test_cancelling_keeps_the_list_that_was_there(shared: Bench) -> None:
+    shared.mission_planner().write(plain_plan(12))
+    kept = shared.board.records()
+    link = shared.lossy_link(delay_s=0.05)
+    async with vehicle_at(link.address[1]) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        upload = missions.upload_mission_with_progress(MissionPlan(raw_items(plain_plan(60, start=20))))
+
+        async def cancel_in_the_middle() -> None:
+            async for _, done in upload:
+                if done.progress > 0.1:
+                    await missions.cancel_mission_upload()
+
+        with pytest.raises(MissionRawError) as cancelled:
+            await cancel_in_the_middle()
+        assert cancelled.value.result == MissionRawResult.TRANSFER_CANCELLED
+        until(lambda: shared.daemon.missions()[0]["outcome"] == "CANCELLED", "the end of the upload")
+    assert shared.board.records() == kept
+
+
+async def test_parameters_and_telemetry(shared: Bench) -> None:
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        parameters = ParamAsync(vehicle)
+        found = {each.name: each.value for each in (await parameters.get_all_params()).float_params}
+        assert found == {"SYSID_THISMAV": 1.0, "WPNAV_RADIUS": 200.0}
+        # The flash write of one is scheduled when the next one comes.
+        for radius_cm in (300.0, 200.0):
+            await parameters.set_param_float("WPNAV_RADIUS", radius_cm)
+            assert await parameters.get_param_float("WPNAV_RADIUS") == radius_cm
+        telemetry = TelemetryAsync(vehicle)
+        async for position in telemetry.subscribe_position():
+            if math.isfinite(position.latitude_deg):
+                assert position.latitude_deg == pytest.approx(47.4, abs=1)
+                break
+        async for battery in telemetry.subscribe_battery():
+            assert 9 < battery.voltage_v < 13
+            break
