@@ -30,7 +30,9 @@ _LINE_SILENCE_S = 0.05
 #: with whole harmless frames. Their replies, should all be understood, fit the send ring: 11 * 13 = 143 bytes.
 _RESYNC_REQUESTS = 11
 RESYNC = request(Msp.IDENT) * _RESYNC_REQUESTS
-_QUESTION = Send(request(Msp.IDENT), Msp.IDENT, 7 + FRAME_OVERHEAD)
+_IDENT_REPLY_SIZE = 7 + FRAME_OVERHEAD
+#: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error.
+_QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, 3 + FRAME_OVERHEAD)
 
 
 @dataclass(slots=True)
@@ -147,7 +149,7 @@ class MspLink:
         return not self._sent or self.outstanding_bytes + reply_size <= MAX_OUTSTANDING_BYTES
 
     def _flush(self, now: float) -> None:
-        if self._resync_due and not self._is_exclusive() and self._has_room(_RESYNC_REQUESTS * _QUESTION.reply_size):
+        if self._resync_due and not self._is_exclusive() and self._has_room(_RESYNC_REQUESTS * _IDENT_REPLY_SIZE):
             self._resync(now)
         while self._waiting:
             message = self._waiting[0]
@@ -173,10 +175,10 @@ class MspLink:
     def _resync(self, now: float) -> None:
         self._resync_due = False
         self._write(RESYNC, now)
-        reply_time = (self.outstanding_bytes + _RESYNC_REQUESTS * _QUESTION.reply_size) * self._byte_s
+        reply_time = (self.outstanding_bytes + _RESYNC_REQUESTS * _IDENT_REPLY_SIZE) * self._byte_s
         deadline = self._line_free_at + reply_time + MIN_TIMEOUT_S
         self._sent += [
-            _Request(Msp.IDENT, _QUESTION.reply_size, self._line_free_at, deadline, exclusive=True)
+            _Request(Msp.IDENT, _IDENT_REPLY_SIZE, self._line_free_at, deadline, exclusive=True)
             for _ in range(_RESYNC_REQUESTS)
         ]
 
