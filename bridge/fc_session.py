@@ -173,7 +173,9 @@ class FcSession:
             return
         self._output += self._search.take_output()
         self._search = None
-        self._known_speed = found.speed
+        if found.spoken is Spoken.MSP or self._known_speed is None:
+            # A Harakiri that arms may go to another speed for MAVLink; disarmed, it comes back to this one.
+            self._known_speed = found.speed
         if found.spoken is Spoken.MSP:
             self._enter(State.IDENTIFYING)
             self.link = MspLink(found.speed, now)
