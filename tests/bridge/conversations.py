@@ -1,0 +1,201 @@
+"""What ground stations do with missions: an upload and a download with the client's own repeats."""
+
+from collections.abc import Callable, Sequence
+
+from world import GroundStation
+
+from bridge.mission_check import RuleProfile, check_list
+from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
+from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from protocols.wp_record import WpRecord
+
+MISSION = 0
+_LAT_E7, _LON_E7 = 453838000, 84733000
+
+
+def waypoints(count: int, seed: int = 0) -> list[MissionItem]:
+    """Home and `count - 1` waypoints that are stored as they are; another `seed` gives another list."""
+    return [
+        MissionItem(
+            seq=number,
+            command=Command.NAV_WAYPOINT,
+            frame=Frame.GLOBAL_RELATIVE_ALT if number else Frame.GLOBAL,
+            p1=0.0,
+            p2=2.0,
+            p3=0.0,
+            p4=0.0,
+            lat_e7=_LAT_E7 + 1000 * seed + 37 * number,
+            lon_e7=_LON_E7 - 91 * number - seed,
+            alt_m=20.0 + number % 50,
+        )
+        for number in range(count)
+    ]
+
+
+def records_of(items: Sequence[MissionItem]) -> tuple[WpRecord, ...]:
+    """What the flight controller is to hold of them."""
+    return check_list(items, RuleProfile()).records
+
+
+def count_message(count: int, mission_type: int = MISSION) -> Message:
+    return messages.MAVLink_mission_count_message(1, 1, count, mission_type)
+
+
+def clear_message(mission_type: int = MISSION) -> Message:
+    return messages.MAVLink_mission_clear_all_message(1, 1, mission_type)
+
+
+def ack_message(result: int, mission_type: int = MISSION) -> Message:
+    return messages.MAVLink_mission_ack_message(1, 1, result, mission_type)
+
+
+def list_message(mission_type: int = MISSION) -> Message:
+    return messages.MAVLink_mission_request_list_message(1, 1, mission_type)
+
+
+def request_message(seq: int, *, as_int: bool = True, mission_type: int = MISSION) -> Message:
+    make = messages.MAVLink_mission_request_int_message if as_int else messages.MAVLink_mission_request_message
+    return make(1, 1, seq, mission_type)
+
+
+def item_message(seq: int, sent: MissionItem, *, as_int: bool = True, mission_type: int = MISSION) -> Message:
+    make = messages.MAVLink_mission_item_int_message if as_int else messages.MAVLink_mission_item_message
+    lat, lon = sent.lat_e7 or 0, sent.lon_e7 or 0
+    x, y = (lat, lon) if as_int else (lat / 1e7, lon / 1e7)
+    params = (sent.p1, sent.p2, sent.p3, sent.p4)
+    return make(1, 1, seq, sent.frame, sent.command, 0, 1, *params, x, y, sent.alt_m, mission_type)
+
+
+class Upload:
+    """A ground station that writes a mission: it answers each request, and repeats itself while nothing comes."""
+
+    def __init__(
+        self,
+        station: GroundStation,
+        items: Sequence[MissionItem],
+        *,
+        as_int: bool = True,
+        repeat_s: float = 0.45,
+        tries: int = 11,
+    ) -> None:
+        self.station, self.items, self.as_int = station, list(items), as_int
+        self.result: MissionResult | None = None
+        self.requested: list[int] = []
+        self.gave_up = False
+        self._repeat_s, self._tries = repeat_s, tries
+        self._silent = 0
+        self._last: Callable[[], None] = self._count
+        self._turn = 0
+        station.on_message.append(self._react)
+        self._say(self._count)
+
+    @property
+    def is_over(self) -> bool:
+        return self.result is not None or self.gave_up
+
+    def run(self, seconds: float = 60.0) -> MissionResult | None:
+        """Let the world go on until the upload is over."""
+        self.station.world.run_until(lambda _: self.is_over, seconds)
+        return self.result
+
+    def stop(self) -> None:
+        """Fall silent for ever, as a crashed ground station does."""
+        self.gave_up = True
+
+    def _count(self) -> None:
+        self.station.send(count_message(len(self.items)))
+
+    def _item(self, seq: int) -> None:
+        self.station.send(item_message(seq, self.items[seq], as_int=self.as_int))
+
+    def _react(self, message: Message) -> None:
+        if self.is_over or (message.target_system if hasattr(message, "target_system") else 0) != self.station.sysid:
+            return
+        match message.get_type():
+            case "MISSION_REQUEST" | "MISSION_REQUEST_INT":
+                self.requested.append(message.seq)
+                self._silent = 0
+                self._say(lambda seq=message.seq: self._item(seq))  # type: ignore[misc]
+            case "MISSION_ACK":
+                self.result = MissionResult(message.type)
+
+    def _say(self, what: Callable[[], None]) -> None:
+        self._last = what
+        self._turn += 1
+        what()
+        self._repeat_later(self._turn)
+
+    def _repeat_later(self, turn: int) -> None:
+        def repeat() -> None:
+            if self.is_over or turn != self._turn:
+                return
+            self._silent += 1
+            if self._silent > self._tries:
+                self.gave_up = True
+                return
+            self._last()
+            self._repeat_later(turn)
+
+        self.station.world.after(self._repeat_s, repeat)
+
+
+class Download:
+    """A ground station that reads the mission."""
+
+    def __init__(self, station: GroundStation, *, as_int: bool = True, repeat_s: float = 0.7, tries: int = 7) -> None:
+        self.station, self.as_int = station, as_int
+        self.count: int | None = None
+        self.items: list[MissionItem] = []
+        self.result: MissionResult | None = None
+        self.gave_up = False
+        self._repeat_s, self._tries = repeat_s, tries
+        self._turn = 0
+        station.on_message.append(self._react)
+        self._ask()
+
+    @property
+    def is_over(self) -> bool:
+        return self.gave_up or self.result is not None or self.count == len(self.items)
+
+    def run(self, seconds: float = 60.0) -> list[MissionItem]:
+        self.station.world.run_until(lambda _: self.is_over, seconds)
+        return self.items
+
+    def _ask(self) -> None:
+        self._turn += 1
+        self._repeat(self._turn, 0)
+
+    def _repeat(self, turn: int, silent: int) -> None:
+        if self.is_over or turn != self._turn:
+            return
+        if silent > self._tries:
+            self.gave_up = True
+            return
+        if self.count is None:
+            self.station.send(list_message())
+        else:
+            self.station.send(request_message(len(self.items), as_int=self.as_int))
+        self.station.world.after(self._repeat_s, lambda: self._repeat(turn, silent + 1))
+
+    def _react(self, message: Message) -> None:
+        if self.is_over or getattr(message, "target_system", 0) != self.station.sysid:
+            return
+        match message.get_type():
+            case "MISSION_COUNT" if self.count is None:
+                self.count = message.count
+            case "MISSION_ITEM_INT" if self.as_int and message.seq == len(self.items):
+                self.items.append(item_from_int_message(message))
+            case "MISSION_ITEM" if not self.as_int and message.seq == len(self.items):
+                self.items.append(item_from_float_message(message))
+            case "MISSION_ACK" if message.type != MissionResult.ACCEPTED:
+                self.result = MissionResult(message.type)
+            case _:
+                return
+        self._go_on()
+
+    def _go_on(self) -> None:
+        if not self.is_over:
+            self._ask()
+        elif self.result is None:
+            self.station.send(ack_message(MissionResult.ACCEPTED))

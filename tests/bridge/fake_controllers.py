@@ -1,0 +1,125 @@
+"""Other things than a Harakiri that may sit on the line, as a `peer` of the world."""
+
+import itertools
+import random
+import struct
+from collections.abc import Mapping
+from math import inf
+
+from protocols.mavlink.dialect import messages
+from protocols.msp.frame import Direction, MspFrame, MspParser
+
+HARAKIRI_CAPABILITY = 0x80000000
+
+
+def ident(version: int, capability: int) -> bytes:
+    return struct.pack("<BBBI", version, 3, 0, capability)
+
+
+class QuietLine:
+    """Nothing ever comes. The others build on it: what they put into `outgoing` arrives at once."""
+
+    def __init__(self, baud: int = 115200) -> None:
+        self.baud = baud
+        self.stored = b""
+        self.outgoing = bytearray()
+
+    def power_on_booted(self, now: float) -> None:
+        """It has no switch."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes from the bridge."""
+
+    def advance(self, now: float) -> bytes:
+        """Return what the bridge reads."""
+        data = bytes(self.outgoing)
+        self.outgoing.clear()
+        return data
+
+    def next_wakeup(self, now: float) -> float:
+        return now if self.outgoing else inf
+
+
+class Loopback(QuietLine):
+    """The port's own TX wired to its RX."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        self.outgoing += data
+
+
+class CommandLine(QuietLine):
+    """A Harakiri that was left in its CLI: it echoes what can be printed."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        for byte in data:
+            if byte == ord("\r"):
+                self.outgoing += b"\r\n# "
+            elif ord(" ") <= byte <= ord("~"):
+                self.outgoing.append(byte)
+
+
+class MspFake(QuietLine):
+    """Answers MSP from a table; what is not in it is an error, or nothing if `silent_on_unknown`."""
+
+    def __init__(self, answers: Mapping[int, bytes], *, silent_on_unknown: bool = False) -> None:
+        super().__init__()
+        self.answers = answers
+        self.asked: list[int] = []
+        self._silent = silent_on_unknown
+        self._parser = MspParser()
+
+    def receive(self, data: bytes, now: float) -> None:
+        for frame in self._parser.feed(data):
+            self.asked.append(frame.command)
+            payload = self.answers.get(frame.command)
+            if payload is not None:
+                self.outgoing += MspFrame(Direction.REPLY, frame.command, payload).encode()
+            elif not self._silent:
+                self.outgoing += MspFrame(Direction.ERROR, frame.command).encode()
+
+
+class MavlinkOnly(QuietLine):
+    """A flight controller with nothing but a heartbeat a second."""
+
+    def __init__(self, version: int = 2, sysid: int = 1) -> None:
+        super().__init__()
+        self._mavlink = messages.MAVLink(None, srcSystem=sysid, srcComponent=1)
+        self._version = version
+        self._due = 0.3
+
+    def advance(self, now: float) -> bytes:
+        while self._due <= now:
+            self._due += 1.0
+            message = messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3)
+            self.outgoing += bytes(message.pack(self._mavlink, force_mavlink1=self._version == 1))
+            # Other messages in between, which are not heard here.
+            self._mavlink.seq = (self._mavlink.seq + 7) % 256
+        return super().advance(now)
+
+    def next_wakeup(self, now: float) -> float:
+        return min(super().next_wakeup(now), self._due)
+
+
+class Noise(QuietLine):
+    """Random bytes without end; `alphabet` makes some of them as likely as a test wants."""
+
+    def __init__(self, seed: int, alphabet: bytes = bytes(range(256)), chunk: int = 512) -> None:
+        super().__init__()
+        # One long pool, read from random places: noise must cost less than what it tests.
+        self._random = random.Random(seed)
+        self._pool = bytes(self._random.choices(alphabet, k=1 << 18))
+        self._chunk = chunk
+        self._due = itertools.count()
+        self._at = 0.0
+        self.sent = 0
+
+    def advance(self, now: float) -> bytes:
+        if now < self._at:
+            return b""
+        self._at = now + self._chunk * 10 / self.baud
+        start = self._random.randrange(len(self._pool) - self._chunk)
+        self.sent += self._chunk
+        return self._pool[start : start + self._chunk]
+
+    def next_wakeup(self, now: float) -> float:
+        return max(now, self._at)

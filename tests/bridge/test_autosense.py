@@ -1,0 +1,317 @@
+"""Finding the flight controller, in simulated time: at every speed, left in mid-frame, booting, power-cycled, armed."""
+
+import random
+from collections.abc import Callable
+
+import pytest
+from fake_controllers import (
+    HARAKIRI_CAPABILITY,
+    CommandLine,
+    Loopback,
+    MavlinkOnly,
+    MspFake,
+    QuietLine,
+    ident,
+)
+from world import World
+
+from bridge.autosense import SPEEDS
+from bridge.fc_session import State
+from bridge.flight_controller import Kind
+from protocols.msp.frame import request
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
+BOXES = b"ANGLE;HORIZON;BARO;MAG;CAMSTAB;ARM;GPS HOME;GPS HOLD;"
+
+
+def verdict(world: World) -> bool:
+    """It is known what is spoken, and at which speed."""
+    return world.bridge.session.state not in (State.NO_PORT, State.SEARCHING)
+
+
+def thinks_armed(world: World) -> bool | None:
+    return world.bridge.session.vehicle.armed
+
+
+@pytest.mark.parametrize("extension", [True, False])
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+def test_found_at_every_speed_in_time(baud: int, extension: bool) -> None:
+    for seed in range(5):
+        world = World(SimOptions(baud=baud), Faults(extension=extension), plugged=False)
+        # Where in its second the board sends its heartbeat.
+        world.run(random.Random(seed).random() * 4)
+        world.plug()
+        assert world.wait_until(verdict, 20) <= (1.5 if baud == SPEEDS[0] else 8)
+        world.wait_ready()
+        assert world.kind is (Kind.HARAKIRI_MISSIONS if extension else Kind.HARAKIRI)
+        assert world.bridge.speed == baud
+        found = world.events("fc.found")
+        assert [event.facts["speed_baud"] for event in found] == [baud]
+        assert "two equal answers" in str(found[0].facts["why"])
+        world.run(5)
+        assert world.is_found
+        world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("baud", [baud for baud in ALL_SPEEDS if baud >= 2400])
+def test_known_by_name_in_time(baud: int) -> None:
+    """At 1200 baud the names of the boxes alone take a second, twice."""
+    assert World(SimOptions(baud=baud)).wait_ready() <= 8
+
+
+@pytest.mark.parametrize("extension", [True, False])
+def test_a_parser_left_in_mid_frame_is_brought_back(extension: bool) -> None:
+    frame = request(200, bytes(64))
+    for length in range(1, len(frame)):
+        world = World(faults=Faults(extension=extension), plugged=False)
+        world.naze.receive(frame[:length], world.now)
+        world.run(0.02)
+        world.plug()
+        assert world.wait_ready() <= 1.5
+        world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("extension", [True, False])
+def test_a_parser_that_loses_the_end_of_a_frame_later_is_brought_back(extension: bool) -> None:
+    frame = request(200, bytes(64))
+    for length in range(1, len(frame), 7):
+        world = World(faults=Faults(extension=extension))
+        world.wait_ready()
+        world.naze.receive(frame[:length], world.now)
+        world.run(3)
+        assert world.events("fc.lost") == []
+        link = world.bridge.session.link
+        assert link is not None
+        assert world.now - link.last_heard_at < 0.5
+        world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("boot_ms", [0, 300, 1000, 1500, 2000, 2700, 3500, 6000])
+@pytest.mark.parametrize("extension", [True, False])
+def test_a_board_that_boots_while_the_port_opens(boot_ms: float, extension: bool) -> None:
+    world = World(SimOptions(boot_ms=boot_ms), Faults(extension=extension), powered=False)
+    world.power_on()
+    assert world.wait_ready() <= boot_ms / 1000 + 3
+    world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+def test_back_within_3_s_of_the_ports_return(baud: int) -> None:
+    draw = random.Random(baud)
+    for _ in range(8):
+        world = World(SimOptions(baud=baud))
+        world.wait_until(verdict, 10)
+        # Perhaps in the middle of being asked who it is: then it has no name yet, but its speed is known.
+        world.run(draw.random() * draw.choice((0.2, 4)))
+        world.unplug()
+        assert world.bridge.session.state is State.NO_PORT
+        world.run(draw.choice((0.001, draw.random() * 8)))
+        world.plug()
+        assert world.wait_until(verdict, 20) <= 3
+        if baud >= 4800:
+            world.wait_until(lambda w: w.is_found, 3)
+        world.wait_ready()
+        world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("extension", [True, False])
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+def test_back_within_3_s_of_the_boot_after_a_power_cycle_at_any_moment(baud: int, extension: bool) -> None:
+    draw = random.Random(baud)
+    for _ in range(8):
+        boot_s = draw.choice((0.5, 1.0, 2.0, 3.5))
+        world = World(SimOptions(baud=baud, boot_ms=boot_s * 1000), Faults(extension=extension))
+        world.wait_until(verdict, 10)
+        world.run(draw.random() * draw.choice((0.2, 4)))
+        world.power_off()
+        world.run(draw.choice((0.001, draw.random() * 3, draw.random() * 12)))
+        world.power_on()
+        world.run(boot_s)
+        began = world.now
+
+        def answers(world: World, began: float = began) -> bool:
+            link = world.bridge.session.link
+            return link is not None and link.last_heard_at > began
+
+        assert world.wait_until(answers, 20) <= 3
+        world.wait_ready()
+        world.assert_line_was_clean()
+
+
+def test_power_and_port_that_come_and_go_at_random_are_survived() -> None:
+    for seed in range(12):
+        world = World(SimOptions(boot_ms=800), seed=seed)
+        draw = random.Random(seed)
+        plugged = powered = True
+        for _ in range(12):
+            world.run(draw.random() * draw.choice((0.05, 0.5, 3)))
+            match draw.randrange(4):
+                case 0:
+                    world.unplug() if plugged else world.plug()
+                    plugged = not plugged
+                case 1:
+                    world.power_off() if powered else world.power_on()
+                    powered = not powered
+                case 2:
+                    world.faults.hang = not world.faults.hang
+                case _:
+                    world.push([])
+        world.faults.hang = False
+        if not plugged:
+            world.plug()
+        if not powered:
+            world.power_on()
+        world.run(0.8)
+        # A board that was lost must first be missed.
+        world.run(2.0)
+        world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 3)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "baud"),
+    [
+        # At 9600 baud the board's own MAVLink is more than its line carries.
+        (TelemetryProtocol.MAVLINK, 115200),
+        (TelemetryProtocol.MAVLINK, 57600),
+        (TelemetryProtocol.MAVLINK_57600, 115200),
+        (TelemetryProtocol.MAVLINK_57600, 57600),
+        (TelemetryProtocol.MAVLINK_57600, 9600),
+    ],
+)
+def test_armed_it_may_turn_to_mavlink_and_back(protocol: TelemetryProtocol, baud: int) -> None:
+    world = World(SimOptions(baud=baud, tele_prot=protocol))
+    world.wait_ready()
+    for _ in range(2):
+        world.faults.armed = True
+        assert world.wait_until(lambda w: w.kind is Kind.MAVLINK, 20) <= 8
+        world.run(1.2)
+        assert thinks_armed(world) is True
+        world.run(6)
+        assert world.kind is Kind.MAVLINK
+        world.faults.armed = False
+        assert world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 20) <= 8
+        world.run(0.5)
+        assert thinks_armed(world) is False
+        world.run(3)
+    world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("protocol", [TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600])
+def test_armed_from_the_start(protocol: TelemetryProtocol) -> None:
+    world = World(SimOptions(tele_prot=protocol), Faults(armed=True))
+    world.run(0.5)
+    assert world.naze.armed
+    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    assert "no answer to" in str(world.events("fc.found")[0].facts["why"])
+    world.faults.armed = False
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 8)
+    world.assert_line_was_clean()
+
+
+def test_frsky_telemetry_of_an_armed_craft_is_taken_for_nothing() -> None:
+    """It answers MSP all the same, at FrSky's speed and between FrSky's frames."""
+    world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
+    world.wait_ready()
+    world.faults.armed = True
+    world.wait_until(lambda w: w.bridge.speed == 9600 and w.kind is Kind.HARAKIRI_MISSIONS, 15)
+    world.run(30)
+    assert world.bridge.session.vehicle.armed
+    world.faults.armed = False
+    world.wait_until(lambda w: w.bridge.speed == 115200 and w.kind is Kind.HARAKIRI_MISSIONS, 8)
+    assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
+    world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("extension", [True, False])
+@pytest.mark.parametrize("rate", [1e-4, 1e-3])
+def test_bit_errors_delay_the_finding_and_never_change_the_finding(rate: float, extension: bool) -> None:
+    kind = Kind.HARAKIRI_MISSIONS if extension else Kind.HARAKIRI
+    found = 0
+    for seed in range(120):
+        faults = Faults(bit_error_rate=rate, extension=extension)
+        world = World(SimOptions(seed=seed), faults, speeds=(115200,))
+        world.run_until(lambda w: w.kind is not None, 8)
+        controller = world.bridge.session.controller
+        if controller is None:
+            continue
+        found += 1
+        assert controller.kind is kind
+        assert controller.arm_bit == 5
+        assert controller.mixer == 3
+        if controller.info is not None:
+            assert (controller.info.capacity, controller.info.wp_radius_cm) == (146, 200)
+    assert found >= 110
+
+
+def test_lost_bytes_delay_the_finding_and_never_change_it() -> None:
+    for seed in range(60):
+        world = World(SimOptions(seed=seed), Faults(lost_byte_rate=3e-3), speeds=(115200,))
+        world.wait_until(lambda w: w.kind is not None, 20)
+        assert world.kind is Kind.HARAKIRI_MISSIONS
+
+
+OTHERS: dict[str, Callable[[], MspFake]] = {
+    "MultiWii": lambda: MspFake({100: ident(241, 1 << 4), 116: BOXES, 101: bytes(11)}),
+    "Baseflight": lambda: MspFake({100: ident(230, HARAKIRI_CAPABILITY), 116: BOXES + b"GTUNE;", 101: bytes(11)}),
+    "no GTUNE": lambda: MspFake({100: ident(211, HARAKIRI_CAPABILITY), 116: BOXES, 101: bytes(11)}),
+    "capability": lambda: MspFake({100: ident(211, 0), 116: BOXES + b"GTUNE;", 101: bytes(11)}),
+    "INAV": lambda: MspFake({1: bytes((0, 2, 5)), 2: b"INAV", 116: BOXES, 101: bytes(11)}),
+    "no boxes": lambda: MspFake({2: b"BTFL", 101: bytes(11)}),
+    "long boxes": lambda: MspFake({2: b"INAV", 116: (BOXES * 5)[:255], 101: bytes(11)}),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_relatives_are_other_flight_controllers(name: str) -> None:
+    fake = OTHERS[name]()
+    world = World(peer=fake)
+    world.wait_until(lambda w: w.is_found, 3)
+    assert world.kind is Kind.OTHER_MSP
+    world.run(10)
+    assert world.kind is Kind.OTHER_MSP
+    # Command numbers that mean something else to them are never sent.
+    assert not {190, 191, 192, 193, 194, 195, 196} & set(fake.asked)
+
+
+def test_a_relative_that_is_silent_on_what_it_does_not_know_is_not_guessed_at() -> None:
+    world = World(peer=MspFake({100: ident(240, 0), 116: BOXES, 101: bytes(11)}, silent_on_unknown=True))
+    world.run(20)
+    assert world.kind is None
+
+
+def test_the_arm_box_is_found_by_its_name() -> None:
+    for boxes in (b"ARM;ANGLE;", b"ANGLE;ARM;HORIZON;", b"ANGLE;HORIZON;ARM"):
+        flags = 1 << boxes.split(b";").index(b"ARM")
+        status = bytes(6) + flags.to_bytes(4, "little") + b"\0"
+        world = World(peer=MspFake({100: ident(241, 0), 2: b"MWII", 116: boxes, 101: status}))
+        world.wait_until(lambda w: w.is_found, 3)
+        world.run(1)
+        assert world.bridge.session.vehicle.armed is True
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_lone_heartbeat_a_second_is_mavlink(version: int) -> None:
+    world = World(peer=MavlinkOnly(version))
+    assert world.wait_until(lambda w: w.is_found, 5) <= 1.5
+    assert world.kind is Kind.MAVLINK
+    world.run(20)
+    assert world.kind is Kind.MAVLINK
+    assert world.events("fc.lost") == []
+
+
+@pytest.mark.parametrize("peer", [QuietLine, Loopback, CommandLine])
+def test_nobody_is_found_where_nobody_is(peer: Callable[[], QuietLine]) -> None:
+    world = World(peer=peer())
+    world.run(60)
+    assert world.bridge.session.state is State.SEARCHING
+    assert world.events("fc.found") == []
+
+
+def test_a_line_that_is_looped_back_is_no_answer() -> None:
+    """A flight controller is unplugged from its adapter and the adapter's wires touch."""
+    world = World()
+    world.wait_ready()
+    world.naze = Loopback()
+    world.run(3)
+    assert world.kind is None

@@ -1,0 +1,348 @@
+"""A whole world in simulated time: the bridge, a simulated Naze on a wire, a store, and ground stations over the air.
+
+Nothing here sleeps, opens a socket or reads a clock. What holds for everything that the bridge does is asserted at
+every step: whole frames without hazard bytes to the flight controller, deadlines that lie ahead, a bounded queue of
+procedures.
+"""
+
+import heapq
+import itertools
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bridge.autosense import SPEEDS
+from bridge.bridge import Bridge, BridgeConfig
+from bridge.fc_session import State
+from bridge.flight_controller import Kind
+from bridge.journal import Level
+from bridge.mission_log import ArrivedMission, Conclusion, Outcome
+from bridge.procedure import Conclude, Recall, Save, StoreEffect
+from bridge.station import Peer
+from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.msp.frame import MspParser
+from protocols.msp.hazards import is_clean
+from protocols.wp_record import WpRecord, identify, unpack_records
+from service.simulator.line import garble
+from service.simulator.naze import SimulatedNaze
+from service.simulator.options import Faults, SimOptions
+
+#: More procedures than this never wait: a ground station that hammers the bridge must not fill its memory.
+MAX_QUEUED = 12
+_MAX_TICKS_AT_ONCE = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What the bridge's journal was told, and when."""
+
+    at: float
+    level: Level
+    name: str
+    facts: Mapping[str, object]
+
+
+class MemoryStore:
+    """Answers store effects after `delay_s`; `failing`: as a full disk does."""
+
+    def __init__(self) -> None:
+        self.missions: list[tuple[ArrivedMission, Conclusion | None]] = []
+        self.delay_s = 0.0
+        self.failing = False
+
+    def carry_out(self, effect: StoreEffect) -> object:
+        match effect:
+            case Save(mission):
+                if self.failing:
+                    return None
+                self.missions.append((mission, None))
+                return len(self.missions)
+            case Conclude(number, conclusion):
+                if self.failing:
+                    return None
+                self.missions[number - 1] = (self.missions[number - 1][0], conclusion)
+                return True
+            case Recall(identity):
+                for mission, ended in reversed(self.missions):
+                    verified = ended is not None and ended.outcome is Outcome.VERIFIED
+                    if verified and identify(mission.verdict.records) == identity:
+                        return mission.verdict.roi_commands
+        return {}
+
+    def outcomes(self) -> list[Outcome | None]:
+        return [conclusion.outcome if conclusion else None for _, conclusion in self.missions]
+
+
+@dataclass(slots=True)
+class Air:
+    """What UDP does to datagrams, each way: chances of a loss and of a repeat, seconds of delay and its spread."""
+
+    loss: float = 0.0
+    repeat: float = 0.0
+    delay_s: float = 0.0
+    spread_s: float = 0.0
+
+
+class World:
+    """The board has power and has booted at time 0, and the port opens then, unless told otherwise."""
+
+    def __init__(
+        self,
+        options: SimOptions | None = None,
+        faults: Faults | None = None,
+        *,
+        speeds: Sequence[int | None] = SPEEDS,
+        seed: int = 0,
+        powered: bool = True,
+        plugged: bool = True,
+        peer: Any = None,
+    ) -> None:
+        self.random = random.Random(seed)
+        self.now = 0.0
+        self.faults = faults or Faults()
+        #: Another flight controller than the simulated Naze may be on the line: see `FakeController`.
+        self.naze: Any = peer or SimulatedNaze(options, self.faults)
+        self.store = MemoryStore()
+        self.journal: list[Event] = []
+        self.stations: dict[Peer, GroundStation] = {}
+        #: What goes over the wire to the flight controller, as the bridge wrote it: time, speed, bytes.
+        self.written: list[tuple[float, int | None, bytes]] = []
+        self._events: list[tuple[float, int, Callable[[], None]]] = []
+        self._numbers = itertools.count()
+        self._plugged = False
+        self.bridge = Bridge(BridgeConfig(speeds), self._note, self.now)
+        if powered:
+            self.naze.power_on_booted(self.now)
+        if plugged:
+            self.plug()
+
+    # What tests do.
+
+    def plug(self) -> None:
+        """The port is there."""
+        self._plugged = True
+        self.bridge.fc_opened(self.now)
+        self._flush()
+
+    def unplug(self) -> None:
+        """The port is gone; the board keeps its power."""
+        self._plugged = False
+        self.bridge.fc_closed(self.now, "unplugged")
+        self._flush()
+
+    def power_off(self) -> None:
+        self.naze.power_off(self.now)
+
+    def power_on(self) -> None:
+        self.naze.power_on(self.now)
+
+    def at(self, when: float, what: Callable[[], None]) -> None:
+        """Do something at a time to come."""
+        heapq.heappush(self._events, (when, next(self._numbers), what))
+
+    def after(self, seconds: float, what: Callable[[], None]) -> None:
+        self.at(self.now + seconds, what)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        end = self.now + seconds
+        while self.now < end:
+            self._step(end)
+
+    def run_until(self, done: "Callable[[World], bool]", seconds: float) -> bool:
+        """Let time pass until `done`; False if that takes longer than `seconds`."""
+        end = self.now + seconds
+        while not done(self):
+            if self.now >= end:
+                return False
+            self._step(end)
+        return True
+
+    def wait_until(self, done: "Callable[[World], bool]", seconds: float) -> float:
+        """The same, but it must happen; return how long it took."""
+        began = self.now
+        assert self.run_until(done, seconds), f"not within {seconds} s, state {self.bridge.session.state}"
+        return self.now - began
+
+    def wait_ready(self, seconds: float = 20.0) -> float:
+        """Wait until the flight controller is found, and what it holds is read."""
+        return self.wait_until(lambda world: world.is_found and not world.bridge.runner.is_busy, seconds)
+
+    def hear(self, data: bytes) -> None:
+        """Let the bridge read bytes that did not come from the simulated board."""
+        self.bridge.fc_received(data, self.now)
+        self._flush()
+
+    def spoken_by(self, station: "GroundStation", data: bytes, *, datagram: bool = True) -> None:
+        """Let bytes from a ground station arrive now."""
+        self.bridge.gcs_received(station.peer, data, self.now, datagram=datagram)
+        self._flush()
+
+    def push(self, items: Sequence[Any]) -> list[Any]:
+        """Push as the command line does; the list gets the outcome."""
+        outcome: list[Any] = []
+        self.bridge.push_locally(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
+        self._flush()
+        return outcome
+
+    # What tests look at.
+
+    @property
+    def kind(self) -> Kind | None:
+        controller = self.bridge.session.controller
+        return None if controller is None else controller.kind
+
+    @property
+    def is_found(self) -> bool:
+        return self.bridge.session.state in (State.MSP, State.MAVLINK)
+
+    @property
+    def stored(self) -> tuple[WpRecord, ...]:
+        """The list in the board's flash, as the next boot would find it."""
+        return tuple(unpack_records(self.naze.stored))
+
+    def events(self, name: str) -> list[Event]:
+        return [event for event in self.journal if event.name == name]
+
+    def assert_line_was_clean(self) -> None:
+        """No trap, no ring lapped. Holds wherever the line itself is sound."""
+        counters = self.naze.counters
+        assert counters.hazard_runs == 0
+        assert counters.tx_overflows == 0
+        assert counters.rx_overflows == 0
+        assert not counters.cli_entered
+        assert counters.max_outstanding_reply_bytes <= 255
+
+    # How time passes.
+
+    def _step(self, end: float) -> None:
+        """Go to the next moment at which anything happens, and let it happen."""
+        wakeup = max(self.naze.next_wakeup(self.now), self.now + 1e-6)
+        wanted = min(self.bridge.next_deadline(), wakeup, end)
+        if self._events:
+            wanted = min(wanted, self._events[0][0])
+        self.now = max(self.now, wanted)
+        data = self.naze.advance(self.now)
+        if data and self._plugged:
+            heard = garble(data, self.naze.baud, self.bridge.speed) if self.bridge.speed else data
+            if heard:
+                self.bridge.fc_received(heard, self.now)
+                self._flush()
+        while self._events and self._events[0][0] <= self.now:
+            heapq.heappop(self._events)[2]()
+        for _ in range(_MAX_TICKS_AT_ONCE):
+            if self.bridge.next_deadline() > self.now:
+                break
+            self.bridge.tick(self.now)
+            self._flush()
+        else:
+            raise AssertionError(f"the bridge spins at {self.now}: {self.bridge.session.state}")
+        assert len(self.bridge.runner._queue) <= MAX_QUEUED
+
+    def _flush(self) -> None:
+        for data in self.bridge.take_fc_output():
+            self._write(data)
+        for peer, frame in self.bridge.take_datagrams():
+            station = self.stations.get(peer)
+            if station is not None:
+                station.carry(frame)
+        for effect in self.bridge.take_store_effects():
+            self._carry_out(effect)
+
+    def _write(self, data: bytes) -> None:
+        parser = MspParser()
+        frames = parser.feed(data)
+        assert b"".join(frame.encode() for frame in frames) == data, f"not whole frames: {data.hex()}"
+        assert is_clean(data), data.hex()
+        assert self._plugged
+        speed = self.bridge.speed
+        self.written.append((self.now, speed, data))
+        self.naze.receive(garble(data, speed, self.naze.baud) if speed else data, self.now)
+
+    def _carry_out(self, effect: StoreEffect) -> None:
+        def answer() -> None:
+            self.bridge.store_answered(self.store.carry_out(effect), self.now)
+            self._flush()
+
+        self.after(self.store.delay_s, answer)
+
+    def _note(self, level: Level, event: str, /, **facts: object) -> None:
+        self.journal.append(Event(self.now, level, event, facts))
+
+
+class GroundStation:
+    """Speaks MAVLink over the air. `heard` keeps what reaches it; `on_message` reacts to it."""
+
+    def __init__(
+        self,
+        world: World,
+        name: str = "gcs",
+        *,
+        sysid: int = 255,
+        compid: int = 190,
+        version: int = 2,
+        air: Air | None = None,
+    ) -> None:
+        self.world = world
+        self.peer = Peer("udp", name)
+        self.version = version
+        self.air = air or Air()
+        self.heard: list[tuple[float, Message]] = []
+        self.frames_heard: list[bytes] = []
+        self.on_message: list[Callable[[Message], None]] = []
+        self._mavlink = messages.MAVLink(None, srcSystem=sysid, srcComponent=compid)
+        self._decoder = MavlinkDecoder()
+        self.sysid, self.compid = sysid, compid
+        world.stations[self.peer] = self
+
+    def send(self, message: Message) -> None:
+        """Send a message on its way to the bridge."""
+        data = self.pack(message)
+        self._through_the_air(lambda: self.world.spoken_by(self, data))
+
+    def pack(self, message: Message) -> bytes:
+        data = bytes(message.pack(self._mavlink, force_mavlink1=self.version == 1))
+        self._mavlink.seq = (self._mavlink.seq + 1) % 256
+        return data
+
+    def carry(self, frame: bytes) -> None:
+        """Carry a frame from the bridge to here."""
+        self._through_the_air(lambda: self._arrived(frame))
+
+    def take(self, *types: str) -> list[Message]:
+        """Return what was heard of these message types, and forget it all."""
+        found = self.said(*types)
+        self.heard.clear()
+        return found
+
+    def said(self, *types: str) -> list[Message]:
+        """Return what was heard of these message types."""
+        return [message for _, message in self.heard if not types or message.get_type() in types]
+
+    def texts(self) -> list[str]:
+        return [message.text for message in self.said("STATUSTEXT")]
+
+    def _arrived(self, frame: bytes) -> None:
+        self.frames_heard.append(frame)
+        found = MavlinkSplitter().feed(frame)
+        assert len(found) == 1, f"not one whole frame: {frame.hex()}"
+        message = self._decoder.decode(found[0])
+        assert message is not None
+        self.heard.append((self.world.now, message))
+        for react in self.on_message:
+            react(message)
+
+    def _through_the_air(self, arrive: Callable[[], None]) -> None:
+        chance, air = self.world.random, self.air
+        for _ in range(1 + (chance.random() < air.repeat)):
+            if chance.random() < air.loss:
+                continue
+            delay = air.delay_s + chance.random() * air.spread_s
+            if delay:
+                self.world.after(delay, arrive)
+            else:
+                # At once, but after what is under way now: a ground station never answers inside of the bridge.
+                self.world.at(self.world.now, arrive)
