@@ -11,6 +11,7 @@ from protocols.wp_record import RECORD_SIZE
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 _BUFFER_SIZE = 243
+_FRAME_SIZE = _BUFFER_SIZE + 6
 _CAPACITY = 146
 _NO_COMMAND, _POWER_CUT = -1, -2
 
@@ -21,6 +22,7 @@ _SIGNATURES = {
     "sim_cut_at": (None, [c_void_p, c_uint32, c_int]),
     "sim_fail_at": (None, [c_void_p, c_uint32, c_int]),
     "sim_request": (c_int, [c_void_p, c_uint8, POINTER(c_uint8), c_uint8]),
+    "sim_receive": (c_int, [c_void_p, c_uint8, POINTER(c_uint8)]),
     "sim_store": (c_int, [c_void_p, POINTER(c_uint8), c_uint16]),
     "sim_advance": (None, [c_void_p, c_uint32]),
     "sim_arm": (None, [c_void_p, c_bool]),
@@ -63,6 +65,17 @@ class CCore:
         if length == _POWER_CUT:
             raise PowerCut
         return None if length == _NO_COMMAND else bytes(buffer[:length])
+
+    def receive(self, data: bytes) -> bytes:
+        """Take bytes as the patched firmware's receiver does; return the reply frames. PowerCut."""
+        reply = (c_uint8 * _FRAME_SIZE)()
+        replies = bytearray()
+        for byte in data:
+            length = self._c.sim_receive(self._board, byte, reply)
+            if length == _POWER_CUT:
+                raise PowerCut
+            replies += bytes(reply[:length])
+        return bytes(replies)
 
     def store(self, records: bytes) -> int:
         """Let the firmware save a list of its own; return the status. PowerCut."""

@@ -4,7 +4,6 @@ from typing import Protocol
 
 from c_core import PowerCut
 
-from protocols.msp.mission import MissionCommand
 from service.simulator.flash import ERASED, NorFlash, PowerCutError
 from service.simulator.mission_commands import Board, MissionCommands
 from service.simulator.mission_slots import MissionSlots, StoredConfig, flash_size
@@ -68,8 +67,7 @@ class Model:
 
     def arm(self, armed: bool) -> None:
         self._board.armed = armed
-        # The model looks at arming only when it is asked something; the daemon polls all the time.
-        self.request(MissionCommand.INFO, b"")
+        self._commands.drop_stale(self._now)  # as the main loop does
 
     def set_busy(self, busy: bool) -> None:
         self._faults.busy = busy
