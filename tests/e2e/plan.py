@@ -77,6 +77,11 @@ def stored_fields(item: MissionItem) -> tuple[float, ...]:
     )
 
 
+def expected_fields(plan: Sequence[PlanRow], *, use_int: bool = True) -> list[tuple[float, ...]]:
+    """What a reader must get after `plan` was written."""
+    return [stored_fields(item) for item in judge(plan, use_int=use_int).items]
+
+
 def records_of(verdict: Verdict) -> list[str]:
     """Return a verdict's records in hex, as the simulated board tells its own."""
     return [pack_records([record]).hex() for record in verdict.records]

@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, TypeVar
 
 from service.control import ControlError, ask_daemon
 
@@ -22,12 +22,18 @@ T = TypeVar("T")
 
 def until(condition: Callable[[], T | None], what: str) -> T:
     """Wait for something to be there (true), and return it."""
-    deadline = time.monotonic() + PATIENCE
+    found = comes(condition)
+    assert found, f"{what} did not come"
+    return found
+
+
+def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | None:
+    """Return what is there within so many seconds; what is not true is not there."""
+    deadline = time.monotonic() + seconds
     while True:
         found = condition()
-        if found:
+        if found or time.monotonic() >= deadline:
             return found
-        assert time.monotonic() < deadline, f"{what} did not come"
         time.sleep(0.02)
 
 
@@ -181,8 +187,3 @@ class Daemon(Program):
         """Return the last event of that name."""
         found = [entry for entry in self.events() if entry["event"] == event]
         return found[-1] if found else None
-
-
-def close_quietly(*streams: IO[Any]) -> None:
-    for stream in streams:
-        stream.close()

@@ -20,7 +20,7 @@ from mavsdk.asyncio.plugins.mission_raw import (
 )
 from mavsdk.asyncio.plugins.param.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
-from plan import HOME, PlanRow, judge, mixed_plan, plain_plan, records_of, stored_fields, waypoint
+from plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
 from programs import until
 
 from protocols.mission_item import Command
@@ -63,10 +63,6 @@ def raw_items(plan: Sequence[PlanRow]) -> list[Any]:
 def fields(item: Any) -> tuple[float, ...]:
     parameters = (item.param1, item.param2, item.param3, item.param4)
     return (item.seq, item.command, item.frame, *parameters, item.x, item.y, item.z)
-
-
-def expected_fields(plan: Sequence[PlanRow]) -> list[tuple[float, ...]]:
-    return [stored_fields(item) for item in judge(plan).items]
 
 
 async def refusal_of(missions: Any, plan: Sequence[PlanRow]) -> Any:

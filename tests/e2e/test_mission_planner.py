@@ -6,7 +6,7 @@ import pytest
 from benches import Bench
 from lossy_udp import Way
 from mission_planner import MissionPlanner, UploadFailed
-from plan import HOME, PlanRow, judge, mixed_plan, plain_plan, records_of, single, stored_fields, waypoint
+from plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, single, waypoint
 from programs import until
 
 from bridge.mission_check import Result
@@ -103,7 +103,7 @@ def test_a_read_in_float_shows_the_same_list(shared: Bench) -> None:
     assert planner.capabilities == 0
     read = planner.read()
     assert {message.get_type() for message in read} == {"MISSION_ITEM"}
-    expected = [stored_fields(item) for item in judge(plan).items]
+    expected = expected_fields(plan)
     for message, stored in zip(read, expected, strict=True):
         lat, lon = (single(value / 1e7) for value in stored[7:9])
         assert as_read(message) == (*stored[:7], lat, lon, *stored[9:])
@@ -276,7 +276,7 @@ def test_armed(bench: Bench) -> None:
     assert refusal_of(planner, plain_plan(12, start=70)) is MissionResult.DENIED
     planner.wait_for_text("disarm to change the mission")
     # It asks for home when the pilot arms.
-    assert as_read(planner.read_item(0)) == stored_fields(judge(plan).items[0])
+    assert as_read(planner.read_item(0)) == expected_fields(plan)[0]
     bench.board.set("armed 0")
     planner.wait_for_armed(False)
     assert bench.board.records() == kept
