@@ -419,7 +419,7 @@ class MissionPlanner:
 
     def read(self) -> list[Message]:
         """Its Read button: REQUEST_LIST 700 ms x 7, then item by item. A MISSION_ACK error is not looked at."""
-        items = [self.read_item(seq) for seq in range(self._read_count())]
+        items = [self.read_item(seq) for seq in range(self.read_count())]
         self._send_ack()
         return items
 
@@ -439,7 +439,7 @@ class MissionPlanner:
                     self.send(request)
         raise TimedOut("Timeout on read - getWP")
 
-    def _read_count(self) -> int:
+    def read_count(self) -> int:
         for _ in range(7):
             self.send(messages.MAVLink_mission_request_list_message(*self._target, 0))
             for message in self._packets(0.7):

@@ -36,9 +36,7 @@ def assert_reads(planner: MissionPlanner, plan: Sequence[PlanRow], *, use_int: b
     """Assert that a Read shows what the rules say that became of `plan`."""
     read = planner.read()
     assert all((message.autocontinue, message.current) == (1, 0) for message in read)
-    assert [as_read(message) for message in read] == [
-        stored_fields(item) for item in judge(plan, use_int=use_int).items
-    ]
+    assert [as_read(message) for message in read] == expected_fields(plan, use_int=use_int)
 
 
 # -- connecting ----------------------------------------------------------------------------------------------

@@ -1,0 +1,111 @@
+"""A ground station that keeps to MAVLink's mission protocol, over any socket and with any of pymavlink's dialects."""
+
+import socket
+import time
+from collections.abc import Iterator, Sequence
+from types import ModuleType, TracebackType
+from typing import Any, Self
+
+from plan import PlanRow
+from programs import PATIENCE
+
+from protocols.mavlink.dialect import messages as v20
+from protocols.mission_item import MissionResult
+
+SYSID, COMPID = 250, 191
+_RETRY_S = 0.5
+
+
+class PlainStation:
+    """Speaks through a connected socket, which becomes its own. `dialect` None: MAVLink 2.
+
+    `heard` has what came but was not waited for, too.
+    """
+
+    def __init__(self, connection: socket.socket, dialect: ModuleType | None = None) -> None:
+        self._socket = connection
+        self._dialect: Any = dialect or v20
+        self._codec = self._dialect.MAVLink(None, srcSystem=SYSID, srcComponent=COMPID)
+        self._codec.robust_parsing = True
+        self.heard: list[Any] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._socket.close()
+
+    def send(self, message: Any) -> None:
+        self._socket.sendall(bytes(message.pack(self._codec)))
+
+    def say_hello(self) -> None:
+        self.send(self._dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+
+    def wait_for(self, *kinds: str) -> Any:
+        """Return the next message of one of these types."""
+        for message in self._messages(PATIENCE):
+            if message.get_type() in kinds:
+                return message
+        raise AssertionError(f"no {kinds} came")
+
+    def upload(self, plan: Sequence[PlanRow]) -> MissionResult:
+        """Give a list, item by item as it is asked for; the final ack."""
+        self.announce(len(plan))
+        for _ in range(20 * len(plan)):
+            for message in self._messages(_RETRY_S):
+                if message.get_type() == "MISSION_ACK":
+                    return MissionResult(message.type)
+                if message.get_type() in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+                    self.give(plan, message.seq)
+        raise AssertionError("no final MISSION_ACK came")
+
+    def announce(self, count: int) -> None:
+        self.send(self._dialect.MAVLink_mission_count_message(1, 1, count))
+
+    def give(self, plan: Sequence[PlanRow], seq: int) -> None:
+        row = plan[seq]
+        parameters = (row.p1, row.p2, row.p3, row.p4, int(row.lat * 1e7), int(row.lng * 1e7), row.alt)
+        self.send(self._dialect.MAVLink_mission_item_int_message(1, 1, seq, row.frame, row.command, 0, 1, *parameters))
+
+    def clear(self) -> MissionResult:
+        self.send(self._dialect.MAVLink_mission_clear_all_message(1, 1))
+        return MissionResult(self.wait_for("MISSION_ACK").type)
+
+    def download(self) -> list[tuple[float, ...]]:
+        """Return seq, command, frame, param1..4, lat_e7, lon_e7 and height of each item."""
+        self.send(self._dialect.MAVLink_mission_request_list_message(1, 1))
+        count = self.wait_for("MISSION_COUNT").count
+        items: list[tuple[float, ...]] = []
+        for seq in range(count):
+            self.send(self._dialect.MAVLink_mission_request_int_message(1, 1, seq))
+            m = self.wait_for("MISSION_ITEM_INT")
+            items.append((m.seq, m.command, m.frame, m.param1, m.param2, m.param3, m.param4, m.x, m.y, m.z))
+        return items
+
+    def _messages(self, seconds: float) -> Iterator[Any]:
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0:
+            self._socket.settimeout(left)
+            try:
+                data = self._socket.recv(4096)
+            except TimeoutError:
+                return
+            assert data, "the daemon hung up"
+            for message in self._codec.parse_buffer(data) or []:
+                if message.get_type() != "BAD_DATA":
+                    self.heard.append(message)
+                    yield message
+
+
+def udp_station(address: tuple[str, int], dialect: ModuleType | None = None) -> PlainStation:
+    """A station that speaks to a daemon's udpin."""
+    connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    connection.connect(address)
+    return PlainStation(connection, dialect)
+
+
+def tcp_station(port: int) -> PlainStation:
+    """A station that is connected to a daemon's tcpin."""
+    return PlainStation(socket.create_connection(("127.0.0.1", port), PATIENCE))

@@ -1,0 +1,130 @@
+"""Ground stations by every kind of link, old ones, and several at once."""
+
+import socket
+
+from benches import Bench, Starter
+from mission_planner import MissionPlanner
+from plain_station import tcp_station, udp_station
+from plan import expected_fields, judge, mixed_plan, plain_plan, records_of
+from programs import free_port, until
+from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
+
+from protocols.mission_item import MissionResult
+
+# -- kinds of links ------------------------------------------------------------------------------------------
+
+
+def test_every_kind_of_link_at_once(start: Starter) -> None:
+    udp_in, udp_out, broadcast, tcp_in = free_port(), free_port(), free_port(), free_port(socket.SOCK_STREAM)
+    links = (
+        f"udpin:127.0.0.1:{udp_in}",
+        f"udpout:127.0.0.1:{udp_out}",
+        f"udpbcast:127.255.255.255:{broadcast}",
+        f"tcpin:127.0.0.1:{tcp_in}",
+    )
+    bench = start.bench(gcs=links)
+    with (
+        MissionPlanner(("127.0.0.1", udp_out), listen=True) as called,
+        MissionPlanner(("", broadcast), listen=True) as called_all,
+        tcp_station(tcp_in) as by_tcp,
+        udp_station(("127.0.0.1", udp_in)) as by_udp,
+    ):
+        by_tcp.wait_for("HEARTBEAT")
+        for number, planner in enumerate((called, called_all)):
+            planner.meet()
+            planner.connect()
+            plan = plain_plan(12, start=20 * number)
+            planner.write(plan)
+            assert bench.board.records() == records_of(judge(plan))
+        by_udp.say_hello()
+        for number, station in enumerate((by_tcp, by_udp)):
+            plan = mixed_plan(13 + number)
+            assert station.upload(plan) is MissionResult.ACCEPTED
+            assert station.download() == expected_fields(plan)
+            assert bench.board.records() == records_of(judge(plan))
+        until(lambda: len(_stations(bench)) == 4, "four ground stations")
+        # Once somebody has answered, it is spoken to and the others on the net are left alone.
+        assert not [peer for peer in _stations(bench) if "127.255.255.255'" in peer]
+    until(lambda: len(_stations(bench)) == 3, "the end of the TCP connection")
+
+
+def _stations(bench: Bench) -> list[str]:
+    status = bench.daemon.status()
+    assert status is not None
+    stations: list[str] = status["ground_stations"]
+    return stations
+
+
+def test_a_tcp_client_that_hangs_up_in_mid_upload_blocks_nobody(start: Starter) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
+    plan = plain_plan(30)
+    with tcp_station(port) as gone:
+        gone.announce(len(plan))
+        gone.wait_for("MISSION_REQUEST")
+        gone.give(plan, 0)
+    with tcp_station(port) as station:
+        until(lambda: station.upload(plan) is MissionResult.ACCEPTED, "an upload that is not denied")
+    assert bench.board.records() == records_of(judge(plan))
+
+
+def test_one_that_knows_mavlink_1_only(shared: Bench) -> None:
+    plan = mixed_plan(14)
+    with udp_station(shared.daemon.address, mavlink_1) as station:
+        station.say_hello()
+        assert station.wait_for("HEARTBEAT").autopilot == mavlink_1.MAV_AUTOPILOT_ARDUPILOTMEGA
+        assert station.upload(plan) is MissionResult.ACCEPTED
+        assert station.download() == expected_fields(plan)
+        assert station.clear() is MissionResult.ACCEPTED
+        assert station.download() == []
+    assert shared.board.records() == []
+
+
+# -- several at once -----------------------------------------------------------------------------------------
+
+
+def test_a_second_one_is_refused_while_the_first_one_writes(shared: Bench) -> None:
+    first = shared.mission_planner()
+    plan = plain_plan(30, start=60)
+    first.write_begun(plan, 10)
+    with udp_station(shared.daemon.address) as second:
+        assert second.upload(plain_plan(12)) is MissionResult.DENIED
+        assert second.clear() is MissionResult.DENIED
+        first.go_on(plan, 10)
+        assert shared.board.records() == records_of(judge(plan))
+        assert set(first.acks()) == {MissionResult.ACCEPTED}
+        assert second.upload(plain_plan(12)) is MissionResult.ACCEPTED
+    assert "Another mission transfer is running" in first.said()
+
+
+def test_items_from_another_one_get_into_no_list(shared: Bench) -> None:
+    first = shared.mission_planner()
+    plan, other = plain_plan(30, start=60), plain_plan(30, start=160)
+    first.write_begun(plan, 10)
+    with udp_station(shared.daemon.address) as second:
+        for seq in range(len(other)):
+            second.give(other, seq)
+    first.go_on(plan, 10)
+    assert shared.board.records() == records_of(judge(plan))
+
+
+def test_a_reader_gets_one_list_whatever_is_written_meanwhile(shared: Bench) -> None:
+    old, new = plain_plan(30, start=60), plain_plan(30, start=160)
+    writer = shared.mission_planner()
+    writer.write(old)
+    reader = shared.mission_planner()
+    reader.request_version()
+    count = reader.read_count()
+    first_half = [reader.read_item(seq) for seq in range(count // 2)]
+    writer.write(new)
+    items = first_half + [reader.read_item(seq) for seq in range(count // 2, count)]
+    assert [(item.x, item.y) for item in items] == [(item.lat_e7, item.lon_e7) for item in judge(old).items]
+    assert [item.x for item in reader.read()] == [item.lat_e7 for item in judge(new).items]
+
+
+def test_everyone_is_told_what_becomes_of_the_mission(shared: Bench) -> None:
+    writer, other = shared.mission_planner(), shared.mission_planner()
+    writer.write(plain_plan(13, start=60))
+    other.wait_for_text("Mission verified: 13 records")
+    other.look_around(1.5)
+    assert other.heard_of("MISSION_CURRENT")[-1].total == 12
