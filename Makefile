@@ -22,6 +22,7 @@ demo: $(VENV)/.demo-ready
 
 test: $(VENV)/.test-ready
 	$(BIN)/python -m pytest $(ARGS)
+	$(if $(ARGS),,$(MAKE) -C firmware test)
 
 lint: $(VENV)/.test-ready
 	$(BIN)/ruff check

@@ -48,7 +48,7 @@
 #define NM_RECORD_SIZE 16u
 #define NM_CAPACITY 146u       /* records in a list: what Harakiri's FloppyDisk holds */
 #define NM_CHUNK_RECORDS 15u   /* most records in one CHUNK */
-#define NM_CHUNK_WINDOW 2u     /* CHUNKs that may be unanswered at once: both fit the 256 byte receive ring while one is programmed */
+#define NM_CHUNK_WINDOW 2u     /* CHUNKs that may be unanswered: while one is programmed (9 ms), 104 of the ring's 256 bytes come in */
 #define NM_READ_RECORDS 6u     /* most records in one READ: two replies fit the 255 bytes of the transmit ring */
 #define NM_BYTE_TIMEOUT_MS 50u /* the receiver's inter-byte time-out (INFO reports it, the receiver around the core keeps it) */
 #define NM_IDLE_TIMEOUT_MS 5000u
