@@ -7,7 +7,8 @@ from bridge.mission_check import RuleProfile
 from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from bridge.procedure import LinkLost, Procedure, ask, pause, receive, send
 from protocols.msp import mission as ext
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Status
+from protocols.msp.frame import MspFrame
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Status, Stored
 from protocols.wp_record import RECORD_SIZE, ListIdentity, WpRecord, identify
 
 _SHORT_REPLY_SIZE = 7
@@ -56,6 +57,7 @@ class HarakiriMissions:
     def __init__(self, info: Info, takeoff_max_m: int) -> None:
         self.info = info
         self._takeoff_max_m = takeoff_max_m
+        self._may_be_stored = False  # the present push has sent COMMIT
 
     @property
     def wp_radius_cm(self) -> int:
@@ -81,10 +83,9 @@ class HarakiriMissions:
         """Put the list there: BEGIN, CHUNKs in a window, COMMIT; proven by the checksum over the flash."""
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER
-        committing = False
         try:
             for _ in range(_MAX_BEGINS):
-                committing = False
+                self._may_be_stored = False
                 try:
                     begun = yield from self._begin(wanted)
                     if begun.status is Status.SAME:
@@ -92,9 +93,7 @@ class HarakiriMissions:
                         if unchanged:
                             return PushResult(None, unchanged=True)
                         continue
-                    yield from self._send_chunks(records, begun, progress)
-                    committing = True
-                    yield from self._commit(wanted)
+                    yield from self._transfer(records, begun, progress)
                     return PushResult(None)
                 except _Retry as retry:
                     failure = retry.failure
@@ -103,7 +102,7 @@ class HarakiriMissions:
             failure = end.failure
         except LinkLost:
             failure = PushFailure.NO_ANSWER
-        if committing and failure is PushFailure.NO_ANSWER:
+        if self._may_be_stored and failure is PushFailure.NO_ANSWER:
             failure = PushFailure.UNCERTAIN
         return PushResult(failure)
 
@@ -154,57 +153,56 @@ class HarakiriMissions:
                 raise _error(answer.status)
             return answer
 
-    def _send_chunks(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Procedure[None]:
-        """Keep the window full; after a loss go back to the first record that the flight controller lacks."""
+    def _transfer(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Procedure[None]:
+        """Keep the window full and send COMMIT right behind the last chunk: the line never waits for an answer.
+
+        After a loss go back to the first record that the flight controller lacks. To a COMMIT that comes before the
+        lost chunk does it answers INCOMPLETE.
+        """
+        wanted = identify(records)
         total = len(records)
-        acked = self._confirmed(records, begun)
-        sent = acked
-        in_flight: list[int] = []  # first record of each unanswered chunk
+        acked = sent = self._confirmed(records, begun)
+        in_flight = 0  # unanswered chunks
+        committing = False
         most = self.info.chunk_records
         silence = 0
-        while acked < total:
-            while sent < total and len(in_flight) < self.info.chunk_window:
+        while True:
+            while sent < total and in_flight < self.info.chunk_window:
                 chunk = ext.encode_chunk(records, sent, most)
                 yield from send(chunk.frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
-                in_flight.append(sent)
+                in_flight += 1
                 sent += chunk.count
-            reply = yield from receive(MissionCommand.CHUNK)
-            answer = None if reply is None else ext.decode_progress(reply.payload)
-            if answer is None:
-                silence += 1
-                if silence > _MAX_SILENCE:
-                    raise _GiveUp(PushFailure.NO_ANSWER)
-                in_flight.clear()
-                sent = acked
-                # A line that loses frames loses long ones most.
-                most = max(most // 2, 1)
-                continue
-            silence = 0
-            if in_flight:
-                in_flight.pop(0)
-            if answer.status not in (Status.OK, Status.SEQUENCE):
-                raise _error(answer.status)
-            confirmed = self._confirmed(records, answer)
-            if confirmed > acked:
-                acked = confirmed
-                progress(acked)
-            if answer.status is Status.SEQUENCE:
-                # A chunk before this one was lost: go back to it without waiting for its time-out.
-                in_flight.clear()
-                sent = acked
-                most = max(most // 2, 1)
-
-    def _commit(self, wanted: ListIdentity) -> Procedure[None]:
-        reply = yield from ask(ext.encode_commit(wanted), MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=True)
-        answer = None if reply is None else ext.decode_stored(reply.payload)
-        if answer is None:
-            raise _GiveUp(PushFailure.NO_ANSWER)
-        if answer.status is Status.INCOMPLETE:
-            raise _Retry(PushFailure.NO_ANSWER)
-        if answer.status is not Status.OK:
-            raise _error(answer.status)
-        if answer.stored != wanted:
-            raise _Retry(PushFailure.FLASH)
+            if sent == total and not committing:
+                # As long as a chunk may have to be repeated, COMMIT must not keep the line to itself.
+                frame = ext.encode_commit(wanted)
+                yield from send(frame, MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=acked == total)
+                committing = self._may_be_stored = True
+            reply = yield from receive(MissionCommand.CHUNK, MissionCommand.COMMIT)
+            answer = None if reply is None else _decode_answer(reply)
+            silence = silence + 1 if answer is None else 0
+            if silence > _MAX_SILENCE:
+                raise _GiveUp(PushFailure.NO_ANSWER)
+            if isinstance(answer, Progress):
+                in_flight = max(in_flight - 1, 0)
+                if answer.status not in (Status.OK, Status.SEQUENCE):
+                    raise _error(answer.status)
+                confirmed = self._confirmed(records, answer)
+                if confirmed > acked:
+                    acked = confirmed
+                    progress(acked)
+                if answer.status is Status.OK:
+                    continue
+            elif isinstance(answer, Stored) and answer.status is not Status.INCOMPLETE:
+                if answer.status is not Status.OK:
+                    raise _error(answer.status)
+                if answer.stored != wanted:
+                    raise _Retry(PushFailure.FLASH)
+                return
+            # Something was lost. A line that loses frames loses long ones most.
+            in_flight = 0
+            sent = acked
+            committing = False
+            most = max(most // 2, 1)
 
     def _is_stored(self, records: Sequence[WpRecord]) -> Procedure[bool]:
         """Compare record by record: "the same list" is a claim by checksum only."""
@@ -248,6 +246,12 @@ class HarakiriMissions:
         if answer.next > len(records) or identify(records[: answer.next]).checksum != answer.checksum:
             raise _Retry(PushFailure.NO_ANSWER)
         return answer.next
+
+
+def _decode_answer(reply: MspFrame) -> Progress | Stored | None:
+    """Read the reply to a CHUNK or COMMIT."""
+    decode = ext.decode_stored if reply.command == MissionCommand.COMMIT else ext.decode_progress
+    return decode(reply.payload)
 
 
 def _error(status: Status) -> _Retry | _GiveUp:
