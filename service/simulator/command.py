@@ -14,7 +14,7 @@ from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
 from service.simulator.pty_link import PtyLink
 
-_BAUD = click.Choice(["9600", "19200", "38400", "57600", "115200"])
+_BAUD = click.Choice(["1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200"])
 _RATE = click.FloatRange(0, 1)
 _PERIOD = click.FloatRange(0)
 _PATH = click.Path(path_type=Path)
@@ -78,6 +78,7 @@ async def _run(
 @click.option("--bit-errors", type=_RATE, default=0.0, help="Probability that a bit is flipped.")
 @click.option("--lost-bytes", type=_RATE, default=0.0, help="Probability that a byte is lost.")
 @click.option("--flash-stall", type=_PERIOD, default=100.0, show_default=True, help="Time to erase a slot, ms.")
+@click.option("--program-stall", type=_PERIOD, default=0.45, show_default=True, help="Time to program a record, ms.")
 @click.option("--capacity", type=click.IntRange(2, 1000), default=146, show_default=True, help="Records that fit.")
 @click.option(
     "--wp-radius-cm", type=click.IntRange(0, 2000), default=200, show_default=True, help="gps_wp_radius, if blank."
@@ -96,6 +97,7 @@ def sim(
     bit_errors: float,
     lost_bytes: float,
     flash_stall: float,
+    program_stall: float,
     capacity: int,
     wp_radius_cm: int,
     seed: int,
@@ -112,6 +114,7 @@ def sim(
         capacity=capacity,
         wp_radius_cm=wp_radius_cm,
         flash_erase_ms=flash_stall,
+        record_program_ms=program_stall,
     )
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
     memory = _open_flash(state, flash_size(options)) if state else None
