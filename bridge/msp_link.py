@@ -26,11 +26,16 @@ _FIRST_GUESS_S = 0.03
 #: After so long without a byte nothing more comes of a frame that has begun.
 _LINE_SILENCE_S = 0.05
 
+_REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: 4 + FRAME_OVERHEAD}
 #: Fills a parser that waits for the rest of a cut frame (64 payload bytes and a checksum on an unpatched Harakiri),
-#: with whole harmless frames. Their replies, should all be understood, fit the send ring: 11 * 13 = 143 bytes.
-_RESYNC_REQUESTS = 11
-RESYNC = request(Msp.IDENT) * _RESYNC_REQUESTS
-_IDENT_REPLY_SIZE = 7 + FRAME_OVERHEAD
+#: with whole harmless frames. Their order has no period: eleven times the same, read by a receiver at a twelfth of the
+#: speed, can come out as three '#' in a row (tests/bridge/test_probe_at_wrong_speed.py).
+_RESYNC_COMMANDS = (
+    *(Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT, Msp.FC_VARIANT, Msp.IDENT, Msp.IDENT),
+    *(Msp.IDENT, Msp.IDENT, Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT),
+)
+RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
+_RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, 3 + FRAME_OVERHEAD)
 
@@ -149,7 +154,7 @@ class MspLink:
         return not self._sent or self.outstanding_bytes + reply_size <= MAX_OUTSTANDING_BYTES
 
     def _flush(self, now: float) -> None:
-        if self._resync_due and not self._is_exclusive() and self._has_room(_RESYNC_REQUESTS * _IDENT_REPLY_SIZE):
+        if self._resync_due and not self._is_exclusive() and self._has_room(_RESYNC_REPLY_SIZE):
             self._resync(now)
         while self._waiting:
             message = self._waiting[0]
@@ -175,11 +180,11 @@ class MspLink:
     def _resync(self, now: float) -> None:
         self._resync_due = False
         self._write(RESYNC, now)
-        reply_time = (self.outstanding_bytes + _RESYNC_REQUESTS * _IDENT_REPLY_SIZE) * self._byte_s
+        reply_time = (self.outstanding_bytes + _RESYNC_REPLY_SIZE) * self._byte_s
         deadline = self._line_free_at + reply_time + MIN_TIMEOUT_S
         self._sent += [
-            _Request(Msp.IDENT, _IDENT_REPLY_SIZE, self._line_free_at, deadline, exclusive=True)
-            for _ in range(_RESYNC_REQUESTS)
+            _Request(command, _REPLY_SIZES[command], self._line_free_at, deadline, exclusive=True)
+            for command in _RESYNC_COMMANDS
         ]
 
     def _write(self, data: bytes, now: float) -> None:
