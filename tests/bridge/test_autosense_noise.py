@@ -1,0 +1,102 @@
+"""Noise is never taken for a flight controller, also where it is made of the very bytes that frames begin with.
+
+What is left to chance, by calculation: an MSP verdict on uniform noise needs two equal answers to IDENT, the shortest
+of which is six given bytes: 2^-48 at each byte, and that again within half a second. A MAVLink verdict needs a heartbeat
+whose magic, length, message number, CRC, version, type, autopilot and state all fit (2^-59 at each byte), or two frames
+of known messages from one sender with sequence numbers that follow (2^-48 for each pair of places).
+"""
+
+import random
+
+import pytest
+
+from bridge.autosense import SPEEDS, Autosense, Phase
+from protocols.mavlink.dialect import messages
+from protocols.msp.frame import Direction, MspFrame, request
+
+MEGABYTE = 1 << 20
+UNIFORM = bytes(range(256))
+#: Every alphabet's bytes are drawn with equal chances; what stands in it often is likely.
+ALPHABETS = {
+    "uniform": UNIFORM,
+    "half MSP preambles": UNIFORM + b"$M>" * 64 + b"$M!" * 21,
+    "half MAVLink 1 magics": UNIFORM + b"\xfe" * 256,
+    "half MAVLink 2 magics": UNIFORM + b"\xfd" * 256,
+    "all that begins a frame": UNIFORM + b"$M><!\xfe\xfd\x00\x64" * 28,
+    "letters": b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ$>!<\r\n 0123456789",
+    "two values": b"\x00\xff",
+}
+
+
+def listen(noise: bytes, search: Autosense, chunk: int) -> set[int | None]:
+    """Let a search read noise at line rate; return the speeds that it visited."""
+    now = 0.0
+    visited = set()
+    for start in range(0, len(noise), chunk):
+        visited.add(search.speed)
+        now += chunk * 10 / (search.speed or 115200)
+        search.receive(noise[start : start + chunk], now)
+        search.tick(now)
+        search.take_output()
+        assert search.found is None, (start, search.found)
+    return visited
+
+
+@pytest.mark.parametrize("name", ALPHABETS)
+def test_megabytes_of_noise_yield_no_verdict(name: str) -> None:
+    draw = random.Random(name)
+    noise = bytes(draw.choices(ALPHABETS[name], k=MEGABYTE))
+    visited = listen(noise, Autosense(SPEEDS, None, 0.0), 96)
+    assert visited == set(SPEEDS)
+    # All of it at the speed at which frames come fastest.
+    listen(noise[MEGABYTE // 2 :], Autosense((115200,), 115200, 0.0), 512)
+
+
+@pytest.mark.parametrize("preamble", [b"$M>", b"$M!", b"$M<", b"\xfe", b"\xfd", b"\xfe\x09", b"\xfd\x09\x00"])
+def test_noise_in_which_every_few_bytes_begin_a_frame_yields_no_verdict(preamble: bytes) -> None:
+    draw = random.Random(preamble)
+    noise = b"".join(preamble + draw.randbytes(draw.randrange(1, 14)) for _ in range(60_000))
+    listen(noise, Autosense(SPEEDS, None, 0.0), 200)
+
+
+def test_mavlink_that_lost_its_bytes_and_msp_of_others_yield_no_verdict() -> None:
+    """Frames with one damaged byte each, and whole requests of another companion on the same wire."""
+    draw = random.Random(1)
+    mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)
+    noise = bytearray()
+    for number in range(3000):
+        mavlink.seq = number % 256
+        heartbeat = bytearray(messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3).pack(mavlink))
+        heartbeat[draw.randrange(len(heartbeat))] ^= 1 << draw.randrange(8)
+        answer = bytearray(MspFrame(Direction.REPLY, 100, bytes((211, 3, 0, 0, 0, 0, 128))).encode())
+        answer[draw.randrange(3, len(answer))] ^= 1 << draw.randrange(8)
+        noise += heartbeat + answer + request(draw.choice((100, 101, 116)))
+    listen(bytes(noise), Autosense(SPEEDS, None, 0.0), 200)
+
+
+def test_one_answer_alone_is_no_evidence() -> None:
+    search = Autosense((115200,), None, 0.0)
+    now, visits = 0.0, 0
+    for number in range(500):
+        now = search.next_deadline() or now
+        if search.phase is Phase.LISTEN:
+            visits += 1
+        # A different answer each time.
+        answer = MspFrame(Direction.REPLY, 100, bytes((211, 3, 0, number % 256, number // 256, 0, 128)))
+        search.receive(answer.encode(), now)
+        search.tick(now)
+    assert search.found is None
+    assert visits > 0
+
+
+def test_a_heartbeat_must_be_plausible_in_every_field() -> None:
+    mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)
+    good = (2, 3, 81, 0, 3, 3)
+    odd = [(250, 3, 81, 0, 3, 3), (2, 99, 81, 0, 3, 3), (2, 3, 81, 0, 77, 3), (2, 3, 81, 0, 3, 2)]
+    for fields, found in [(good, True), *((fields, False) for fields in odd)]:
+        search = Autosense((115200,), None, 0.0)
+        frame = bytes(messages.MAVLink_heartbeat_message(*fields).pack(mavlink))
+        search.receive(frame, 0.0)
+        for _ in range(6):
+            search.tick(search.next_deadline() or 0.0)
+        assert (search.found is not None) is found
