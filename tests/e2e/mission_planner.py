@@ -10,11 +10,11 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
 from plan import PlanRow
+from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
@@ -37,14 +37,6 @@ class UploadFailed(Exception):
 
 class TimedOut(UploadFailed):
     """It gave up waiting."""
-
-
-@dataclass(frozen=True)
-class Traffic:
-    """A message and when it came, seconds."""
-
-    at: float
-    message: Message
 
 
 class MissionPlanner:
@@ -84,7 +76,7 @@ class MissionPlanner:
         self.texts: list[str] = []
         self.armed = False
         #: Everything that came, whether one of its loops was waiting for it or not.
-        self.heard: list[Traffic] = []
+        self.heard: list[Message] = []
         self.unacked_commands: list[int] = []
         # What "Write Fast" looks at; no loop can eat it.
         self._requested, self._answer = 0, MissionResult.ACCEPTED
@@ -140,13 +132,13 @@ class MissionPlanner:
             return True
         self._peer = sender
         for message in self._codec.parse_buffer(data) or []:
-            if message.get_type() != "BAD_DATA":
+            if message.get_type() != "BAD_DATA" and _has_the_right_size(message):
                 self._note(message)
         return True
 
     def _note(self, message: Message) -> None:
         """What every packet does on its way, whichever loop gets it."""
-        self.heard.append(Traffic(time.monotonic(), message))
+        self.heard.append(message)
         self._sees_mavlink_2 |= message.get_msgbuf()[0] == 0xFD
         match message.get_type():
             case "HEARTBEAT":
@@ -220,7 +212,8 @@ class MissionPlanner:
         system, component = self._target
         for _ in range(2):
             self.send(m.MAVLink_statustext_message(6, b"Mission Planner"))
-        self._send_signed(m.MAVLink_statustext_message(6, b"Mission Planner"))
+        if not self._mavlink_1_only:
+            self._send_signed(m.MAVLink_statustext_message(6, b"Mission Planner"))
         for stream, rate in (*_STREAMS, *_STREAMS):
             self.send(m.MAVLink_request_data_stream_message(system, component, stream, rate, 1))
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 148)
@@ -452,8 +445,20 @@ class MissionPlanner:
 
     def heard_of(self, kind: str) -> list[Any]:
         """Return all messages of one type that came, eaten ones included."""
-        return [traffic.message for traffic in self.heard if traffic.message.get_type() == kind]
+        return [message for message in self.heard if message.get_type() == kind]
+
+    def heard_in(self, version: int) -> list[Any]:
+        """Return all messages that came in one version of MAVLink."""
+        magic = 0xFD if version == 2 else 0xFE
+        return [message for message in self.heard if message.get_msgbuf()[0] == magic]
 
     def acks(self) -> list[MissionResult]:
         """Return the results of all MISSION_ACKs that came."""
         return [MissionResult(message.type) for message in self.heard_of("MISSION_ACK")]
+
+
+def _has_the_right_size(message: Message) -> bool:
+    """MAVLink 1 frames of another size than the table's are dropped; MAVLink 2 may be cut or extended."""
+    frame = message.get_msgbuf()
+    known = mavlink_1.mavlink_map.get(message.get_msgId())
+    return frame[0] == 0xFD or known is None or frame[1] == known.unpacker.size

@@ -1,5 +1,6 @@
 """A ground station that keeps to MAVLink's mission protocol, over any socket and with any of pymavlink's dialects."""
 
+import select
 import socket
 import time
 from collections.abc import Iterator, Sequence
@@ -22,10 +23,10 @@ class PlainStation:
     `heard` has what came but was not waited for, too.
     """
 
-    def __init__(self, connection: socket.socket, dialect: ModuleType | None = None) -> None:
+    def __init__(self, connection: socket.socket, dialect: ModuleType | None = None, sysid: int = SYSID) -> None:
         self._socket = connection
         self._dialect: Any = dialect or v20
-        self._codec = self._dialect.MAVLink(None, srcSystem=SYSID, srcComponent=COMPID)
+        self._codec = self._dialect.MAVLink(None, srcSystem=sysid, srcComponent=COMPID)
         self._codec.robust_parsing = True
         self.heard: list[Any] = []
 
@@ -42,6 +43,10 @@ class PlainStation:
 
     def say_hello(self) -> None:
         self.send(self._dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+
+    def has_data(self) -> bool:
+        """Tell whether anything came that was not read yet."""
+        return bool(select.select([self._socket], [], [], 0)[0])
 
     def wait_for(self, *kinds: str) -> Any:
         """Return the next message of one of these types."""
@@ -99,11 +104,11 @@ class PlainStation:
                     yield message
 
 
-def udp_station(address: tuple[str, int], dialect: ModuleType | None = None) -> PlainStation:
+def udp_station(address: tuple[str, int], dialect: ModuleType | None = None, sysid: int = SYSID) -> PlainStation:
     """A station that speaks to a daemon's udpin."""
     connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     connection.connect(address)
-    return PlainStation(connection, dialect)
+    return PlainStation(connection, dialect, sysid)
 
 
 def tcp_station(port: int) -> PlainStation:

@@ -60,18 +60,28 @@ def test_the_vehicle_moves_on_its_map(shared: Bench) -> None:
     planner = shared.mission_planner()
     wanted = {"ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "SYS_STATUS", "MISSION_CURRENT"}
     planner.look_around(2.5)
-    assert wanted <= {traffic.message.get_type() for traffic in planner.heard}
+    assert wanted <= {message.get_type() for message in planner.heard}
 
 
 def test_it_speaks_mavlink_1_until_it_has_seen_mavlink_2(shared: Bench) -> None:
-    planner = shared.mission_planner(mavlink_1_only=True)
-    planner.look_around(1.2)
-    versions = {traffic.message.get_msgbuf()[0] for traffic in planner.heard}
-    assert versions == {0xFE, 0xFD}
-    plan = plain_plan(12)
+    planner = shared.mission_planner()
+    assert planner.heard_in(1)
+    assert planner.heard_in(2)
     planner.connect()
+    planner.heard.clear()
+    planner.look_around(1.2)
+    assert planner.heard_in(2)
+    assert not planner.heard_in(1)
+
+
+def test_an_old_one_that_never_takes_mavlink_2_up(shared: Bench) -> None:
+    planner = shared.mission_planner(mavlink_1_only=True)
+    planner.connect()
+    plan = mixed_plan(14)
     planner.write(plan)
     assert_reads(planner, plan)
+    kinds = {message.get_type() for message in planner.heard_in(2)}
+    assert kinds == {"HEARTBEAT"}
 
 
 # -- writing and reading -------------------------------------------------------------------------------------

@@ -1,0 +1,206 @@
+"""Noise, nonsense and strangers on the network and on the UART: nothing comes of them."""
+
+import os
+import random
+import select
+import socket
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from benches import Bench, Starter
+from mission_planner import MissionPlanner
+from plain_station import PlainStation, udp_station
+from plan import judge, plain_plan, records_of
+from programs import comes, free_port, until
+
+from protocols.mavlink.dialect import messages
+from protocols.msp.commands import Msp
+from protocols.msp.frame import request
+from protocols.msp.hazards import is_clean
+
+MEGABYTE = 1 << 20
+
+
+def nonsense(seed: int) -> Iterator[bytes]:
+    """Datagrams of noise, a megabyte in all; every other one begins like a MAVLink frame.
+
+    In one of ten megabytes, 16 bits of noise are the right checksum of the noise before them; none of those is used.
+    """
+    chance = random.Random(seed)
+    left = MEGABYTE
+    while left > 0:
+        data = chance.randbytes(chance.randint(1, 1400))
+        left -= len(data)
+        yield (chance.choice((b"\xfd", b"\xfe")) + data) if chance.random() < 0.5 else data
+
+
+def damaged_frames(seed: int, count: int) -> Iterator[bytes]:
+    """Mission messages for the daemon, each with one bit that is wrong."""
+    chance = random.Random(seed)
+    codec = messages.MAVLink(None, srcSystem=255, srcComponent=190)
+    originals = [
+        messages.MAVLink_mission_count_message(1, 1, 0, 0),
+        messages.MAVLink_mission_clear_all_message(1, 1, 0),
+        plain_plan(3)[2].int_message(1, 1, 2),
+        messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 900.0, 9),
+    ]
+    for _ in range(count):
+        frame = bytearray(chance.choice(originals).pack(codec, force_mavlink1=chance.random() < 0.5))
+        frame[chance.randrange(len(frame))] ^= 1 << chance.randrange(8)
+        yield bytes(frame)
+
+
+@pytest.fixture
+def kept(shared: Bench) -> list[str]:
+    """What the board holds before, and must hold afterwards."""
+    shared.mission_planner().write(plain_plan(12))
+    return shared.board.records()
+
+
+def test_a_megabyte_of_noise_on_udp(shared: Bench, kept: list[str]) -> None:
+    status = shared.daemon.status()
+    assert status is not None
+    before = status["ground_stations"]
+    planner = shared.mission_planner()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for number, data in enumerate((*nonsense(3), *damaged_frames(2, 2000))):
+            stranger.sendto(data, shared.daemon.address)
+            if number % 64 == 0:
+                # Each answer proves that the daemon has read what was sent before: nothing is dropped unread.
+                assert planner.command(messages.MAV_CMD_REQUEST_MESSAGE, 148) is not None
+    status = shared.daemon.status()
+    assert status is not None
+    assert len(status["ground_stations"]) == len(before) + 1
+    assert shared.board.records() == kept
+    plan = plain_plan(12, start=9)
+    planner.write(plan)
+    assert shared.board.records() == records_of(judge(plan))
+
+
+def test_a_megabyte_of_noise_from_a_tcp_client(start: Starter) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
+    with socket.create_connection(("127.0.0.1", port)) as stranger:
+        for data in nonsense(3):
+            stranger.sendall(data)
+        with PlainStation(socket.create_connection(("127.0.0.1", port))) as station:
+            assert station.upload(plain_plan(12)) == 0
+        # The one that made the noise can be understood as soon as it makes sense.
+        station = PlainStation(stranger)
+        assert station.upload(plain_plan(13)) == 0
+    assert bench.board.records() == records_of(judge(plain_plan(13)))
+
+
+# -- the UART ------------------------------------------------------------------------------------------------
+
+
+class NoisyWire:
+    """A pty whose far end is the test: `path` is what the daemon opens."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.heard = bytearray()
+        self._near, self._far = os.openpty()
+        tty.setraw(self._far)
+        os.set_blocking(self._near, False)
+        path.symlink_to(os.ttyname(self._far))
+
+    def say(self, data: bytes) -> None:
+        while data:
+            readable, writable, _ = select.select([self._near], [self._near], [])
+            if readable:
+                self.heard += os.read(self._near, 4096)
+            if writable:
+                data = data[os.write(self._near, data[:1024]) :]
+
+    def listen(self) -> bytearray:
+        while select.select([self._near], [], [], 0)[0]:
+            self.heard += os.read(self._near, 4096)
+        return self.heard
+
+    def unplug(self) -> None:
+        self.path.unlink()
+        os.close(self._far)
+        os.close(self._near)
+
+
+def test_a_megabyte_of_noise_on_the_uart(start: Starter) -> None:
+    wire = NoisyWire(start.directory / "naze")
+    daemon = start.daemon(str(wire.path))
+    daemon.wait("searching")
+    chance = random.Random(4)
+    with MissionPlanner(daemon.address) as planner:
+        for _ in range(MEGABYTE // 4096):
+            wire.say(chance.randbytes(4096))
+        planner.meet()
+        heartbeats = planner.heard_of("HEARTBEAT")
+    assert {heartbeat.system_status for heartbeat in heartbeats} == {messages.MAV_STATE_UNINIT}
+    status = daemon.status()
+    assert status is not None
+    assert (status["state"], status["flight_controller"]) == ("searching", None)
+    assert daemon.has_logged("fc.found") is None
+    # It asked, in whole harmless frames and in nothing else, and what was said to it changed nothing of that.
+    until(lambda: len(wire.listen()) > 100, "probes")
+    assert is_clean(bytes(wire.heard))
+    assert not bytes(wire.heard).replace(request(Msp.IDENT), b"")
+    # The same daemon finds the real one as soon as it is there.
+    wire.unplug()
+    board = start.board()
+    daemon.wait()
+    board.assert_was_treated_well()
+
+
+# -- strangers -----------------------------------------------------------------------------------------------
+
+
+def test_messages_for_others_change_nothing(shared: Bench, kept: list[str]) -> None:
+    m = messages
+    with udp_station(shared.daemon.address) as station:
+        station.say_hello()
+        for system, component in ((2, 1), (1, 100), (255, 190)):
+            station.send(m.MAVLink_mission_count_message(system, component, 0, 0))
+            station.send(m.MAVLink_mission_count_message(system, component, 12, 0))
+            station.send(plain_plan(3)[2].int_message(system, component, 0))
+            station.send(m.MAVLink_mission_clear_all_message(system, component, 0))
+            station.send(m.MAVLink_mission_request_list_message(system, component, 0))
+            station.send(m.MAVLink_param_set_message(system, component, b"WPNAV_RADIUS", 900.0, 9))
+            station.send(m.MAVLink_command_long_message(system, component, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+        # What answers the last, honest question has read all of the above.
+        station.send(m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
+        assert station.wait_for("PARAM_VALUE").param_value == 200
+        addressed = {"MISSION_ACK", "MISSION_REQUEST", "MISSION_COUNT", "COMMAND_ACK", "STATUSTEXT"}
+        assert not addressed & {message.get_type() for message in station.heard}
+    assert shared.board.records() == kept
+
+
+def test_a_vehicle_with_our_own_number_is_not_obeyed(shared: Bench, kept: list[str]) -> None:
+    """An echo of our own messages looks like this, too."""
+    with udp_station(shared.daemon.address, sysid=1) as echo, udp_station(shared.daemon.address) as station:
+        echo.say_hello()
+        echo.send(messages.MAVLink_mission_clear_all_message(1, 1, 0))
+        echo.announce(12)
+        station.say_hello()
+        station.wait_for("HEARTBEAT")
+        assert station.upload(plain_plan(12, start=30)) == 0
+        assert station.upload(plain_plan(12)) == 0
+        assert echo.heard == []
+        assert comes(echo.has_data, seconds=0.1) is False
+    assert shared.board.records() == kept
+
+
+def test_other_vehicles_on_the_net_disturb_nobody(shared: Bench) -> None:
+    """A second vehicle talks to the same port; its own mission traffic is none of ours."""
+    planner = shared.mission_planner()
+    with udp_station(shared.daemon.address, sysid=7) as vehicle:
+        m = messages
+        plan = plain_plan(30, start=60)
+        planner.write_begun(plan, 10)
+        vehicle.send(m.MAVLink_heartbeat_message(2, 3, 0x81, 0, 4, 3))
+        vehicle.send(m.MAVLink_mission_ack_message(255, 190, 5, 0))
+        vehicle.send(m.MAVLink_mission_request_message(255, 190, 3, 0))
+        vehicle.send(m.MAVLink_mission_count_message(255, 190, 44, 0))
+        planner.go_on(plan, 10)
+    assert shared.board.records() == records_of(judge(plan))
+    assert not planner.armed
