@@ -22,6 +22,7 @@ _MAX_BEGINS = 3
 #: Unanswered requests in a row after which the flight controller counts as gone.
 _MAX_SILENCE = 5
 
+#: What is told if this status ends the last attempt; those that are missing say nothing but "the line is bad".
 _FAILURES = {
     Status.ARMED: PushFailure.ARMED,
     Status.BUSY: PushFailure.BUSY,
@@ -31,8 +32,6 @@ _FAILURES = {
     Status.BAD_RECORD: PushFailure.REFUSED,
     Status.FLASH: PushFailure.FLASH,
 }
-#: Statuses after which the same list is begun again: the line or the board had a fault that may pass.
-_BEGIN_AGAIN = {Status.NO_TRANSFER, Status.CHECKSUM, Status.FLASH, Status.BAD_RECORD}
 
 
 class _Retry(Exception):
@@ -145,12 +144,14 @@ class HarakiriMissions:
             answer = None if reply is None else ext.decode_progress(reply.payload)
             if answer is None:
                 raise _GiveUp(PushFailure.NO_ANSWER)
-            if answer.status is Status.BUSY and waited_s < _BUSY_PATIENCE_S:
+            if answer.status is Status.BUSY:
+                if waited_s >= _BUSY_PATIENCE_S:
+                    raise _GiveUp(PushFailure.BUSY)
                 yield from pause(_BUSY_INTERVAL_S)
                 waited_s += _BUSY_INTERVAL_S
                 continue
             if answer.status not in (Status.OK, Status.SAME):
-                raise _error(answer.status)
+                raise _again(answer.status)
             return answer
 
     def _transfer(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Procedure[None]:
@@ -185,7 +186,7 @@ class HarakiriMissions:
             if isinstance(answer, Progress):
                 in_flight = max(in_flight - 1, 0)
                 if answer.status not in (Status.OK, Status.SEQUENCE):
-                    raise _error(answer.status)
+                    raise _again(answer.status)
                 confirmed = self._confirmed(records, answer)
                 if confirmed > acked:
                     acked = confirmed
@@ -194,7 +195,7 @@ class HarakiriMissions:
                     continue
             elif isinstance(answer, Stored) and answer.status is not Status.INCOMPLETE:
                 if answer.status is not Status.OK:
-                    raise _error(answer.status)
+                    raise _again(answer.status)
                 if answer.stored != wanted:
                     raise _Retry(PushFailure.FLASH)
                 return
@@ -254,6 +255,6 @@ def _decode_answer(reply: MspFrame) -> Progress | Stored | None:
     return decode(reply.payload)
 
 
-def _error(status: Status) -> _Retry | _GiveUp:
-    failure = _FAILURES.get(status, PushFailure.REFUSED)
-    return _Retry(failure) if status in _BEGIN_AGAIN else _GiveUp(failure)
+def _again(status: Status) -> _Retry:
+    """Ask again, whatever the refusal: on a bad line one in a hundred is a damaged reply that the XOR let pass."""
+    return _Retry(_FAILURES.get(status, PushFailure.NO_ANSWER))
