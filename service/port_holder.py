@@ -2,6 +2,7 @@
 
 import errno
 import os
+import termios
 from pathlib import Path
 
 _LOGIN_PROGRAMS = ("agetty", "getty", "login")
@@ -10,9 +11,10 @@ _LOGIN_PROGRAMS = ("agetty", "getty", "login")
 def explain_port_error(path: str, error: OSError) -> str:
     """Turn an error from opening `path` into one sentence: what, where, what to do."""
     code = error.errno
-    if code is None and isinstance(error.__cause__ or error.__context__, OSError):
-        cause = error.__cause__ or error.__context__
-        code = cause.errno if isinstance(cause, OSError) else None
+    cause = error.__cause__ or error.__context__
+    if code is None and isinstance(cause, OSError | termios.error):
+        # pyserial keeps the number to itself; termios.error has one, too, but is no OSError.
+        code = cause.args[0]
     if not Path(path).exists():
         return f"{path} is missing: plug the flight controller in, or name another port with --fc"
     if code in (errno.EACCES, errno.EPERM):
