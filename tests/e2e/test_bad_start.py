@@ -1,0 +1,187 @@
+"""What a person gets wrong when starting the daemon, and what the machine has wrong: one clear sentence each."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from plain_station import udp_station
+from plan import judge, plain_plan, records_of
+from programs import PATIENCE, free_port, run_naze_bridge, until
+
+UNKNOWN = {
+    "no such device name": (["--fc", "ttyUSB0"], "/dev/serial0"),
+    "no speed": (["--fc", "/dev/ttyUSB0,fast"], "no speed in baud"),
+    "tcp without a port": (["--fc", "tcp:naze.local"], "needs a host and a port"),
+    "no such link": (["--fc", "sim:", "--gcs", "serial:/dev/ttyS0"], "udpin:0.0.0.0:14550"),
+    "a port of words": (["--fc", "sim:", "--gcs", "udpin:0.0.0.0:mavlink"], "no port number"),
+    "a port out of range": (["--fc", "sim:", "--gcs", "udpout:10.0.0.1:70000"], "no port number"),
+    "no flight controller": ([], "--fc"),
+}
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_a_connection_that_cannot_be_understood(tmp_path: Path, name: str) -> None:
+    arguments, hint = UNKNOWN[name]
+    ended = run_naze_bridge("run", *arguments, "--state-dir", str(tmp_path))
+    assert ended.returncode == 2
+    sentence = ended.stderr.splitlines()[-1]
+    assert sentence.startswith("Error: ")
+    assert hint in sentence
+    assert "Traceback" not in ended.stderr
+
+
+def assert_refused(ended: subprocess.CompletedProcess[str], *parts: str) -> None:
+    assert ended.returncode == 1
+    (sentence,) = [line for line in ended.stderr.splitlines() if not line.startswith("{")]
+    assert sentence.startswith("naze-bridge: ")
+    for part in parts:
+        assert part in sentence
+
+
+def test_two_daemons_on_one_port(start: Starter, tmp_path: Path) -> None:
+    first = start.daemon("sim:")
+    first.wait_up()
+    link = f"udpin:127.0.0.1:{first.port}"
+    ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", str(tmp_path / "other"))
+    assert_refused(ended, link, "in use")
+    assert first.is_alive
+
+
+def test_two_daemons_on_one_state_directory(start: Starter) -> None:
+    first = start.daemon("sim:")
+    first.wait_up()
+    link = f"udpin:127.0.0.1:{free_port()}"
+    ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", str(first.state_dir))
+    assert_refused(ended, str(first.state_dir), "in use by process", "--state-dir")
+    # And the first one can still be asked.
+    first.wait()
+
+
+def test_a_state_directory_that_cannot_be(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("not a directory")
+    assert_refused(run_naze_bridge("run", "--fc", "sim:", "--state-dir", str(file / "state")), str(file))
+
+
+def test_the_plain_simulator_takes_a_mission(start: Starter) -> None:
+    """`--fc sim:`, as the README and `make demo` use it."""
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    with udp_station(daemon.address) as station:
+        station.say_hello()
+        assert station.upload(plain_plan(20)) == 0
+    assert daemon.held()["records"] == records_of(judge(plain_plan(20)))
+
+
+# -- the serial port -----------------------------------------------------------------------------------------
+
+
+def complaint(start: Starter, path: Path) -> str:
+    """What a daemon says of its port; it stays up."""
+    daemon = start.daemon(str(path))
+    event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
+    assert daemon.is_alive
+    why: str = event["why"]
+    return why
+
+
+@pytest.fixture
+def terminal() -> Iterator[Path]:
+    """A serial port with nothing at its other end."""
+    near, far = os.openpty()
+    tty.setraw(far)
+    path = Path(os.ttyname(far))
+    os.close(far)
+    yield path
+    os.close(near)
+
+
+def test_a_port_that_is_missing_is_taken_when_it_appears(start: Starter) -> None:
+    daemon = start.daemon(str(start.directory / "naze"))
+    event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
+    assert "is missing: plug the flight controller in" in event["why"]
+    with udp_station(daemon.address) as station:
+        # The vehicle is there for a ground station all the same, and says why it takes no mission.
+        station.say_hello()
+        assert station.upload(plain_plan(12)) == 14
+    board = start.board()
+    daemon.wait()
+    with udp_station(daemon.address) as station:
+        assert station.upload(plain_plan(12)) == 0
+    assert board.records() == records_of(judge(plain_plan(12)))
+    # It was told once, not four times a second.
+    assert len([event for event in daemon.events() if event["event"] == "fc.port_unavailable"]) == 1
+
+
+@pytest.mark.parametrize("path", ["/dev/null", __file__])
+def test_a_port_that_is_no_port(start: Starter, path: str) -> None:
+    assert "is no serial port" in complaint(start, Path(path))
+
+
+def test_a_port_that_another_program_has(start: Starter, terminal: Path) -> None:
+    script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", script, str(terminal)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "open\n"
+        why = complaint(start, terminal)
+        assert f"pid {other.pid}" in why
+        assert "busy" in why
+        other.kill()
+
+
+def test_a_port_that_a_login_console_has(start: Starter, terminal: Path) -> None:
+    with subprocess.Popen(
+        ["/sbin/agetty", "-c", "input()", terminal.name], executable=sys.executable, stdin=subprocess.PIPE
+    ) as console:
+        why = complaint(start, terminal)
+        assert "login console" in why
+        assert f"serial-getty@{terminal.name}.service" in why
+        console.kill()
+
+
+def test_a_tcp_flight_controller_that_is_not_there_yet(start: Starter) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    daemon = start.daemon(f"tcp:127.0.0.1:{port}")
+    event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
+    assert f"tcp:127.0.0.1:{port} cannot be reached" in event["why"]
+    with socket.create_server(("127.0.0.1", port)) as server:
+        server.settimeout(PATIENCE)
+        connection, _ = server.accept()
+        with connection:
+            connection.settimeout(PATIENCE)
+            assert connection.recv(100)
+    assert daemon.is_alive
+
+
+# -- the store -----------------------------------------------------------------------------------------------
+
+
+def test_a_corrupt_database_is_kept_aside(start: Starter) -> None:
+    state = start.directory / "state"
+    state.mkdir()
+    rubbish = bytes(range(256)) * 64
+    (state / "missions.db").write_bytes(rubbish)
+    daemon = start.daemon("sim:", state_dir=state)
+    daemon.wait()
+    event = until(lambda: daemon.has_logged("store.damaged"), "a word about the database")
+    assert Path(event["kept_as"]).read_bytes() == rubbish
+    with udp_station(daemon.address) as station:
+        station.say_hello()
+        assert station.upload(plain_plan(12)) == 0
+    assert [mission["outcome"] for mission in daemon.missions()] == ["VERIFIED"]
+
+
+def test_the_log_is_one_object_a_line(start: Starter) -> None:
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    lines = daemon.printed.splitlines()
+    assert [json.loads(line)["event"] for line in lines].count("fc.found") == 1
