@@ -1,0 +1,202 @@
+"""The flight controller loses power, hangs, garbles, is unplugged, or is another one than hoped; the daemon is killed.
+
+The pilot is told in time, the list that was there is whole, and a second try works.
+"""
+
+from collections.abc import Callable
+
+import pytest
+from benches import Bench, Starter
+from mission_planner import MissionPlanner, UploadFailed
+from plain_station import udp_station
+from plan import judge, plain_plan, records_of
+from programs import until
+
+from protocols.mission_item import MissionResult
+
+OLD, NEW = plain_plan(40), plain_plan(146, start=40)
+
+
+@pytest.fixture
+def planner(bench: Bench) -> MissionPlanner:
+    """With its own timers: a refusal that comes too late for them is a time-out, which is another error."""
+    planner = bench.mission_planner(pace=1.0)
+    planner.write(OLD)
+    return planner
+
+
+def assert_denied(act: Callable[[], None]) -> None:
+    """Assert that the user is told, and before Mission Planner has given up waiting."""
+    with pytest.raises(UploadFailed) as refused:
+        act()
+    assert refused.value.result is MissionResult.DENIED, refused.value
+
+
+def assert_old_list(bench: Bench) -> None:
+    assert bench.board.records() == records_of(judge(OLD))
+    assert bench.daemon.held()["records"] == records_of(judge(OLD))
+
+
+def assert_retry_works(bench: Bench, planner: MissionPlanner) -> None:
+    bench.daemon.wait()
+    planner.write(NEW)
+    assert bench.board.records() == records_of(judge(NEW))
+    assert bench.daemon.missions()[0]["outcome"] == "VERIFIED"
+
+
+# OLD took 3 erased pages, 40 records and 1 header; NEW erases again, and writes its records from operation 48 on.
+@pytest.mark.parametrize("operation", [46, 150])
+def test_a_power_cut_while_it_is_written(bench: Bench, planner: MissionPlanner, operation: int) -> None:
+    bench.board.set(f"power_cut_at_flash_operation {operation}")
+    assert_denied(lambda: planner.write(NEW))
+    assert bench.board.stats()["power"] == "OFF"
+    assert bench.daemon.missions()[0]["outcome"] == "FAILED"
+    bench.board.set("power_cut_at_flash_operation 0")
+    bench.board.set("power on")
+    bench.daemon.wait()
+    assert_old_list(bench)
+    assert_retry_works(bench, planner)
+
+
+def test_a_hang_while_items_come_in(bench: Bench, planner: MissionPlanner) -> None:
+    planner.write_begun(NEW, 20)
+    bench.board.set("hang 1")
+    assert_denied(lambda: planner.go_on(NEW, 20))
+    bench.board.set("hang 0")
+    bench.daemon.wait()
+    assert_old_list(bench)
+    assert_retry_works(bench, planner)
+
+
+def test_flash_that_fails(bench: Bench, planner: MissionPlanner) -> None:
+    bench.board.set("flash_failures 1000")
+    assert_denied(lambda: planner.write(NEW))
+    planner.wait_for_text("could not write its flash")
+    bench.board.set("flash_failures 0")
+    assert_old_list(bench)
+    assert_retry_works(bench, planner)
+
+
+@pytest.mark.parametrize("fault", ["bit_error_rate 0.0001", "lost_byte_rate 0.0005"])
+def test_a_line_that_damages_some_frames_delays_and_does_no_more(
+    bench: Bench, planner: MissionPlanner, fault: str
+) -> None:
+    bench.board.set(fault)
+    planner.write(NEW)
+    assert bench.board.records() == records_of(judge(NEW))
+
+
+def test_a_line_that_damages_most_frames(bench: Bench, planner: MissionPlanner) -> None:
+    bench.board.set("bit_error_rate 0.004")
+    denied = False
+    try:
+        planner.write(NEW)
+    except UploadFailed as failed:
+        denied = failed.result is MissionResult.DENIED
+    bench.board.set("bit_error_rate 0")
+    assert bench.board.records() == records_of(judge(OLD if denied else NEW))
+    assert_retry_works(bench, planner)
+
+
+def test_unplugged_and_plugged_in_again(bench: Bench, planner: MissionPlanner) -> None:
+    planner.write_begun(NEW, 20)
+    bench.board.set("unplug")
+    assert_denied(lambda: planner.go_on(NEW, 20))
+    planner.wait_for_text("Flight controller lost")
+    assert_denied(lambda: planner.write(NEW))
+    planner.wait_for_text("No link to the flight controller")
+    bench.board.set("plug")
+    bench.daemon.wait()
+    assert_old_list(bench)
+    assert_retry_works(bench, planner)
+    lost = bench.daemon.has_logged("fc.port_lost")
+    assert lost is not None
+
+
+def test_another_list_is_there_after_the_board_was_changed(start: Starter) -> None:
+    """A copy on the companion answers only while its checksum is the board's."""
+    bench = start.bench()
+    with udp_station(bench.daemon.address) as station:
+        station.say_hello()
+        assert station.upload(OLD) is MissionResult.ACCEPTED
+        assert len(station.download()) == len(OLD)
+        bench.board.end()
+        board = start.board()
+        until(lambda: bench.daemon.has_logged("fc.port_lost"), "the loss of the port")
+        bench.daemon.wait()
+        assert board.records() == []
+        assert station.download() == []
+
+
+# -- other flight controllers --------------------------------------------------------------------------------
+
+
+def refusal_by(bench: Bench, reason: str) -> MissionResult | None:
+    planner = bench.mission_planner()
+    with pytest.raises(UploadFailed) as refused:
+        planner.write(plain_plan(12))
+    planner.wait_for_text(reason)
+    return refused.value.result
+
+
+def test_a_harakiri_without_the_mission_extension(start: Starter) -> None:
+    bench = start.bench("--no-extension")
+    assert refusal_by(bench, "lacks the mission patch") is MissionResult.UNSUPPORTED
+    found = bench.daemon.has_logged("fc.found")
+    assert found is not None
+    assert "Harakiri" in found["name"]
+    bench.board.assert_was_treated_well()
+
+
+def test_one_that_speaks_mavlink_while_it_is_armed(start: Starter) -> None:
+    board = start.board("--armed", "--tele-prot", "2")
+    daemon = start.daemon(str(board.link))
+    daemon.wait("MAVLink")
+    with MissionPlanner(daemon.address) as planner:
+        planner.meet()
+        planner.wait_for_armed(True)
+        assert_denied(lambda: planner.write(plain_plan(12)))
+        board.set("armed 0")
+        daemon.wait("MSP")
+        planner.wait_for_armed(False)
+        planner.write(plain_plan(12))
+    assert board.records() == records_of(judge(plain_plan(12)))
+    board.assert_was_treated_well()
+
+
+def test_a_speed_that_nobody_told(start: Starter) -> None:
+    bench = start.bench("--baud", "38400")
+    status = bench.daemon.status()
+    assert status is not None
+    assert status["speed_baud"] == 38400
+    bench.mission_planner().write(plain_plan(12))
+    assert bench.board.records() == records_of(judge(plain_plan(12)))
+    bench.board.assert_was_treated_well()
+
+
+# -- the daemon ----------------------------------------------------------------------------------------------
+
+
+def test_a_kill_right_behind_the_ack_loses_nothing(start: Starter) -> None:
+    bench = start.bench()
+    with udp_station(bench.daemon.address) as station:
+        station.say_hello()
+        for number in range(3):
+            plan = plain_plan(20 + number, start=number)
+            assert station.upload(plan) is MissionResult.ACCEPTED
+            bench.daemon.kill_and_restart()
+            bench.daemon.wait()
+            newest = bench.daemon.missions()[0]
+            assert (newest["outcome"], newest["item_count"]) == ("VERIFIED", len(plan))
+            assert len(bench.daemon.missions()) == number + 1
+            shown = bench.daemon.ask({"do": "mission", "number": newest["number"]})
+            assert shown["received"]["records"] == "".join(records_of(judge(plan)))
+            assert bench.board.records() == records_of(judge(plan))
+
+
+def test_a_kill_in_mid_upload_keeps_the_list_that_was_there(bench: Bench, planner: MissionPlanner) -> None:
+    planner.write_begun(NEW, 100)
+    bench.daemon.kill_and_restart()
+    bench.daemon.wait()
+    assert_old_list(bench)
+    assert_retry_works(bench, planner)
