@@ -56,7 +56,7 @@ class HarakiriMissions:
     def __init__(self, info: Info, takeoff_max_m: int) -> None:
         self.info = info
         self._takeoff_max_m = takeoff_max_m
-        self._may_be_stored = False  # the present push has sent COMMIT
+        self._may_be_stored = False  # COMMIT was sent, and nothing heard since that tells whether it was done
 
     @property
     def wp_radius_cm(self) -> int:
@@ -82,11 +82,12 @@ class HarakiriMissions:
         """Put the list there: BEGIN, CHUNKs in a window, COMMIT; proven by the checksum over the flash."""
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER
+        self._may_be_stored = False
         try:
             for _ in range(_MAX_BEGINS):
-                self._may_be_stored = False
                 try:
                     begun = yield from self._begin(wanted)
+                    self._may_be_stored = begun.status is Status.SAME
                     if begun.status is Status.SAME:
                         unchanged = yield from self._is_stored(records)
                         if unchanged:
@@ -101,8 +102,8 @@ class HarakiriMissions:
             failure = end.failure
         except LinkLost:
             failure = PushFailure.NO_ANSWER
-        if self._may_be_stored and failure is PushFailure.NO_ANSWER:
-            failure = PushFailure.UNCERTAIN
+        if self._may_be_stored:
+            return PushResult((yield from self._look_what_is_stored(wanted, failure)))
         return PushResult(failure)
 
     def pull(self) -> Procedure[tuple[WpRecord, ...] | None]:
@@ -205,6 +206,16 @@ class HarakiriMissions:
             committing = False
             most = max(most // 2, 1)
 
+    def _look_what_is_stored(self, wanted: ListIdentity, failure: PushFailure) -> Procedure[PushFailure | None]:
+        """Ask whether COMMIT was done after all; only silence leaves it uncertain."""
+        try:
+            info = yield from self._read_info()
+        except LinkLost:
+            info = None
+        if info is None:
+            return PushFailure.UNCERTAIN
+        return None if info.stored == wanted else failure
+
     def _is_stored(self, records: Sequence[WpRecord]) -> Procedure[bool]:
         """Compare record by record: "the same list" is a claim by checksum only."""
         held = yield from self.pull()
@@ -214,7 +225,7 @@ class HarakiriMissions:
         """Read all records, two requests in flight, each asked again until it is there."""
         step = min(info.read_records, _READ_RECORDS)
         total = info.stored.count
-        missing = list(range(0, total, step))
+        missing = range(0, total, step)
         parts: dict[int, Sequence[WpRecord]] = {}
         silence = 0
         in_flight = 0
@@ -238,7 +249,8 @@ class HarakiriMissions:
             if answer.status is not Status.OK:
                 return None
             silence = 0
-            if len(answer.records) == min(step, total - answer.first):
+            # Damage that the XOR let pass may show as another place.
+            if answer.first in missing and len(answer.records) == min(step, total - answer.first):
                 parts[answer.first] = answer.records
         return tuple(record for first in missing for record in parts[first])
 
