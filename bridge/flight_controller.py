@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from bridge.procedure import Procedure, ask
+from bridge.procedure import Procedure, ask_surely
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.mission import INFO_SIZE, Info, MissionCommand, decode_info
@@ -15,8 +15,6 @@ _HARAKIRI_CAPABILITY = 0x80000000
 _HARAKIRI_BOX = "GTUNE"
 _ARM_BOX = "ARM"
 _MAX_REPLY_PAYLOAD = 200
-#: How often a question is asked for two answers that are equal.
-_MAX_ASKS = 5
 
 
 class Kind(Enum):
@@ -73,16 +71,8 @@ def _identify() -> Procedure[FlightController]:
 
 
 def _question(command: int, reply_payload: int) -> Procedure[MspFrame]:
-    """Ask until two answers in a row are equal: a checksum of 8 bits lets some damage through, of long answers most.
-
-    An error frame is an answer too: it says that the command is not known.
-    """
-    before: MspFrame | None = None
-    for _ in range(_MAX_ASKS):
-        reply = yield from ask(request(command), command, reply_payload)
-        if reply is None:
-            break
-        if reply == before:
-            return reply
-        before = reply
-    raise _Silence
+    """Ask, and take an error frame for an answer too: it says that the command is not known."""
+    reply = yield from ask_surely(request(command), command, reply_payload)
+    if reply is None:
+        raise _Silence
+    return reply

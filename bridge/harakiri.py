@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from bridge.mission_check import RuleProfile
 from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from bridge.procedure import LinkLost, Procedure, ask, pause, receive, send
+from bridge.procedure import LinkLost, Procedure, ask, ask_surely, pause, receive, send
 from protocols.msp import mission as ext
 from protocols.msp.frame import MspFrame
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Status, Stored
@@ -135,7 +135,8 @@ class HarakiriMissions:
         return answer.wp_radius_cm
 
     def _read_info(self) -> Procedure[Info | None]:
-        reply = yield from ask(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
+        # Of the radius in it every waypoint gets its own, and its checksum tells what is stored.
+        reply = yield from ask_surely(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
         return None if reply is None else ext.decode_info(reply.payload)
 
     def _begin(self, wanted: ListIdentity) -> Procedure[Progress]:
