@@ -87,7 +87,10 @@ class Air:
 
 
 class World:
-    """The board has power and has booted at time 0, and the port opens then, unless told otherwise."""
+    """The board has power and has booted at time 0, and the port opens then, unless told otherwise.
+
+    `flash`: what its flash holds. `peer`: what is on the line instead of a simulated Naze (fake_controllers).
+    """
 
     def __init__(
         self,
@@ -98,13 +101,15 @@ class World:
         seed: int = 0,
         powered: bool = True,
         plugged: bool = True,
+        flash: bytes | None = None,
         peer: Any = None,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
         self.faults = faults or Faults()
-        #: Another flight controller than the simulated Naze may be on the line: see `FakeController`.
-        self.naze: Any = peer or SimulatedNaze(options, self.faults)
+        self.naze: Any = peer or SimulatedNaze(
+            options, self.faults, None if flash is None else memoryview(bytearray(flash))
+        )
         self.store = MemoryStore()
         self.journal: list[Event] = []
         self.stations: dict[Peer, GroundStation] = {}
