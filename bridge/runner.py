@@ -71,11 +71,17 @@ class Runner:
         return self._deadline
 
     def _begin_next(self, now: float) -> None:
-        if self._current is None and self._queue and not self._busy:
+        """Run what is queued; a loop, because all of it may end at once when there is no link."""
+        while self._current is None and self._queue and not self._busy:
             self._current = self._queue.popleft()
-            self._advance(None, now)
+            self._run(None, now)
 
     def _advance(self, answer: object, now: float) -> None:
+        """Go on with the current procedure, and with the next ones when it ends."""
+        self._run(answer, now)
+        self._begin_next(now)
+
+    def _run(self, answer: object, now: float) -> None:
         """Run the current procedure up to its next wait."""
         assert self._current is not None
         procedure, on_done = self._current
@@ -112,4 +118,3 @@ class Runner:
         self._busy = True
         on_done(result, now)
         self._busy = False
-        self._begin_next(now)
