@@ -1,7 +1,6 @@
 """Harakiri with the mission extension: docs/msp-mission.md, the companion's side."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from bridge.mission_check import RuleProfile
 from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
@@ -119,7 +118,7 @@ class HarakiriMissions:
         return None
 
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
-        """Set gps_wp_radius, 0..2000 cm."""
+        """Set gps_wp_radius, 0..2000 cm; INFO tells what came of it, and not a late answer to another value."""
         frame = ext.encode_radius(wp_radius_cm)
         waited_s = 0.0
         while True:
@@ -131,8 +130,11 @@ class HarakiriMissions:
                 break
             yield from pause(_BUSY_INTERVAL_S)
             waited_s += _BUSY_INTERVAL_S
-        self.info = replace(self.info, wp_radius_cm=answer.wp_radius_cm)
-        return answer.wp_radius_cm
+        info = yield from self._read_info()
+        if info is None:
+            return None
+        self.info = info
+        return info.wp_radius_cm
 
     def _read_info(self) -> Procedure[Info | None]:
         # Of the radius in it every waypoint gets its own, and its checksum tells what is stored.

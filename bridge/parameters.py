@@ -22,6 +22,7 @@ class Parameters:
         self._runner = runner
         self._post = post
         self._sysid = sysid
+        self._is_setting = False
 
     def send_all(self, station: Station) -> None:
         """PARAM_REQUEST_LIST."""
@@ -38,23 +39,32 @@ class Parameters:
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered by the value that is in force then, as the protocol wants."""
         dialect = self._desk.dialect
-        if name != WP_RADIUS or dialect is None or value == dialect.wp_radius_cm:
-            # An equal value is not written: the board's whole configuration would be erased for it.
+        if name != WP_RADIUS or dialect is None:
             self._send(station, name)
             return
         if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
             self._post.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm")
             self._send(station, name)
             return
+        wanted_cm = int(value)
+        if wanted_cm == dialect.wp_radius_cm:
+            # An equal value is not written: the board's whole configuration would be erased for it.
+            self._send(station, name)
+            return
+        if self._is_setting:
+            # Its answer is on the way; who asked for another value asks again.
+            return
 
         def done(radius_cm: int | None, _at: float) -> None:
+            self._is_setting = False
             if radius_cm is None:
                 self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer")
-            elif radius_cm != int(value):
+            elif radius_cm != wanted_cm:
                 self._post.say(Severity.ERROR, f"{WP_RADIUS} stays {radius_cm}: disarm, or try again")
             self._send(station, name)
 
-        self._runner.start(dialect.set_wp_radius(int(value)), done, now)
+        self._is_setting = True
+        self._runner.start(dialect.set_wp_radius(wanted_cm), done, now)
 
     def _values(self) -> dict[str, float]:
         values = {SYSID: float(self._sysid)}
