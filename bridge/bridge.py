@@ -308,6 +308,7 @@ class Bridge:
         if controller is not None and controller.info is not None:
             dialect = HarakiriMissions(controller.info, self._config.takeoff_max_m)
         self.desk.controller_changed(controller, dialect)
+        self._downloads.forget_all()
         if controller is None:
             self._uploads.link_lost(now)
             self.say(Severity.WARNING, "Flight controller lost")

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from bridge import vehicle_messages
 from bridge.commands import Commands
 from bridge.mission_download import MissionDownloads
-from bridge.mission_upload import MissionUploads
+from bridge.mission_upload import MISSION_TYPE_MISSION, MissionUploads
 from bridge.parameters import Parameters
 from bridge.station import Post, Severity, Station
 from protocols.mavlink.dialect import Message
@@ -38,7 +38,7 @@ class Inbox:
             m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: uploads.item(
                 s, item_from_int_message(msg), msg.mission_type, now
             ),
-            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
+            m.MAVLINK_MSG_ID_MISSION_ACK: self._mission_ack,
             m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.partial_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, msg, now: downloads.request_list(s, msg.mission_type, now),
@@ -80,6 +80,11 @@ class Inbox:
     def _mission_clear(self, station: Station, message: Message, now: float) -> None:
         self._downloads.forget(station)
         self._uploads.clear_all(station, message.mission_type, now)
+
+    def _mission_ack(self, station: Station, message: Message, now: float) -> None:
+        if message.mission_type == MISSION_TYPE_MISSION:
+            self._downloads.forget(station)
+            self._uploads.ack(station, message.type, now)
 
     def _set_current(self, _station: Station, _message: Message, _now: float) -> None:
         self._post.say(Severity.ERROR, "The current waypoint cannot be set")

@@ -142,23 +142,27 @@ class MissionDesk:
 
     def read_back(self) -> Procedure[HeldMission | Refusal]:
         """Return what the flight controller holds; a copy answers only while it has the same checksum."""
+        dialect = self._dialect
+        if dialect is None:
+            return self._refusal
         try:
-            if self._dialect is None:
-                return self._refusal
-            report = yield from self._dialect.report()
+            report = yield from dialect.report()
             if report is None:
                 return _NO_LINK
             if self.held is not None and self.held.identity == report.stored:
                 return self.held
-            records = yield from self._dialect.pull()
+            records = yield from dialect.pull()
             if records is None:
                 return _NO_LINK
-            identity = identify(records)
-            roi_commands: Mapping[int, int] = yield from recall(identity)
-            self.held = HeldMission(identity, records, tuple(items_from_records(records, roi_commands)))
         except LinkLost:
             return _NO_LINK
-        return self.held
+        identity = identify(records)
+        roi_commands: Mapping[int, int] = yield from recall(identity)
+        held = HeldMission(identity, records, tuple(items_from_records(records, roi_commands)))
+        if dialect is self._dialect:
+            # The store may take its time, and another flight controller be there by then.
+            self.held = held
+        return held
 
     def _conclude(self, number: int | None, outcome: Outcome, ack: MissionResult, text: str) -> Procedure[Delivery]:
         if number is not None and not (yield from conclude(number, Conclusion(outcome, text))):

@@ -1,6 +1,7 @@
 """A ground station reads the mission: the vehicle's side of MAVLink's download (mission-rules.md, "Read-back")."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from bridge.mission_desk import ARMED, HeldMission, MissionDesk, Refusal
 from bridge.mission_upload import MISSION_TYPE_MISSION
@@ -12,6 +13,28 @@ from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 
 #: Ground stations whose reading is remembered; the oldest is forgotten first.
 _MAX_READERS = 16
+#: A reading that does not go on for so long is over, though its MISSION_ACK was lost: Mission Planner asks for an item
+#: for 15 s.
+_READING_S = 20.0
+#: Questions that wait for the list to be read; more are not answered, and repeated by who asked.
+_MAX_QUESTIONS = 32
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """What a ground station wants of the list: item `seq`, or how many there are."""
+
+    station: Station
+    seq: int | None
+    as_int: bool
+
+
+@dataclass(slots=True)
+class _Snapshot:
+    """The list as it was when a ground station began to read it."""
+
+    items: tuple[MissionItem, ...]
+    until: float
 
 
 class MissionDownloads:
@@ -30,7 +53,9 @@ class MissionDownloads:
         self._post = post
         self._is_armed = is_armed
         self._home = home
-        self._snapshots: dict[Station, tuple[MissionItem, ...]] = {}
+        self._snapshots: dict[Station, _Snapshot] = {}
+        self._questions: dict[_Question, None] = {}
+        self._is_reading = False
 
     def request_list(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_REQUEST_LIST."""
@@ -39,37 +64,57 @@ class MissionDownloads:
         elif self._is_armed():
             self._refuse(station, Refusal(MissionResult.DENIED, "Armed: disarm to read the mission"))
         else:
-            self._read(station, lambda items: self._send_count(station, items), now)
+            self._ask(_Question(station, None, as_int=True), now)
 
     def request(self, station: Station, seq: int, mission_type: int, now: float, *, as_int: bool) -> None:
         """MISSION_REQUEST or MISSION_REQUEST_INT; item 0 is served at any time (Mission Planner asks on arming)."""
         if mission_type != MISSION_TYPE_MISSION:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
+        question = _Question(station, seq, as_int)
         snapshot = self._snapshots.get(station)
-        if snapshot is not None:
-            self._send_item(station, snapshot, seq, as_int=as_int)
+        if snapshot is not None and now < snapshot.until:
+            snapshot.until = now + _READING_S
+            self._answer(question, snapshot.items)
         elif self._is_armed() and seq != 0:
             self._refuse(station, ARMED)
         else:
-            self._read(station, lambda items: self._send_item(station, items, seq, as_int=as_int), now)
+            self._ask(question, now)
 
     def forget(self, station: Station) -> None:
-        """The ground station writes a new list, or is gone."""
+        """The ground station has read the list, or writes a new one."""
         self._snapshots.pop(station, None)
 
-    def _read(self, station: Station, then: Callable[[tuple[MissionItem, ...]], None], now: float) -> None:
-        def answered(held: HeldMission | Refusal, _at: float) -> None:
+    def forget_all(self) -> None:
+        """The flight controller is another one."""
+        self._snapshots.clear()
+
+    def _ask(self, question: _Question, now: float) -> None:
+        """Read the list once for all who wait for it: who hammers the bridge must not fill its queue."""
+        if len(self._questions) < _MAX_QUESTIONS:
+            self._questions[question] = None
+        if not self._is_reading:
+            self._is_reading = True
+            self._runner.start(self._desk.read_back(), self._read, now)
+
+    def _read(self, held: HeldMission | Refusal, now: float) -> None:
+        self._is_reading = False
+        questions, self._questions = self._questions, {}
+        for question in questions:
             if isinstance(held, Refusal):
-                self._refuse(station, held)
-                return
-            self._snapshots.pop(station, None)
-            self._snapshots[station] = held.items
+                self._refuse(question.station, held)
+                continue
+            self._snapshots.pop(question.station, None)
+            self._snapshots[question.station] = _Snapshot(held.items, now + _READING_S)
             if len(self._snapshots) > _MAX_READERS:
                 del self._snapshots[next(iter(self._snapshots))]
-            then(held.items)
+            self._answer(question, held.items)
 
-        self._runner.start(self._desk.read_back(), answered, now)
+    def _answer(self, question: _Question, items: tuple[MissionItem, ...]) -> None:
+        if question.seq is None:
+            self._send_count(question.station, items)
+        else:
+            self._send_item(question.station, items, question.seq, as_int=question.as_int)
 
     def _send_count(self, station: Station, items: tuple[MissionItem, ...]) -> None:
         self._post.to(
