@@ -48,7 +48,8 @@ class _Transfer:
     request_due: float = 0.0
     patience_s: float = _FIRST_PATIENCE_S
     round_trip_s: float | None = None
-    repeated: bool = False  # the present request went out more than once: its answer measures nothing
+    requested: int | None = None  # the item that was asked for last
+    repeated: bool = False  # it was asked for more than once: its answer measures nothing
     announced_again: bool = False  # begun anew, or a COUNT that the network repeated: the next item tells
 
 
@@ -81,6 +82,7 @@ class MissionUploads:
         self._transfer: _Transfer | None = None
         self._answered: dict[Station, _Answered] = {}
         self._queued: tuple[Station, int] | None = None
+        self._is_asking = False
 
     @property
     def phase(self) -> Phase | None:
@@ -95,8 +97,9 @@ class MissionUploads:
         present = self._transfer
         if present is not None and present.station == station:
             if present.phase is Phase.DELIVERING:
-                # The list before is being written: what is proven first, then the new one.
-                self._queued = (station, count)
+                # The list before is being written: what is proven first, then the new one. A cancel comes too late.
+                if count:
+                    self._queued = (station, count)
                 return
             if count == 0:
                 # Mission Planner's Cancel button. The pilot did not ask to lose the mission that is in the craft.
@@ -116,9 +119,11 @@ class MissionUploads:
         if count == 0:
             self._deliver(_Transfer(station, 0), check_list((), RuleProfile()), (), now)
             return
-        transfer = _Transfer(station, count)
-        self._transfer = transfer
-        self._runner.start(self._desk.preflight(), lambda answer, at: self._asked(transfer, answer, at), now)
+        self._transfer = _Transfer(station, count)
+        if not self._is_asking:
+            # One question serves all transfers that are begun before it is answered.
+            self._is_asking = True
+            self._runner.start(self._desk.preflight(), self._asked, now)
 
     def clear_all(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL."""
@@ -126,7 +131,11 @@ class MissionUploads:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
         present = self._transfer
-        if present is not None and present.station == station and present.phase is not Phase.DELIVERING:
+        if present is not None and present.station == station:
+            if present.phase is Phase.DELIVERING:
+                if present.count:
+                    self._queued = (station, 0)
+                return
             self._end(now)
         self.count(station, 0, MISSION_TYPE_MISSION, now)
 
@@ -218,8 +227,10 @@ class MissionUploads:
             return None
         return min(transfer.request_due, transfer.progress_at + _GIVE_UP_S)
 
-    def _asked(self, transfer: _Transfer, answer: StoreReport | Refusal, now: float) -> None:
-        if self._transfer is not transfer:
+    def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
+        self._is_asking = False
+        transfer = self._transfer
+        if transfer is None or transfer.phase is not Phase.ASKING:
             return
         if isinstance(answer, Refusal):
             self._abandon(transfer, answer, now)
@@ -237,7 +248,8 @@ class MissionUploads:
     def _request(self, transfer: _Transfer, now: float) -> None:
         """Ask for the lowest missing item; id 40, the only one that Mission Planner understands in both modes."""
         seq = 0 if transfer.announced_again else transfer.checked
-        transfer.repeated = transfer.requested_at > transfer.progress_at
+        transfer.repeated = seq == transfer.requested
+        transfer.requested = seq
         transfer.requested_at = now
         transfer.request_due = now + transfer.patience_s
         station = transfer.station
