@@ -8,6 +8,8 @@ from bridge.station import Peer
 EXPIRY_S = 60.0
 #: More are not spoken to: every heartbeat costs a datagram for each.
 MAX_PEERS = 32
+#: A new one takes the place of one that was silent for so long: a ground station sends a heartbeat every second.
+_MAKES_ROOM_S = 5.0
 
 
 @dataclass(slots=True)
@@ -32,9 +34,12 @@ class Stations:
         return True
 
     def add(self, peer: Peer, version: int, now: float) -> bool:
-        """Take a new peer in; False if there are too many."""
+        """Take a new peer in, in the place of the one silent for longest if need be; False if there are too many."""
         if len(self._known) >= MAX_PEERS:
-            return False
+            silent = min(self._known, key=lambda known: self._known[known].heard_at)
+            if now - self._known[silent].heard_at < _MAKES_ROOM_S:
+                return False
+            del self._known[silent]
         self._known[peer] = _Known(version, now)
         return True
 
