@@ -1,13 +1,15 @@
 """What ground stations do with missions: an upload and a download with the client's own repeats."""
 
+import struct
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from world import GroundStation
 
 from bridge.mission_check import RuleProfile, check_list
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
-from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from protocols.mission_item import Command, Frame, MissionItem, MissionResult, degrees_to_e7
 from protocols.wp_record import WpRecord
 
 MISSION = 0
@@ -36,6 +38,16 @@ def waypoints(count: int, seed: int = 0) -> list[MissionItem]:
 def records_of(items: Sequence[MissionItem]) -> tuple[WpRecord, ...]:
     """What the flight controller is to hold of them."""
     return check_list(items, RuleProfile()).records
+
+
+def rounded(items: Sequence[MissionItem]) -> list[MissionItem]:
+    """The items as MISSION_ITEM carries them: degrees in single precision."""
+
+    def single(degrees_e7: int | None) -> int | None:
+        (degrees,) = struct.unpack("<f", struct.pack("<f", (degrees_e7 or 0) / 1e7))
+        return degrees_to_e7(degrees)
+
+    return [replace(item, lat_e7=single(item.lat_e7), lon_e7=single(item.lon_e7)) for item in items]
 
 
 def count_message(count: int, mission_type: int = MISSION) -> Message:
@@ -110,14 +122,14 @@ class Upload:
         self.station.send(item_message(seq, self.items[seq], as_int=self.as_int))
 
     def _react(self, message: Message) -> None:
-        if self.is_over or (message.target_system if hasattr(message, "target_system") else 0) != self.station.sysid:
+        if self.is_over or not self.station.is_meant(message):
             return
         match message.get_type():
             case "MISSION_REQUEST" | "MISSION_REQUEST_INT":
                 self.requested.append(message.seq)
                 self._silent = 0
                 self._say(lambda seq=message.seq: self._item(seq))  # type: ignore[misc]
-            case "MISSION_ACK":
+            case "MISSION_ACK" if message.mission_type == MISSION:
                 self.result = MissionResult(message.type)
 
     def _say(self, what: Callable[[], None]) -> None:
@@ -179,7 +191,7 @@ class Download:
         self.station.world.after(self._repeat_s, lambda: self._repeat(turn, silent + 1))
 
     def _react(self, message: Message) -> None:
-        if self.is_over or getattr(message, "target_system", 0) != self.station.sysid:
+        if self.is_over or not self.station.is_meant(message):
             return
         match message.get_type():
             case "MISSION_COUNT" if self.count is None:

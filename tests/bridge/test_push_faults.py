@@ -6,45 +6,32 @@ Only a push whose COMMIT was under way may end with "read the mission back". Aft
 import random
 from collections import Counter
 from collections.abc import Callable
-from functools import cache
 
 import pytest
 from conversations import records_of, waypoints
-from world import World
+from world import World, flash_holding
 
 from bridge.mission_desk import ARMED, Delivery, HeldMission, Refusal
 from bridge.mission_dialect import PushFailure
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from protocols.wp_record import identify
-from service.simulator.flash import NorFlash
-from service.simulator.mission_slots import MissionSlots, flash_size
 from service.simulator.naze import Power
 from service.simulator.options import Faults, SimOptions
 
 OLD = waypoints(20, seed=77)
 NEW = waypoints(146, seed=5)
 OLD_RECORDS, NEW_RECORDS = records_of(OLD), records_of(NEW)
+OLD_FLASH = flash_holding(OLD_RECORDS)
 
 BUSY_TEXT = "Flight controller is busy writing: try again"
 
 Injection = Callable[[World, random.Random], None]
 
 
-@cache
-def flash_with_the_old_list() -> bytes:
-    memory = bytearray(b"\xff" * flash_size(SimOptions()))
-    slots = MissionSlots(NorFlash(memoryview(memory), Faults()), SimOptions())
-    for index, record in enumerate(OLD_RECORDS):
-        slots.stage(index, record.pack())
-    slots.commit(identify(OLD_RECORDS))
-    return bytes(memory)
-
-
 def holding_the_old_list(seed: int, options: SimOptions | None = None) -> World:
     options = options or SimOptions(seed=seed, boot_ms=500)
-    world = World(options, seed=seed, speeds=(115200,), flash=flash_with_the_old_list())
+    world = World(options, seed=seed, speeds=(115200,), flash=OLD_FLASH)
     world.wait_ready()
     assert world.stored == OLD_RECORDS
     return world

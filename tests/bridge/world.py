@@ -26,7 +26,9 @@ from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.frame import MspParser
 from protocols.msp.hazards import is_clean
 from protocols.wp_record import WpRecord, identify, unpack_records
+from service.simulator.flash import ERASED, NorFlash
 from service.simulator.line import garble
+from service.simulator.mission_slots import MissionSlots, flash_size
 from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults, SimOptions
 
@@ -278,6 +280,17 @@ class World:
         self.journal.append(Event(self.now, level, event, facts))
 
 
+def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None) -> bytes:
+    """Return a flash in which a list is stored, for a new world's board."""
+    options = options or SimOptions()
+    memory = bytearray((ERASED,)) * flash_size(options)
+    slots = MissionSlots(NorFlash(memoryview(memory), Faults()), options)
+    for index, record in enumerate(records):
+        slots.stage(index, record.pack())
+    slots.commit(identify(records))
+    return bytes(memory)
+
+
 class GroundStation:
     """Speaks MAVLink over the air. `heard` keeps what reaches it; `on_message` reacts to it."""
 
@@ -326,6 +339,11 @@ class GroundStation:
     def said(self, *types: str) -> list[Message]:
         """Return what was heard of these message types."""
         return [message for _, message in self.heard if not types or message.get_type() in types]
+
+    def is_meant(self, message: Message) -> bool:
+        """Tell whether a message is addressed to exactly this one, as Mission Planner wants it."""
+        address = (getattr(message, "target_system", None), getattr(message, "target_component", None))
+        return address == (self.sysid, self.compid)
 
     def texts(self) -> list[str]:
         return [message.text for message in self.said("STATUSTEXT")]

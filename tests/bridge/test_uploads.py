@@ -1,0 +1,728 @@
+"""Writing a mission, row by row of mission-rules.md: "Before the first item" and "While items come in"."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from conversations import (
+    Upload,
+    ack_message,
+    clear_message,
+    count_message,
+    item_message,
+    records_of,
+    rounded,
+    waypoints,
+)
+from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
+from world import Air, GroundStation, World, flash_holding
+
+from bridge.mission_log import Outcome
+from bridge.mission_upload import Phase
+from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import MissionItem, MissionResult
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+OLD = waypoints(20, seed=77)
+OLD_RECORDS = records_of(OLD)
+OLD_FLASH = flash_holding(OLD_RECORDS)
+A = MissionResult
+
+
+def holding(options: SimOptions | None = None, faults: Faults | None = None) -> tuple[World, GroundStation]:
+    """A bridge at a board that holds the old list, and one ground station that has been heard."""
+    world = World(options, faults, speeds=(115200,), flash=OLD_FLASH)
+    world.wait_ready()
+    assert world.stored == OLD_RECORDS
+    return world, GroundStation(world)
+
+
+def phase(world: World) -> Phase | None:
+    return world.bridge._uploads.phase
+
+
+def receiving(world: World, station: GroundStation, items: list[MissionItem], sent: int) -> None:
+    """Begin an upload and send its first items."""
+    station.send(count_message(len(items)))
+    world.wait_until(lambda w: phase(w) is Phase.RECEIVING, 1)
+    for seq in range(sent):
+        station.send(item_message(seq, items[seq]))
+    world.run(0.001)
+    station.take()
+
+
+def acks(station: GroundStation) -> list[MissionResult]:
+    return [MissionResult(message.type) for message in station.said("MISSION_ACK")]
+
+
+def requested(station: GroundStation) -> list[int]:
+    assert station.said("MISSION_REQUEST_INT") == []
+    return [message.seq for message in station.said("MISSION_REQUEST")]
+
+
+def partial_list_message() -> Message:
+    return messages.MAVLink_mission_write_partial_list_message(1, 1, 0, 0, 0)
+
+
+def assert_refusal_stands(world: World, station: GroundStation, result: MissionResult) -> None:
+    """Mission Planner goes on after any ack to its count: what it sends then is answered by the same refusal."""
+    for seq in (0, 1, 0, 999):
+        station.take()
+        station.send(item_message(seq, OLD[1]))
+        world.run(0.05)
+        assert acks(station) == [result]
+        assert requested(station) == []
+    station.take()
+    station.send(partial_list_message())
+    world.run(0.05)
+    assert acks(station) == [result]
+    assert A.INVALID_SEQUENCE not in acks(station)
+    assert phase(world) is None
+
+
+def refused(world: World, station: GroundStation, count: int, result: MissionResult, words: str) -> None:
+    """Announce a list: it is refused with this answer and these words, and the old list stays."""
+    station.send(count_message(count))
+    world.wait_until(lambda _: bool(acks(station)), 3)
+    assert acks(station) == [result]
+    assert any(words in text for text in station.texts()), station.texts()
+    assert requested(station) == []
+    assert_refusal_stands(world, station, result)
+    if world.naze.stored:
+        assert world.stored == OLD_RECORDS
+
+
+# Before the first item.
+
+
+@pytest.mark.parametrize("mission_type", [1, 2, 7, 255])
+def test_another_mission_type_is_unsupported(mission_type: int) -> None:
+    world, station = holding()
+    for message in (
+        count_message(5, mission_type),
+        item_message(0, OLD[0], mission_type=mission_type),
+        item_message(0, OLD[0], mission_type=mission_type, as_int=False),
+    ):
+        station.take()
+        station.send(message)
+        world.run(0.3)
+        assert [(ack.type, ack.mission_type) for ack in station.said("MISSION_ACK")] == [(A.UNSUPPORTED, mission_type)]
+        assert requested(station) == []
+    if mission_type != 255:
+        station.take()
+        station.send(clear_message(mission_type))
+        world.run(0.3)
+        assert [(ack.type, ack.mission_type) for ack in station.said("MISSION_ACK")] == [(A.UNSUPPORTED, mission_type)]
+    assert world.stored == OLD_RECORDS
+
+
+def test_another_mission_type_does_not_disturb_a_transfer() -> None:
+    world, station = holding()
+    station.air = Air(delay_s=0.002)
+    upload = Upload(station, waypoints(30))
+    for number in range(10):
+        world.after(number * 0.003, lambda: station.send(count_message(3, 1)))
+        world.after(number * 0.003, lambda: station.send(ack_message(A.ERROR, 1)))
+    assert upload.run() is A.ACCEPTED
+    assert world.stored == records_of(waypoints(30))
+
+
+def test_armed_is_denied() -> None:
+    world, station = holding()
+    world.faults.armed = True
+    world.run(1)
+    refused(world, station, 5, A.DENIED, "disarm")
+    world.faults.armed = False
+    world.run(1)
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+
+
+def test_armed_in_mavlink_mode_is_denied() -> None:
+    world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
+    world.faults.armed = True
+    world.run(5)
+    refused(world, station, 5, A.DENIED, "MAVLink")
+
+
+def test_armed_while_items_come_in_is_denied() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(50), 10)
+    world.faults.armed = True
+    world.run(0.5)
+    assert acks(station) == [A.DENIED]
+    assert "Armed: disarm to change the mission" in station.texts()
+    assert world.stored == OLD_RECORDS
+    assert_refusal_stands(world, station, A.DENIED)
+    assert world.store.outcomes()[-1] is Outcome.REJECTED
+
+
+def test_armed_for_a_moment_while_items_come_in_is_denied() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(50), 10)
+    world.faults.armed = True
+    world.run(0.4)
+    world.faults.armed = False
+    world.run(1)
+    assert acks(station) == [A.DENIED]
+
+
+@pytest.mark.parametrize("message", [count_message(0), clear_message(), clear_message(255)])
+def test_the_list_is_cleared_and_verified(message: Message) -> None:
+    world, station = holding()
+    stored_at_ack = []
+    station.on_message.append(
+        lambda heard: stored_at_ack.append(world.stored) if heard.get_type() == "MISSION_ACK" else None
+    )
+    station.send(message)
+    world.wait_until(lambda _: bool(acks(station)), 2)
+    assert acks(station) == [A.ACCEPTED]
+    assert stored_at_ack == [()]
+    assert world.naze.counters.flash_writes == 2
+    # Once more: nothing is written.
+    station.send(message)
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED, A.ACCEPTED]
+    assert world.naze.counters.flash_writes == 2
+
+
+def test_armed_nothing_is_cleared() -> None:
+    world, station = holding()
+    world.faults.armed = True
+    world.run(1)
+    for message in (clear_message(), count_message(0)):
+        station.take()
+        station.send(message)
+        world.run(1)
+        assert acks(station) == [A.DENIED]
+        assert any("disarm" in text for text in station.texts())
+    assert world.stored == OLD_RECORDS
+
+
+def test_home_alone_is_invalid() -> None:
+    world, station = holding()
+    refused(world, station, 1, A.INVALID, "only a home point")
+
+
+@pytest.mark.parametrize("capacity", [146, 30])
+def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> None:
+    options = SimOptions(capacity=capacity)
+    world = World(options, flash=flash_holding(OLD_RECORDS, options))
+    world.wait_ready()
+    station = GroundStation(world)
+    for count in (capacity + 1, 65535):
+        refused(world, station, count, A.NO_SPACE, f"{capacity} fit")
+        station.take()
+    assert Upload(station, waypoints(capacity)).run() is A.ACCEPTED
+
+
+def test_a_second_ground_station_is_denied_while_a_transfer_runs() -> None:
+    world, station = holding()
+    second = GroundStation(world, "second", sysid=254)
+    other_program = GroundStation(world, "gcs", compid=7)
+    world.stations[station.peer] = station
+    station.air = Air(delay_s=0.002)
+    upload = Upload(station, waypoints(100))
+    world.run(0.1)
+    assert phase(world) is Phase.RECEIVING
+    for intruder in (second, other_program):
+        for message in (count_message(5), count_message(0), clear_message()):
+            second.take()
+            intruder.send(message)
+        intruder.send(item_message(0, OLD[1]))
+        intruder.send(ack_message(A.ERROR))
+        intruder.send(partial_list_message())
+    world.run(0.02)
+    assert set(acks(second)) == {A.DENIED}
+    assert any("Another mission transfer" in text for text in second.texts())
+    assert requested(second) == []
+    world.run(2)
+    assert upload.requested[-1] == 99
+    assert world.stored == records_of(waypoints(100))
+    # The first is done: now the second may.
+    assert Upload(second, waypoints(3, 1)).run() is A.ACCEPTED
+
+
+def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
+    world, station = holding()
+    outcome = world.push(waypoints(146))
+    station.send(count_message(5))
+    world.run(0.05)
+    assert acks(station) == [A.DENIED]
+    world.wait_until(lambda _: bool(outcome), 2)
+    upload = Upload(station, waypoints(30))
+    world.run(0.02)
+    denied = world.push(waypoints(3))
+    assert denied[0][0].text == "Another mission transfer is running"
+    assert upload.run() is A.ACCEPTED
+
+
+@pytest.mark.parametrize("sent", [0, 1, 10, 29])
+@pytest.mark.parametrize("count", [7, 30, 60])
+def test_the_same_ground_station_starts_again_while_items_come_in(sent: int, count: int) -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(30, 1), sent)
+    again = waypoints(count, 2)
+    assert Upload(station, again).run() is A.ACCEPTED
+    assert world.stored == records_of(again)
+
+
+def test_the_same_ground_station_starts_again_while_the_flight_controller_is_asked() -> None:
+    world, station = holding()
+    station.send(count_message(9))
+    world.run(0.0005)
+    assert phase(world) is Phase.ASKING
+    again = waypoints(12, 2)
+    assert Upload(station, again).run() is A.ACCEPTED
+    assert world.stored == records_of(again)
+
+
+@pytest.mark.parametrize("after_s", [0.001, 0.02, 0.1, 0.2])
+def test_the_same_ground_station_starts_again_while_the_list_is_written(after_s: float) -> None:
+    world, station = holding()
+    first, again = waypoints(146, 1), waypoints(12, 2)
+    receiving(world, station, first, 146)
+    world.run(after_s)
+    assert phase(world) is Phase.DELIVERING
+    upload = Upload(station, again)
+    # The answer to the list before comes first, and is no answer to this one: the requests go on.
+    assert upload.run() is A.ACCEPTED
+    for seq, item in enumerate(again):
+        station.send(item_message(seq, item))
+    world.run(6)
+    assert world.stored in (records_of(first), records_of(again))
+    assert world.store.outcomes()[0] is Outcome.VERIFIED
+    assert phase(world) is None
+    assert Upload(station, again).run() is A.ACCEPTED
+
+
+def test_a_new_list_that_is_announced_while_the_one_before_is_written_is_asked_for() -> None:
+    world, station = holding()
+    first, again = waypoints(146, 1), waypoints(12, 2)
+    receiving(world, station, first, 146)
+    world.run(0.05)
+    station.send(count_message(12))
+    world.wait_until(lambda _: bool(requested(station)), 2)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(first)
+    for seq, item in enumerate(again):
+        station.send(item_message(seq, item))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED, A.ACCEPTED]
+    assert world.stored == records_of(again)
+
+
+def busy_for(world: World, seconds: float) -> None:
+    world.faults.busy = True
+    world.after(seconds, lambda: setattr(world.faults, "busy", False))
+
+
+def test_a_flash_write_is_waited_for() -> None:
+    world, station = holding()
+    busy_for(world, 0.7)
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+
+
+def test_a_flash_write_that_lasts_is_denied() -> None:
+    world, station = holding()
+    busy_for(world, 3)
+    began = world.now
+    station.send(count_message(5))
+    world.wait_until(lambda _: bool(acks(station)), 3)
+    assert 0.9 < world.now - began < 1.5
+    assert any("busy" in text for text in station.texts())
+    assert_refusal_stands(world, station, A.DENIED)
+    assert world.stored == OLD_RECORDS
+
+
+def test_without_a_link_is_denied() -> None:
+    world, station = holding()
+    world.unplug()
+    refused(world, station, 5, A.DENIED, "No link")
+    for message in (count_message(0), clear_message()):
+        station.take()
+        station.send(message)
+        world.run(0.1)
+        assert acks(station) == [A.DENIED]
+
+
+def test_a_flight_controller_that_was_never_there_is_no_link() -> None:
+    world = World(powered=False)
+    station = GroundStation(world)
+    refused(world, station, 5, A.DENIED, "No link")
+
+
+def test_a_harakiri_without_the_extension_is_unsupported() -> None:
+    world = World(faults=Faults(extension=False))
+    world.wait_ready()
+    refused(world, GroundStation(world), 5, A.UNSUPPORTED, "lacks the mission patch")
+
+
+def test_another_flight_controller_is_unsupported() -> None:
+    world = World(peer=MspFake({100: ident(240, HARAKIRI_CAPABILITY), 2: b"BTFL", 116: b"ARM;", 101: bytes(11)}))
+    world.wait_until(lambda w: w.is_found, 3)
+    refused(world, GroundStation(world), 5, A.UNSUPPORTED, "stores no missions")
+
+
+def test_a_refusal_is_remembered_for_ten_seconds() -> None:
+    world, station = holding()
+    refused(world, station, 1, A.INVALID, "only a home point")
+    world.run(10.5)
+    station.take()
+    station.send(item_message(0, OLD[0]))
+    world.run(1)
+    assert acks(station) == []
+    station.send(partial_list_message())
+    world.run(1)
+    assert acks(station) == [A.UNSUPPORTED]
+    assert "A mission can only be written as a whole" in station.texts()
+
+
+def test_a_new_count_makes_the_refusal_before_forgotten() -> None:
+    world, station = holding()
+    refused(world, station, 1, A.INVALID, "only a home point")
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+    station.take()
+    station.send(item_message(1, OLD[1]))
+    world.run(0.1)
+    assert acks(station) == []
+
+
+# While items come in.
+
+
+@pytest.mark.parametrize("as_int", [True, False])
+def test_each_item_is_asked_for_once_by_the_request_that_mission_planner_understands(as_int: bool) -> None:
+    world, station = holding()
+    items = waypoints(146)
+    upload = Upload(station, items, as_int=as_int)
+    stored_at_ack = []
+    station.on_message.append(
+        lambda heard: stored_at_ack.append(world.stored) if heard.get_type() == "MISSION_ACK" else None
+    )
+    assert upload.run() is A.ACCEPTED
+    assert requested(station) == list(range(146))
+    assert stored_at_ack == [records_of(items if as_int else rounded(items))]
+    assert {(m.target_system, m.target_component) for m in station.said("MISSION_REQUEST")} == {(255, 190)}
+    world.assert_line_was_clean()
+
+
+def test_both_kinds_of_items_may_come_in_one_list() -> None:
+    world, station = holding()
+    items = waypoints(10)
+    receiving(world, station, items, 0)
+    for seq, item in enumerate(items):
+        station.send(item_message(seq, item, as_int=bool(seq % 2)))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+
+
+def test_a_burst_is_taken_and_answered_item_by_item() -> None:
+    """Mission Planner's "Write Fast": ten at once, then it wants the request for the eleventh."""
+    world, station = holding()
+    items = waypoints(40)
+    receiving(world, station, items, 0)
+    for first in range(0, 40, 10):
+        station.take()
+        for seq in range(first, first + 10):
+            station.send(item_message(seq, items[seq]))
+        world.run(0.001)
+        assert requested(station) == list(range(first + 1, min(first + 11, 40)))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def test_items_out_of_order_are_kept_and_the_missing_one_is_asked_for() -> None:
+    world, station = holding()
+    items = waypoints(8)
+    receiving(world, station, items, 0)
+    for seq, wanted in [(0, 1), (2, 1), (3, 1), (7, 1), (1, 4), (5, 4), (6, 4)]:
+        station.take()
+        station.send(item_message(seq, items[seq]))
+        world.run(0.001)
+        assert requested(station) == [wanted]
+    station.send(item_message(4, items[4]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def test_a_repeat_is_answered_by_one_request_and_never_stored_again() -> None:
+    world, station = holding()
+    items = waypoints(8)
+    receiving(world, station, items, 5)
+    for seq in (0, 4, 4, 2):
+        station.take()
+        # It says something else now: the first one counts.
+        station.send(item_message(seq, replace(items[seq], alt_m=99.0)))
+        world.run(0.001)
+        assert requested(station) == [5]
+    for seq in range(5, 8):
+        station.send(item_message(seq, items[seq]))
+    world.run(1)
+    assert world.stored == records_of(items)
+
+
+def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_goes_on() -> None:
+    world, station = holding()
+    items = waypoints(8)
+    receiving(world, station, items, 3)
+    for seq in (8, 9, 65535):
+        station.take()
+        station.send(item_message(seq, items[0]))
+        world.run(0.001)
+        assert acks(station) == [A.INVALID_SEQUENCE]
+    for seq in range(3, 8):
+        station.send(item_message(seq, items[seq]))
+    world.run(1)
+    assert acks(station)[-1] is A.ACCEPTED
+
+
+@pytest.mark.parametrize("sent", [0, 3])
+def test_silence_repeats_the_request_and_ends_the_transfer_after_five_seconds(sent: int) -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(8), sent)
+    began = world.now
+    world.wait_until(lambda _: bool(acks(station)), 10)
+    assert world.now - began == pytest.approx(5.0, abs=0.05)
+    assert acks(station) == [A.OPERATION_CANCELLED]
+    assert any("no item came for 5 s" in text for text in station.texts())
+    times = [at - began for at, message in station.heard if message.get_type() == "MISSION_REQUEST"]
+    assert set(requested(station)) == {sent}
+    assert times[0] == pytest.approx(0.25, abs=0.05)
+    assert 4 <= len(times) <= 8
+    # Rarer and rarer.
+    gaps = [later - earlier for earlier, later in pairwise(times)]
+    assert gaps == sorted(gaps)
+    assert world.stored == OLD_RECORDS
+    assert_refusal_stands(world, station, A.OPERATION_CANCELLED)
+    assert world.store.outcomes() == ([Outcome.CANCELLED] if sent else [])
+
+
+@pytest.mark.parametrize(("round_trip_s", "copies"), [(0.2, 1), (0.3, 2), (0.6, 2), (1.0, 3)])
+def test_the_waiting_adapts_to_the_round_trip(round_trip_s: float, copies: int) -> None:
+    """Asking twice costs Mission Planner one of its ten tries.
+
+    The first request is repeated until it is answered. Each copy brings an item, and each item a request, so there are
+    as many copies of every later one; but no more.
+    """
+    _, station = holding()
+    station.air = Air(delay_s=round_trip_s / 2)
+    upload = Upload(station, waypoints(30), repeat_s=10)
+    assert upload.run(120) is A.ACCEPTED
+    assert max(requested(station).count(seq) for seq in range(30)) == copies
+
+
+@pytest.mark.parametrize("round_trip_s", [0.3, 0.6, 1.0])
+def test_a_request_that_was_repeated_in_vain_teaches_patience(round_trip_s: float) -> None:
+    """A ground station that answers each request once: only the first one is asked for too early."""
+    world, station = holding()
+    station.air = Air(delay_s=round_trip_s / 2)
+    items = waypoints(30)
+    answered: set[int] = set()
+
+    def answer(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST" and message.seq not in answered:
+            answered.add(message.seq)
+            station.send(item_message(message.seq, items[message.seq]))
+
+    station.on_message.append(answer)
+    station.send(count_message(30))
+    world.wait_until(lambda _: bool(acks(station)), 60)
+    assert acks(station) == [A.ACCEPTED]
+    assert sorted(requested(station))[-29:] == list(range(1, 30))
+
+
+@pytest.mark.parametrize("result", [A.ERROR, A.DENIED, A.OPERATION_CANCELLED, A.INVALID])
+@pytest.mark.parametrize("sent", [0, 4])
+def test_an_error_from_the_ground_station_cancels(result: MissionResult, sent: int) -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(8), sent)
+    station.send(ack_message(result))
+    world.run(0.1)
+    assert acks(station) == [A.OPERATION_CANCELLED]
+    assert phase(world) is None
+    assert world.stored == OLD_RECORDS
+
+
+def test_accepted_from_the_ground_station_cancels_nothing() -> None:
+    world, station = holding()
+    items = waypoints(8)
+    receiving(world, station, items, 4)
+    station.send(ack_message(A.ACCEPTED))
+    for seq in range(4, 8):
+        station.send(item_message(seq, items[seq]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+
+
+@pytest.mark.parametrize("sent", [0, 4])
+def test_a_count_of_none_in_a_running_transfer_is_mission_planners_cancel(sent: int) -> None:
+    """The pilot did not ask to lose the list that is in the craft."""
+    world, station = holding()
+    receiving(world, station, waypoints(8), sent)
+    station.send(count_message(0))
+    world.run(1)
+    assert acks(station) == [A.OPERATION_CANCELLED]
+    assert world.stored == OLD_RECORDS
+
+
+def test_a_cancel_that_comes_too_late_erases_nothing() -> None:
+    world, station = holding()
+    items = waypoints(30)
+    receiving(world, station, items, 30)
+    assert phase(world) is Phase.DELIVERING
+    station.send(count_message(0))
+    world.run(3)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+@pytest.mark.parametrize("sent", [0, 4, 8])
+def test_clear_all_in_a_running_transfer_clears(sent: int) -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(8), sent)
+    station.send(clear_message())
+    world.run(2)
+    assert acks(station)[-1] is A.ACCEPTED
+    assert world.stored == ()
+
+
+def test_a_repeated_last_item_is_met_with_silence_and_then_with_the_same_ack() -> None:
+    world, station = holding(SimOptions(flash_erase_ms=1200))
+    items = waypoints(146)
+    receiving(world, station, items, 146)
+    for _ in range(3):
+        station.send(item_message(145, items[145]))
+        world.run(0.3)
+        assert phase(world) is Phase.DELIVERING
+        assert acks(station) == []
+        assert requested(station) == []
+    world.wait_until(lambda _: bool(acks(station)), 3)
+    for _ in range(4):
+        station.take()
+        station.send(item_message(145, items[145]))
+        world.run(0.45)
+        assert acks(station) == [A.ACCEPTED]
+        assert phase(world) is None
+    # An item in the middle is not the last one.
+    station.take()
+    station.send(item_message(20, items[20]))
+    world.run(0.45)
+    assert acks(station) == []
+    assert world.naze.counters.flash_writes == 2
+
+
+def test_a_lost_final_ack_is_given_again() -> None:
+    world, station = holding()
+    items = waypoints(20)
+    receiving(world, station, items, 19)
+    station.air.loss = 1.0
+    world.spoken_by(station, station.pack(item_message(19, items[19])))
+    world.run(1)
+    station.air.loss = 0.0
+    assert acks(station) == []
+    station.send(item_message(19, items[19]))
+    world.run(0.1)
+    assert acks(station) == [A.ACCEPTED]
+
+
+def test_the_final_ack_comes_within_two_seconds_of_the_last_item() -> None:
+    """With a flash that stalls for 300 ms and a store that takes its time."""
+    world, station = holding(SimOptions(flash_erase_ms=300))
+    world.store.delay_s = 0.3
+    items = waypoints(146)
+    receiving(world, station, items, 145)
+    station.send(item_message(145, items[145]))
+    assert world.wait_until(lambda _: bool(acks(station)), 5) <= 2.0
+    assert acks(station) == [A.ACCEPTED]
+
+
+def test_a_list_that_breaks_a_rule_is_refused_at_once_and_the_refusal_stands() -> None:
+    world, station = holding()
+    items = waypoints(30)
+    items[12] = replace(items[12], command=21)  # LAND must be last
+    upload = Upload(station, items)
+    assert upload.run() is A.INVALID
+    assert upload.requested == list(range(13))
+    assert any("LAND must be the last item" in text for text in station.texts())
+    assert_refusal_stands(world, station, A.INVALID)
+    assert world.stored == OLD_RECORDS
+    assert world.store.outcomes() == [Outcome.REJECTED]
+
+
+def test_a_list_of_which_nothing_is_left_clears_and_says_so() -> None:
+    world, station = holding()
+    items = waypoints(2)
+    items[1] = replace(items[1], command=178)
+    assert Upload(station, items).run() is A.ACCEPTED
+    assert world.stored == ()
+    assert any("list erased" in text for text in station.texts())
+
+
+@pytest.mark.parametrize("lose", [World.unplug, World.power_off])
+@pytest.mark.parametrize("sent", [0, 4, 30])
+def test_the_flight_controller_is_lost_in_the_middle(lose: Callable[[World], None], sent: int) -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(30), sent)
+    world.run(0.05 if sent == 30 else 0.001)
+    station.take()
+    lose(world)
+    world.run(4)
+    assert acks(station) == [A.DENIED]
+    assert phase(world) is None
+    assert world.stored == OLD_RECORDS
+    world.plug() if lose is World.unplug else world.power_on()
+    world.run(5)
+    assert Upload(station, waypoints(30)).run() is A.ACCEPTED
+
+
+def test_the_flight_controller_is_lost_while_it_is_asked() -> None:
+    world, station = holding()
+    station.send(count_message(5))
+    world.run(0.0005)
+    assert phase(world) is Phase.ASKING
+    world.unplug()
+    world.run(0.1)
+    assert acks(station) == [A.DENIED]
+
+
+@pytest.mark.parametrize("failing", [True, False])
+def test_a_store_that_fails_or_is_slow_keeps_no_mission_from_the_flight_controller(failing: bool) -> None:
+    world, station = holding()
+    world.store.failing = failing
+    world.store.delay_s = 0.7
+    assert Upload(station, waypoints(20)).run() is A.ACCEPTED
+    assert world.stored == records_of(waypoints(20))
+    world.run(0.1)
+    assert ("The mission could not be stored on the Pi" in station.texts()) is failing
+
+
+def test_uploads_over_bad_air_are_exact_or_refused() -> None:
+    accepted = 0
+    for seed in range(25):
+        world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH)
+        world.wait_ready()
+        station = GroundStation(world, air=Air(loss=0.1, repeat=0.1, delay_s=0.1 * (seed % 3), spread_s=0.05))
+        items = waypoints(25, seed)
+        result = Upload(station, items).run(120)
+        world.run(6)
+        assert world.stored == (records_of(items) if result is A.ACCEPTED else world.stored)
+        assert world.stored in (records_of(items), OLD_RECORDS)
+        accepted += result is A.ACCEPTED
+        world.assert_line_was_clean()
+    assert accepted >= 24
+
+
+def test_a_station_that_hammers_fills_nothing() -> None:
+    """The world asserts that the queue of procedures stays short; nothing else may grow without bound either."""
+    world, station = holding()
+    for number in range(3000):
+        station.send(count_message(5 + number % 90))
+        station.send(item_message(0, OLD[0]))
+        if number % 7 == 0:
+            world.run(0.0001)
+    world.run(10)
+    assert len(world.store.missions) < 20
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
