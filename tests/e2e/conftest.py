@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from benches import Bench, Starter
+from plan import plain_plan
 
 
 @pytest.fixture
@@ -36,3 +37,10 @@ def shared(lasting_bench: Bench) -> Iterator[Bench]:
     """The bench of all tests of a module that leave no trace but missions; the clients are one test's own."""
     with ExitStack() as stack:
         yield replace(lasting_bench, stack=stack)
+
+
+@pytest.fixture
+def kept(shared: Bench) -> list[str]:
+    """What the shared board holds before a test that must change nothing."""
+    shared.daemon.push(plain_plan(12))
+    return shared.board.records()

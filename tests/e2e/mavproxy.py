@@ -60,14 +60,9 @@ class MavProxy:
 
     def wait_for(self, part: str) -> str:
         """Wait until `part` is printed; return all that was since the last line that was typed."""
-
-        def printed() -> str | None:
-            text = self._printed()[self._seen :]
-            return text if part in text else None
-
-        found = comes(printed)
-        assert found is not None, f"{part!r} was not printed, but:\n{self._printed()[self._seen :]}"
-        return found
+        text = self._answer(part, PATIENCE)
+        assert part in text, f"{part!r} was not printed, but:\n{text}"
+        return text
 
     def load(self, plan: Sequence[PlanRow]) -> None:
         """Write a mission file and `wp load` it."""
@@ -81,9 +76,15 @@ class MavProxy:
         self.type(f"wp load {path}")
 
     def list(self, count: int) -> list[tuple[float, ...]]:
-        """`wp list`: seq, command, frame, param1..4, lat_e7, lon_e7, height of each item."""
-        self.type("wp list")
-        text = self.wait_for(f"Saved {count} waypoints")
+        """`wp list`: seq, command, frame, param1..4, lat_e7, lon_e7, height of each item.
+
+        It asks for the list once; where that was lost its user types it again.
+        """
+        for _ in range(3):
+            self.type("wp list")
+            text = self._answer(f"Saved {count} waypoints", PATIENCE / 2)
+            if f"Saved {count} waypoints" in text:
+                break
         items = []
         for seq, found in enumerate(_LISTED.finditer(text)):
             command, frame = int(found["command"]), int(found["frame"])
@@ -91,6 +92,11 @@ class MavProxy:
             place = [round(float(found[name]) * 1e7) for name in ("lat", "lon")]
             items.append((seq, command, frame, *parameters, *place, float(found["alt"])))
         return items
+
+    def _answer(self, part: str, seconds: float) -> str:
+        """Return what was printed since the last line that was typed, as soon as `part` is in it."""
+        comes(lambda: part in self._printed()[self._seen :], seconds)
+        return self._printed()[self._seen :]
 
     def _printed(self) -> str:
         return self._output.read_text(errors="replace")

@@ -177,17 +177,18 @@ class MissionPlanner:
 
     def wait_for_text(self, part: str) -> None:
         """Wait until the vehicle has said `part`."""
-        self._wait_for(lambda: part in self.said(), f"the text {part!r}")
+        self.wait_until(lambda: part in self.said(), f"the text {part!r}")
 
     def wait_for_ack(self, result: MissionResult) -> None:
         """Wait until a MISSION_ACK with `result` has come."""
-        self._wait_for(lambda: result in self.acks(), result.name)
+        self.wait_until(lambda: result in self.acks(), result.name)
 
     def wait_for_armed(self, armed: bool) -> None:
         """Wait for heartbeats that say so."""
-        self._wait_for(lambda: self.armed is armed, f"armed {armed}")
+        self.wait_until(lambda: self.armed is armed, f"armed {armed}")
 
-    def _wait_for(self, condition: Callable[[], bool], what: str) -> None:
+    def wait_until(self, condition: Callable[[], bool], what: str) -> None:
+        """Listen until something is so."""
         deadline = time.monotonic() + _PATIENCE_S
         while not condition():
             assert self._receive(deadline), f"{what} did not come, but {self.texts}, {self.acks()}"

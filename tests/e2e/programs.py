@@ -8,8 +8,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
+
+from plan import PlanRow
 
 from service.control import ControlError, ask_daemon
 
@@ -172,6 +175,12 @@ class Daemon(Program):
     def held(self) -> dict[str, Any]:
         """Return what the flight controller holds, read by the daemon."""
         return self.ask({"do": "pull"})
+
+    def push(self, plan: Sequence[PlanRow]) -> None:
+        """Bring a list to the board, as `naze-bridge push` does."""
+        items = [asdict(row.as_sent(seq, use_int=True)) for seq, row in enumerate(plan)]
+        answer = self.ask({"do": "push", "source": "test", "items": items})
+        assert answer["ack"] == "MAV_MISSION_ACCEPTED", answer
 
     def kill_and_restart(self) -> None:
         """Die as by a power cut, and start again as by systemd."""

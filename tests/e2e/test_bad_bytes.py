@@ -9,7 +9,6 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
 from benches import Bench, Starter
 from mission_planner import MissionPlanner
 from plain_station import PlainStation, udp_station
@@ -53,13 +52,6 @@ def damaged_frames(seed: int, count: int) -> Iterator[bytes]:
         frame = bytearray(chance.choice(originals).pack(codec, force_mavlink1=chance.random() < 0.5))
         frame[chance.randrange(len(frame))] ^= 1 << chance.randrange(8)
         yield bytes(frame)
-
-
-@pytest.fixture
-def kept(shared: Bench) -> list[str]:
-    """What the board holds before, and must hold afterwards."""
-    shared.mission_planner().write(plain_plan(12))
-    return shared.board.records()
 
 
 def test_a_megabyte_of_noise_on_udp(shared: Bench, kept: list[str]) -> None:

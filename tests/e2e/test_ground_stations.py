@@ -126,5 +126,12 @@ def test_everyone_is_told_what_becomes_of_the_mission(shared: Bench) -> None:
     writer, other = shared.mission_planner(), shared.mission_planner()
     writer.write(plain_plan(13, start=60))
     other.wait_for_text("Mission verified: 13 records")
-    other.look_around(1.5)
-    assert other.heard_of("MISSION_CURRENT")[-1].total == 12
+    other.wait_until(lambda: other.heard_of("MISSION_CURRENT")[-1].total == 12, "the new total")
+
+
+def test_many_that_came_and_went_lock_nobody_out(bench: Bench) -> None:
+    for _ in range(40):
+        with udp_station(bench.daemon.address) as passer_by:
+            passer_by.say_hello()
+    bench.mission_planner().write(plain_plan(12))
+    assert bench.board.records() == records_of(judge(plain_plan(12)))

@@ -143,9 +143,7 @@ async def test_clearing(shared: Bench) -> None:
         assert await missions.download_mission() == []
 
 
-async def test_cancelling_keeps_the_list_that_was_there(shared: Bench) -> None:
-    shared.mission_planner().write(plain_plan(12))
-    kept = shared.board.records()
+async def test_cancelling_keeps_the_list_that_was_there(shared: Bench, kept: list[str]) -> None:
     link = shared.lossy_link(delay_s=0.05)
     async with vehicle_at(link.address[1]) as vehicle:
         missions = MissionRawAsync(vehicle)
