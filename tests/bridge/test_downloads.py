@@ -1,0 +1,309 @@
+"""Reading a mission: mission-rules.md, "Read-back"."""
+
+from dataclasses import replace
+
+import pytest
+from conversations import (
+    Download,
+    Upload,
+    ack_message,
+    count_message,
+    list_message,
+    records_of,
+    request_message,
+    waypoints,
+)
+from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
+from world import Air, GroundStation, World, flash_holding
+
+from bridge.flight_controller import Kind
+from bridge.mission_desk import HeldMission, Refusal
+from protocols.mavlink.dialect import Message
+from protocols.mission_item import Command, MissionResult
+from protocols.msp.frame import MspParser
+from protocols.msp.mission import MissionCommand
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+OLD = waypoints(20, seed=77)
+OLD_RECORDS = records_of(OLD)
+OLD_FLASH = flash_holding(OLD_RECORDS)
+A = MissionResult
+
+
+def holding(options: SimOptions | None = None, flash: bytes = OLD_FLASH) -> tuple[World, GroundStation]:
+    world = World(options, speeds=(115200,), flash=flash)
+    world.wait_ready()
+    world.run(2)
+    return world, GroundStation(world)
+
+
+def ask(station: GroundStation, message: Message, seconds: float = 0.2) -> list[Message]:
+    """Send a message, and return what comes back that has to do with missions and is addressed."""
+    station.take()
+    station.send(message)
+    station.world.run(seconds)
+    return [heard for heard in station.said() if station.is_meant(heard)]
+
+
+def reads(world: World) -> int:
+    return sum(frame.command == MissionCommand.READ for _, _, data in world.written for frame in MspParser().feed(data))
+
+
+@pytest.mark.parametrize("as_int", [True, False])
+def test_the_list_reads_back_as_it_is_stored(as_int: bool) -> None:
+    _, station = holding()
+    download = Download(station, as_int=as_int)
+    items = download.run()
+    assert download.count == 20
+    frames = [0] + [3] * 19
+    assert [item.frame for item in items] == frames
+    assert [item.seq for item in items] == list(range(20))
+    if as_int:
+        assert [(item.lat_e7, item.lon_e7) for item in items] == [(item.lat_e7, item.lon_e7) for item in OLD]
+    assert [(item.p1, item.p2, item.p3, item.p4, item.alt_m) for item in items] == [
+        (item.p1, item.p2, item.p3, item.p4, item.alt_m) for item in OLD
+    ]
+    assert {(m.autocontinue, m.current) for m in station.said("MISSION_ITEM", "MISSION_ITEM_INT")} == {(1, 0)}
+    expected = "MISSION_ITEM_INT" if as_int else "MISSION_ITEM"
+    assert len(station.said(expected)) == 20
+    assert len(station.said("MISSION_ITEM", "MISSION_ITEM_INT")) == 20
+
+
+def test_it_is_read_from_the_flight_controller_after_the_bridge_starts() -> None:
+    """What another companion has put there meanwhile is what reads back: a copy answers only while it is the same."""
+    world, station = holding()
+    assert Download(station).run() != []
+    before = reads(world)
+    assert Download(station).run() != []
+    assert reads(world) == before
+    other = waypoints(9, seed=3)
+    # The same board with another list: its flash is changed behind the bridge's back, and it boots anew.
+    world.power_off()
+    world.naze._flash._memory[:] = flash_holding(records_of(other))
+    world.power_on()
+    world.run(8)
+    items = Download(station).run()
+    assert [item.lat_e7 for item in items] == [item.lat_e7 for item in other]
+
+
+def test_what_was_uploaded_reads_back_with_the_rules_applied() -> None:
+    _, station = holding()
+    items = waypoints(5, 8)
+    items[2] = replace(items[2], p1=7.0, p2=0.0, alt_m=0.0, frame=0)
+    assert Upload(station, items).run() is A.ACCEPTED
+    back = Download(station).run()
+    assert (back[2].p1, back[2].p2, back[2].alt_m, back[2].frame) == (1.0, 2.0, 2.0, 3)
+
+
+@pytest.mark.parametrize("remembered", [True, False])
+def test_a_region_of_interest_reads_back_as_it_was_sent(remembered: bool) -> None:
+    world, station = holding()
+    items = waypoints(6, 8)
+    for seq, command in ((1, Command.DO_SET_ROI), (2, Command.DO_SET_ROI_LOCATION), (3, Command.NAV_ROI)):
+        items[seq] = replace(items[seq], command=command, p2=0.0, alt_m=0.0)
+    assert Upload(station, items).run() is A.ACCEPTED
+    world.store.missions = world.store.missions if remembered else []
+    # Another time: what the bridge had in mind is gone.
+    world.unplug()
+    world.plug()
+    world.wait_ready()
+    commands = [item.command for item in Download(station).run()]
+    assert commands == ([16, 201, 195, 80, 16, 16] if remembered else [16, 80, 80, 80, 16, 16])
+
+
+def test_a_record_that_we_do_not_know_is_shown_as_nothing_that_flies() -> None:
+    strange = flash_holding([*OLD_RECORDS[:3], replace(OLD_RECORDS[3], command=99), *OLD_RECORDS[4:]])
+    _, station = holding(flash=strange)
+    item = Download(station).run()[3]
+    assert (item.command, item.p1) == (0, 99.0)
+
+
+def test_an_empty_list_is_a_count_of_none() -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    station = GroundStation(world)
+    download = Download(station)
+    download.run(2)
+    assert (download.count, download.items) == (0, [])
+    world.run(1.1)
+    assert station.said("MISSION_CURRENT")[-1].mission_state == 1
+
+
+@pytest.mark.parametrize("as_int", [True, False])
+def test_item_0_of_an_empty_list_is_the_flight_controllers_home(as_int: bool) -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    world.run(6)
+    station = GroundStation(world)
+    (item,) = ask(station, request_message(0, as_int=as_int))
+    assert item.get_type() == ("MISSION_ITEM_INT" if as_int else "MISSION_ITEM")
+    assert (item.seq, item.command, item.frame) == (0, 16, 0)
+    assert item.x != 0
+
+
+def test_a_number_past_the_end_is_an_invalid_sequence() -> None:
+    _, station = holding()
+    for seq in (20, 65535):
+        (ack,) = ask(station, request_message(seq))
+        assert (ack.get_type(), ack.type) == ("MISSION_ACK", A.INVALID_SEQUENCE)
+
+
+@pytest.mark.parametrize("mission_type", [1, 2, 7, 255])
+def test_another_mission_type_is_unsupported(mission_type: int) -> None:
+    _, station = holding()
+    for message in (
+        list_message(mission_type),
+        request_message(0, mission_type=mission_type),
+        request_message(3, as_int=False, mission_type=mission_type),
+    ):
+        (ack,) = ask(station, message)
+        assert (ack.type, ack.mission_type) == (A.UNSUPPORTED, mission_type)
+
+
+def test_armed_the_list_is_refused_but_item_0_is_served() -> None:
+    world, station = holding()
+    world.faults.armed = True
+    world.run(1)
+    (ack,) = ask(station, list_message())
+    assert ack.type == A.DENIED
+    assert "Armed: disarm to read the mission" in station.texts()
+    (ack,) = ask(station, request_message(3))
+    assert ack.type == A.DENIED
+    for as_int in (True, False):
+        (item,) = ask(station, request_message(0, as_int=as_int))
+        assert item.seq == 0
+    assert item.x == pytest.approx((OLD[0].lat_e7 or 0) / 1e7)
+    # Having read item 0 does not open the rest.
+    world.faults.armed = False
+    world.run(1)
+    assert len(Download(station).run()) == 20
+
+
+def test_item_0_is_served_armed_without_anything_read_before() -> None:
+    world = World(faults=Faults(armed=True), speeds=(115200,), flash=OLD_FLASH)
+    world.wait_ready()
+    world.run(1)
+    assert world.naze.armed
+    (item,) = ask(GroundStation(world), request_message(0), 1)
+    assert item.x == OLD[0].lat_e7
+
+
+def test_a_reading_is_a_snapshot_that_no_upload_mixes_with_another_list() -> None:
+    world, reader = holding()
+    writer = GroundStation(world, "writer", sysid=250)
+    assert ask(reader, list_message())[0].count == 20
+    read = [ask(reader, request_message(seq))[0].x for seq in range(10)]
+    assert Upload(writer, waypoints(15, 4)).run() is A.ACCEPTED
+    read += [ask(reader, request_message(seq))[0].x for seq in range(10, 20)]
+    assert read == [item.lat_e7 for item in OLD]
+    # The next reading sees the new one.
+    assert [item.lat_e7 for item in Download(reader).run()] == [item.lat_e7 for item in waypoints(15, 4)]
+
+
+@pytest.mark.parametrize("ends", ["ack", "time", "new flight controller", "own upload"])
+def test_a_snapshot_ends_with_its_reading(ends: str) -> None:
+    """Mission Planner asks for item 0 on arming: long after it has read a list that is not there any more."""
+    world, station = holding()
+    writer = GroundStation(world, "writer", sysid=250)
+    assert ask(station, list_message())[0].count == 20
+    for seq in range(20):
+        ask(station, request_message(seq), 0.05)
+    new = waypoints(15, 4)
+    assert Upload(station if ends == "own upload" else writer, new).run() is A.ACCEPTED
+    match ends:
+        case "ack":
+            station.send(ack_message(A.ACCEPTED))
+            world.run(0.1)
+        case "time":
+            world.run(25)
+        case "new flight controller":
+            world.unplug()
+            world.plug()
+            world.wait_ready()
+    assert ask(station, request_message(0))[0].x == new[0].lat_e7
+
+
+def test_two_stations_read_at_once() -> None:
+    world, first = holding()
+    second = GroundStation(world, "second", sysid=250)
+    downloads = [Download(first), Download(second, as_int=False)]
+    world.wait_until(lambda _: all(download.is_over for download in downloads), 5)
+    assert [len(download.items) for download in downloads] == [20, 20]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_reading_over_bad_air_is_exact(seed: int) -> None:
+    world = World(speeds=(115200,), flash=OLD_FLASH, seed=seed)
+    world.wait_ready()
+    station = GroundStation(world, air=Air(loss=0.1, repeat=0.1, delay_s=0.05, spread_s=0.1))
+    items = Download(station, repeat_s=0.6, tries=20).run()
+    assert [(item.lat_e7, item.lon_e7, item.alt_m) for item in items] == [
+        (item.lat_e7, item.lon_e7, item.alt_m) for item in OLD
+    ]
+
+
+def test_a_station_that_hammers_fills_nothing_and_others_are_served() -> None:
+    world, station = holding()
+    second = GroundStation(world, "second", sysid=250)
+    for number in range(4000):
+        station.send(list_message())
+        station.send(request_message(number % 700))
+        if number % 9 == 0:
+            world.run(0.0001)
+    world.run(1)
+    assert len(Download(second).run()) == 20
+
+
+def test_a_long_queue_without_a_link_ends() -> None:
+    """What waits for its turn is told so when the port goes."""
+    world, _ = holding()
+    bridge = world.bridge
+    answers: list[HeldMission | Refusal] = []
+    for _ in range(600):
+        bridge.pull_locally(answers.append, world.now)
+    bridge.fc_closed(world.now, "unplugged")
+    assert len(answers) == 600
+    assert {answer.text for answer in answers if isinstance(answer, Refusal)} == {"No link to the flight controller"}
+
+
+def test_without_a_link_and_without_a_store_the_reason_is_told() -> None:
+    world, station = holding()
+    world.unplug()
+    (ack,) = ask(station, list_message())
+    assert ack.type == A.DENIED
+    assert any("No link" in text for text in station.texts())
+    other = World(peer=MspFake({100: ident(240, HARAKIRI_CAPABILITY), 2: b"BTFL", 116: b"ARM;", 101: bytes(11)}))
+    other.wait_until(lambda w: w.is_found, 3)
+    station = GroundStation(other)
+    (ack,) = ask(station, list_message())
+    assert ack.type == A.UNSUPPORTED
+    assert any("stores no missions" in text for text in station.texts())
+
+
+def test_in_mavlink_mode_the_reason_is_told() -> None:
+    world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
+    world.faults.armed = True
+    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 8)
+    (ack,) = ask(station, request_message(0))
+    assert ack.type == A.DENIED
+    assert any("MAVLink mode" in text for text in station.texts())
+
+
+def test_reading_goes_on_beside_an_upload_by_another() -> None:
+    world, reader = holding()
+    writer = GroundStation(world, "writer", sysid=250, air=Air(delay_s=0.01))
+    upload = Upload(writer, waypoints(60, 4))
+    world.run(0.3)
+    assert [item.lat_e7 for item in Download(reader).run()] == [item.lat_e7 for item in OLD]
+    assert upload.run() is A.ACCEPTED
+
+
+def test_mission_current_counts_what_is_held() -> None:
+    world, station = holding()
+    station.send(count_message(1))
+    world.run(1.5)
+    current = station.said("MISSION_CURRENT")[-1]
+    assert (current.seq, current.total, current.mission_state) == (0, 19, 2)
+    Upload(station, waypoints(5)).run()
+    world.run(1.5)
+    assert station.said("MISSION_CURRENT")[-1].total == 4
