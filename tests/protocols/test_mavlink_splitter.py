@@ -1,0 +1,131 @@
+"""Finding MAVLink frames in any stream: whole or byte by byte, behind false and cut headers, quickly."""
+
+import random
+from itertools import pairwise
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from protocols.mavlink.codec import MavlinkDecoder, MavlinkEncoder
+from protocols.mavlink.dialect import messages
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+
+MEGABYTE = 1 << 20
+
+
+def make_frames() -> list[bytes]:
+    """Frames of both versions, short and long, truncated zeros included."""
+    encoder = MavlinkEncoder(1, 190)
+    some = [
+        messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3),
+        messages.MAVLink_mission_request_message(255, 190, 7, 0),
+        messages.MAVLink_statustext_message(3, b"\xfe\xfd\xfe\x09" * 12),
+        messages.MAVLink_mission_item_int_message(
+            1, 1, 3, 3, 16, 0, 1, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 20.0, 0
+        ),
+        messages.MAVLink_param_request_list_message(0, 0),
+    ]
+    return [encoder.encode(message, version) for message in some for version in (1, 2)]
+
+
+FRAMES = make_frames()
+#: Bytes that look like the beginning of frames, and any others.
+pieces = st.one_of(
+    st.sampled_from(FRAMES),
+    st.sampled_from(FRAMES).flatmap(lambda frame: st.integers(1, len(frame) - 1).map(lambda size: frame[:size])),
+    st.sampled_from(FRAMES).flatmap(lambda frame: st.integers(1, len(frame) - 1).map(lambda start: frame[start:])),
+    st.sampled_from(
+        [b"\xfe", b"\xfd", b"\xfe\x00", b"\xfe\xff", b"\xfd\xff\x00", b"\xfd\x00\x01", b"\xfd\x10\x00\x00"]
+    ),
+    st.binary(max_size=40),
+)
+streams = st.lists(pieces, max_size=12).map(b"".join)
+
+
+def split(data: bytes, cuts: list[int]) -> tuple[list[MavlinkFrame], MavlinkSplitter]:
+    splitter = MavlinkSplitter()
+    frames: list[MavlinkFrame] = []
+    places = sorted({0, len(data), *(cut % (len(data) + 1) for cut in cuts)})
+    for start, end in pairwise(places):
+        frames += splitter.feed(data[start:end])
+    return frames, splitter
+
+
+@given(streams, st.lists(st.integers(0, 5000), max_size=8))
+@example(b"\xfe\xff" + FRAMES[0], [])
+def test_any_stream_gives_the_same_frames_however_it_is_cut(data: bytes, cuts: list[int]) -> None:
+    whole, splitter = split(data, [])
+    rest = splitter.reset()
+    for places in (cuts, list(range(len(data)))):
+        frames, other = split(data, places)
+        assert frames == whole
+        assert other.reset() == rest
+    # Every byte is either in a frame or counted.
+    assert splitter.skipped_bytes + sum(len(frame.raw) for frame in whole + rest) == len(data)
+
+
+@given(streams, st.sampled_from(FRAMES), streams)
+def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
+    before: bytes, frame: bytes, after: bytes
+) -> None:
+    data = before + frame + after
+    found, splitter = split(data, [])
+    found += splitter.reset()
+    assert b"".join(one.raw for one in found).find(frame) >= 0
+
+
+@given(streams)
+def test_what_is_found_decodes_or_is_refused_and_never_raises(data: bytes) -> None:
+    found, splitter = split(data, [])
+    decoder = MavlinkDecoder()
+    for frame in found + splitter.reset():
+        decoder.decode(frame)
+
+
+@given(st.binary(max_size=300))
+def test_any_payload_with_a_right_checksum_decodes_or_is_refused(payload: bytes) -> None:
+    """A sender may fill a known message with anything: too long, too short, strings that are none."""
+    from fastcrc.crc16 import mcrf4xx
+
+    from protocols.mavlink.dialect import CRC_EXTRA
+
+    payload = payload[:255]
+    decoder = MavlinkDecoder()
+    for msgid in (0, 20, 23, 39, 44, 45, 47, 73, 76, 110, 253):
+        header = bytes((len(payload), 0, 0, 5, 255, 190)) + msgid.to_bytes(3, "little")
+        crc = mcrf4xx(header + payload + bytes((CRC_EXTRA[msgid],)))
+        (frame,) = MavlinkSplitter().feed(b"\xfd" + header + payload + crc.to_bytes(2, "little"))
+        decoder.decode(frame)
+
+
+def test_a_signed_frame_is_taken_with_its_signature() -> None:
+    mavlink = messages.MAVLink(None, srcSystem=255, srcComponent=190)
+    mavlink.signing.secret_key = bytes(32)
+    mavlink.signing.sign_outgoing = True
+    frame = bytes(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(mavlink))
+    splitter = MavlinkSplitter()
+    (found,) = splitter.feed(frame + FRAMES[0])[:1]
+    assert found.raw == frame
+    assert splitter.skipped_bytes == 0
+
+
+def test_an_incompatibility_flag_that_we_do_not_know_is_refused() -> None:
+    frame = bytearray(FRAMES[1])
+    assert frame[0] == 0xFD
+    frame[2] = 0x02
+    splitter = MavlinkSplitter()
+    assert splitter.feed(bytes(frame)) + splitter.reset() == []
+
+
+def test_a_megabyte_of_anything_costs_a_bounded_amount_of_work() -> None:
+    """What waits for its end is never more than one frame, so that no byte is looked at more than a few times."""
+    draw = random.Random(1)
+    alphabets = (bytes(range(256)), b"\xfe", b"\xfd\x00", b"\xfe\xff\x00", bytes(range(256)) + b"\xfe\xfd" * 128)
+    for alphabet in alphabets:
+        data = bytes(draw.choices(alphabet, k=MEGABYTE // 4))
+        splitter = MavlinkSplitter()
+        for start in range(0, len(data), 4096):
+            splitter.feed(data[start : start + 4096])
+            assert len(splitter._buffer) < 10 + 255 + 2 + 13
+        splitter.reset()
+        assert splitter._buffer == b""

@@ -1,0 +1,95 @@
+"""Finding MSP frames in any stream: whole or byte by byte, behind false and cut headers, quickly."""
+
+import random
+from itertools import pairwise
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from protocols.msp.frame import Direction, MspFrame, MspParser, request
+
+MEGABYTE = 1 << 20
+
+frames = st.builds(MspFrame, st.sampled_from(Direction), st.integers(0, 255), st.binary(max_size=40))
+encoded = frames.map(MspFrame.encode)
+pieces = st.one_of(
+    encoded,
+    encoded.flatmap(lambda frame: st.integers(1, len(frame) - 1).map(lambda size: frame[:size])),
+    encoded.flatmap(lambda frame: st.integers(1, len(frame) - 1).map(lambda start: frame[start:])),
+    st.sampled_from([b"$", b"$M", b"$M>", b"$M>\xff", b"$M!\x00", b"$$M", b"$M$", b"$M>\x03d"]),
+    st.binary(max_size=30),
+)
+streams = st.lists(pieces, max_size=12).map(b"".join)
+
+
+def parse(data: bytes, cuts: list[int]) -> tuple[list[MspFrame], MspParser]:
+    parser = MspParser()
+    found: list[MspFrame] = []
+    places = sorted({0, len(data), *(cut % (len(data) + 1) for cut in cuts)})
+    for start, end in pairwise(places):
+        found += parser.feed(data[start:end])
+    return found, parser
+
+
+@given(streams, st.lists(st.integers(0, 5000), max_size=8))
+@example(b"$M>\xff" + request(100), [])
+@example(b"$", [])
+def test_any_stream_gives_the_same_frames_however_it_is_cut(data: bytes, cuts: list[int]) -> None:
+    whole, parser = parse(data, [])
+    rest = parser.reset()
+    for places in (cuts, list(range(len(data)))):
+        found, other = parse(data, places)
+        assert found == whole
+        assert other.reset() == rest
+    assert parser.skipped_bytes + sum(len(frame.encode()) for frame in whole + rest) == len(data)
+
+
+@given(streams, frames, streams)
+def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
+    before: bytes, frame: MspFrame, after: bytes
+) -> None:
+    found, parser = parse(before + frame.encode() + after, [])
+    found += parser.reset()
+    assert (
+        frame in found or any(frame.encode() in one.encode()[1:] for one in found) or _overlapped(before, frame, found)
+    )
+
+
+def _overlapped(before: bytes, frame: MspFrame, found: list[MspFrame]) -> bool:
+    """Tell whether bytes before it and bytes of its own make up another valid frame."""
+    stream = before + frame.encode()
+    return any(one.encode() in stream and stream.rfind(one.encode()) + len(one.encode()) > len(before) for one in found)
+
+
+@given(frames)
+def test_a_frame_survives_the_way_there_and_back(frame: MspFrame) -> None:
+    assert MspParser().feed(frame.encode()) == [frame]
+
+
+@given(frames, st.data())
+def test_a_flipped_bit_in_what_the_checksum_covers_is_seen(frame: MspFrame, data: st.DataObject) -> None:
+    damaged = bytearray(frame.encode())
+    at = data.draw(st.integers(3, len(damaged) - 1))
+    damaged[at] ^= 1 << data.draw(st.integers(0, 7))
+    assert frame not in MspParser().feed(bytes(damaged))
+
+
+def test_a_reply_behind_a_false_header_comes_with_the_reset_or_the_next_bytes() -> None:
+    answer = MspFrame(Direction.REPLY, 100, bytes(7))
+    parser = MspParser()
+    assert parser.feed(b"$M>\xf0\x01" + answer.encode()) == []
+    assert parser.reset() == [answer]
+    assert parser.feed(b"$M>\x40\x01" + answer.encode()) == []
+    assert answer in parser.feed(bytes(64))
+
+
+def test_a_megabyte_of_anything_costs_a_bounded_amount_of_work() -> None:
+    draw = random.Random(1)
+    for alphabet in (bytes(range(256)), b"$", b"$M", b"$M>", b"$M>\xff", bytes(range(256)) + b"$M>" * 85):
+        data = bytes(draw.choices(alphabet, k=MEGABYTE))
+        parser = MspParser()
+        for start in range(0, len(data), 4096):
+            parser.feed(data[start : start + 4096])
+            assert len(parser._buffer) < 6 + 255
+        parser.reset()
+        assert parser._buffer == b""
