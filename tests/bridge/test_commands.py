@@ -1,0 +1,342 @@
+"""What else a ground station asks: every command acknowledged once, nothing that acts on the aircraft done."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from world import GroundStation, World
+
+from protocols.mavlink.dialect import Message, messages
+from service.simulator.options import Faults
+
+m = messages
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+
+
+@pytest.fixture(scope="module")
+def flying() -> tuple[World, GroundStation]:
+    """A world whose board has a fix and a home."""
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    world.run(7)
+    return world, GroundStation(world)
+
+
+def long(command: int, param1: float = 0.0, *, system: int = 1, component: int = 1) -> Message:
+    return m.MAVLink_command_long_message(system, component, command, 0, param1, 0, 0, 0, 0, 0, 0)
+
+
+def integer(command: int, param1: float = 0.0) -> Message:
+    return m.MAVLink_command_int_message(1, 1, 3, command, 0, 0, param1, 0, 0, 0, 0, 0, 0)
+
+
+def answers(flying: tuple[World, GroundStation], *sent: Message) -> list[Message]:
+    """Send, and return all that comes back but telemetry."""
+    world, station = flying
+    station.take()
+    for message in sent:
+        station.send(message)
+    world.run(0.05)
+    telemetry = {"HEARTBEAT", "SYS_STATUS", "ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "MISSION_CURRENT"}
+    return [heard for heard in station.said() if heard.get_type() not in telemetry]
+
+
+def acks(heard: list[Message]) -> list[tuple[int, int, int, int]]:
+    return [
+        (ack.command, ack.result, ack.target_system, ack.target_component)
+        for ack in heard
+        if ack.get_type() == "COMMAND_ACK"
+    ]
+
+
+@pytest.mark.parametrize("make", [long, integer])
+@pytest.mark.parametrize(
+    ("command", "param1", "result", "also"),
+    [
+        (512, 148, ACCEPTED, "AUTOPILOT_VERSION"),
+        (520, 1, ACCEPTED, "AUTOPILOT_VERSION"),
+        (410, 0, ACCEPTED, "HOME_POSITION"),
+        (512, 242, ACCEPTED, "HOME_POSITION"),
+        (42428, 0, ACCEPTED, "STATUSTEXT"),
+        (511, 33, ACCEPTED, None),
+        (512, 259, UNSUPPORTED, None),
+        (512, 269, UNSUPPORTED, None),
+        (512, 280, UNSUPPORTED, None),
+        (512, math.nan, UNSUPPORTED, None),
+        (512, math.inf, UNSUPPORTED, None),
+        (512, -1, UNSUPPORTED, None),
+        (521, 1, UNSUPPORTED, None),
+        (0, 0, UNSUPPORTED, None),
+        (65535, 0, UNSUPPORTED, None),
+    ],
+)
+def test_every_command_is_acknowledged_once(
+    flying: tuple[World, GroundStation],
+    make: Callable[[int, float], Message],
+    command: int,
+    param1: float,
+    result: int,
+    also: str | None,
+) -> None:
+    heard = answers(flying, make(command, param1))
+    assert acks(heard) == [(command, result, 255, 190)]
+    others = [message.get_type() for message in heard if message.get_type() != "COMMAND_ACK"]
+    assert others == ([also] if also else [])
+
+
+def test_all_command_numbers_are_acknowledged(flying: tuple[World, GroundStation]) -> None:
+    numbers = [*range(700), *range(3000, 3010), *range(42400, 42440)]
+    heard = answers(flying, *(long(number) for number in numbers))
+    assert [ack[0] for ack in acks(heard)] == numbers
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (400, "transmitter"),  # arm, disarm
+        (176, "transmitter"),  # set mode
+        (246, "not rebooted"),
+        (300, "transmitter"),  # mission start
+        (22, "transmitter"),
+        (21, "transmitter"),
+        (20, "transmitter"),
+        (224, "waypoint cannot be set"),
+    ],
+)
+def test_what_would_act_on_the_aircraft_is_denied_with_a_reason(
+    flying: tuple[World, GroundStation], command: int, words: str
+) -> None:
+    world, _ = flying
+    before = len(world.written)
+    heard = answers(flying, long(command, 1.0))
+    assert acks(heard) == [(command, DENIED, 255, 190)]
+    texts = [message for message in heard if message.get_type() == "STATUSTEXT"]
+    assert len(texts) == 1
+    assert words in texts[0].text
+    assert texts[0].severity == 3
+    # Nothing but polls went to the flight controller.
+    assert all(data[4] < 190 for _, _, data in world.written[before:])
+    assert not world.naze.armed
+
+
+def test_a_mode_is_refused_with_a_text(flying: tuple[World, GroundStation]) -> None:
+    heard = answers(flying, m.MAVLink_set_mode_message(1, 1, 4))
+    assert [message.get_type() for message in heard] == ["STATUSTEXT"]
+    assert "transmitter switches" in heard[0].text
+
+
+def test_the_current_waypoint_cannot_be_set(flying: tuple[World, GroundStation]) -> None:
+    heard = answers(flying, m.MAVLink_mission_set_current_message(1, 1, 3))
+    assert ["cannot be set" in message.text for message in heard] == [True]
+
+
+def test_a_command_for_another_is_not_answered(flying: tuple[World, GroundStation]) -> None:
+    for system, component in ((2, 1), (1, 100), (255, 0)):
+        assert answers(flying, long(400, 1.0, system=system, component=component)) == []
+    for system, component in ((0, 0), (1, 0), (0, 1)):
+        assert len(acks(answers(flying, long(512, 148, system=system, component=component)))) == 1
+
+
+def test_the_version_says_what_is_there_and_no_ftp(flying: tuple[World, GroundStation]) -> None:
+    (version,) = answers(flying, m.MAVLink_autopilot_version_request_message(1, 1))
+    assert version.get_type() == "AUTOPILOT_VERSION"
+    can = version.capabilities
+    assert can & m.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    assert can & m.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    assert can & m.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    assert not can & m.MAV_PROTOCOL_CAPABILITY_FTP
+
+
+def test_a_home_that_is_not_known_is_refused_for_now() -> None:
+    world = World(powered=False)
+    world.run(0.5)
+    heard = answers((world, GroundStation(world)), long(410), long(512, 242))
+    assert [(ack[0], ack[1]) for ack in acks(heard)] == [(410, TEMPORARILY_REJECTED), (512, TEMPORARILY_REJECTED)]
+
+
+def test_the_banner_names_the_flight_controller(flying: tuple[World, GroundStation]) -> None:
+    heard = answers(flying, long(42428))
+    text = "".join(message.text for message in heard if message.get_type() == "STATUSTEXT")
+    assert "Harakiri with the mission extension" in text
+
+
+def test_a_file_request_is_refused_at_once(flying: tuple[World, GroundStation]) -> None:
+    payload = bytes((7, 0, 3, 4, 0, 0, 0, 0, 0, 0, 0, 0)).ljust(251, b"\0")
+    (answer,) = answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload)))
+    assert (answer.target_system, answer.target_component) == (255, 190)
+    assert list(answer.payload[:6]) == [8, 0, 3, 129, 1, 4]
+    # A refusal is no request: nobody answers it.
+    assert answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(answer.payload))) == []
+
+
+def test_a_ping_is_answered_and_an_answer_is_not(flying: tuple[World, GroundStation]) -> None:
+    (answer,) = answers(flying, m.MAVLink_ping_message(123456789, 42, 0, 0))
+    assert (answer.time_usec, answer.seq, answer.target_system, answer.target_component) == (123456789, 42, 255, 190)
+    assert answers(flying, m.MAVLink_ping_message(123456789, 42, 1, 1)) == []
+
+
+def test_time_is_told_who_asks(flying: tuple[World, GroundStation]) -> None:
+    world, _ = flying
+    (answer,) = answers(flying, m.MAVLink_timesync_message(0, 777))
+    assert answer.ts1 == 777
+    assert abs(answer.tc1 / 1e9 - world.now) < 1
+    assert answers(flying, m.MAVLink_timesync_message(5, 777)) == []
+
+
+def test_stream_requests_are_taken_in_silence(flying: tuple[World, GroundStation]) -> None:
+    requests = [m.MAVLink_request_data_stream_message(1, 1, stream, 2, 1) for stream in (2, 6, 10, 11, 12, 1, 3)]
+    assert answers(flying, *requests) == []
+
+
+# Parameters.
+
+
+def param_set(name: bytes, value: float) -> Message:
+    return m.MAVLink_param_set_message(1, 1, name, value, 9)
+
+
+def values(heard: list[Message]) -> list[tuple[str, float, int, int]]:
+    return [
+        (message.param_id, message.param_value, message.param_index, message.param_count)
+        for message in heard
+        if message.get_type() == "PARAM_VALUE"
+    ]
+
+
+def radius_world() -> tuple[World, GroundStation]:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    return world, GroundStation(world)
+
+
+def test_the_list_is_short_and_complete(flying: tuple[World, GroundStation]) -> None:
+    heard = answers(flying, m.MAVLink_param_request_list_message(1, 1))
+    assert values(heard) == [("SYSID_THISMAV", 1.0, 0, 2), ("WPNAV_RADIUS", 200.0, 1, 2)]
+    assert {message.param_type for message in heard} == {9}
+
+
+@pytest.mark.parametrize(
+    ("name", "index", "expected"),
+    [
+        (b"", 0, "SYSID_THISMAV"),
+        (b"", 1, "WPNAV_RADIUS"),
+        (b"WPNAV_RADIUS", -1, "WPNAV_RADIUS"),
+        (b"SYSID_THISMAV", -1, "SYSID_THISMAV"),
+        (b"WPNAV_RADIUS", 0, "SYSID_THISMAV"),  # the index counts
+        (b"", 2, None),
+        (b"", 32767, None),
+        (b"NO_SUCH_NAME", -1, None),
+        (b"WPNAV_RADIUS1234", -1, None),
+        (b"", -1, None),
+        (b"WPNAV_RADIUS", -2, "WPNAV_RADIUS"),
+        (b"\xff\xfe", -1, None),
+    ],
+)
+def test_one_is_read_by_index_or_by_name(
+    flying: tuple[World, GroundStation], name: bytes, index: int, expected: str | None
+) -> None:
+    heard = answers(flying, m.MAVLink_param_request_read_message(1, 1, name, index))
+    assert [value[0] for value in values(heard)] == ([expected] if expected else [])
+
+
+def test_the_radius_is_set_on_the_flight_controller() -> None:
+    world, station = radius_world()
+    station.send(param_set(b"WPNAV_RADIUS", 350.0))
+    world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 1)
+    assert values(station.said()) == [("WPNAV_RADIUS", 350.0, 1, 2)]
+    assert station.texts() == []
+    operations = world.naze.flash_operations
+    world.run(2)
+    # It is the firmware that writes it, a second later.
+    assert world.naze.flash_operations > operations
+    world.power_off()
+    world.power_on()
+    world.run(6)
+    assert values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1] == 350.0
+
+
+@pytest.mark.parametrize("value", [200.0, 200.4, 200.99])
+def test_an_equal_value_is_not_written(value: float) -> None:
+    world, station = radius_world()
+    before, operations = len(world.written), world.naze.flash_operations
+    heard = answers((world, station), param_set(b"WPNAV_RADIUS", value))
+    assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
+    assert all(data[4] < 190 for _, _, data in world.written[before:])
+    world.run(2)
+    assert world.naze.flash_operations == operations
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, 2001.0, 1e30])
+def test_a_value_out_of_range_changes_nothing_and_says_so(value: float) -> None:
+    world, station = radius_world()
+    heard = answers((world, station), param_set(b"WPNAV_RADIUS", value))
+    assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
+    assert station.texts() == ["WPNAV_RADIUS must be 0..2000 cm"]
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, 13.0, 35.0, 82.0, 2000.0])
+def test_every_radius_in_range_is_set(value: float) -> None:
+    world, station = radius_world()
+    assert values(answers((world, station), param_set(b"WPNAV_RADIUS", value)))[0][1] == value
+    world.assert_line_was_clean()
+
+
+def test_what_cannot_be_set_answers_with_what_it_is() -> None:
+    world, station = radius_world()
+    assert values(answers((world, station), param_set(b"SYSID_THISMAV", 7.0))) == [("SYSID_THISMAV", 1.0, 0, 2)]
+    assert answers((world, station), param_set(b"NO_SUCH_NAME", 7.0)) == []
+
+
+def test_armed_the_radius_stays_and_the_pilot_hears_why() -> None:
+    world, station = radius_world()
+    world.faults.armed = True
+    world.run(1)
+    heard = answers((world, station), param_set(b"WPNAV_RADIUS", 400.0))
+    assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
+    assert any("disarm" in text for text in station.texts())
+
+
+def test_a_board_that_falls_silent_is_said_to_have_set_nothing() -> None:
+    world, station = radius_world()
+    world.faults.hang = True
+    station.send(param_set(b"WPNAV_RADIUS", 400.0))
+    world.wait_until(lambda _: bool(station.texts()), 5)
+    assert "WPNAV_RADIUS was not set: no answer" in station.texts()[0]
+
+
+def test_without_the_extension_there_is_no_radius() -> None:
+    world = World(faults=Faults(extension=False))
+    world.wait_ready()
+    station = GroundStation(world)
+    heard = answers((world, station), m.MAVLink_param_request_list_message(1, 1), param_set(b"WPNAV_RADIUS", 300.0))
+    assert values(heard) == [("SYSID_THISMAV", 1.0, 0, 1)]
+
+
+def test_a_repeated_or_hammered_set_is_done_once_at_a_time() -> None:
+    world, station = radius_world()
+    for number in range(2000):
+        station.send(param_set(b"WPNAV_RADIUS", 300.0 + number % 5))
+        if number % 9 == 0:
+            world.run(0.0001)
+    world.run(4)
+    heard = answers((world, station), m.MAVLink_param_request_list_message(1, 1))
+    assert 300 <= values(heard)[1][1] <= 304
+    world.assert_line_was_clean()
+
+
+def test_a_late_answer_to_one_value_is_not_taken_for_another() -> None:
+    """The board hangs while the first value is on its way, and answers both when it comes back."""
+    for hang_s in (0.1, 0.2, 0.3, 0.5, 0.8):
+        world, station = radius_world()
+        world.faults.hang = True
+        station.send(param_set(b"WPNAV_RADIUS", 300.0))
+        world.run(0.02)
+        world.after(hang_s, lambda world=world: setattr(world.faults, "hang", False))  # type: ignore[misc]
+        world.run(hang_s - 0.01)
+        station.send(param_set(b"WPNAV_RADIUS", 500.0))
+        world.run(3)
+        told = values(station.said())[-1][1]
+        assert told == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1]
+        info = world.bridge.desk.dialect
+        assert info is not None
+        assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == told

@@ -1,0 +1,232 @@
+"""Ground stations that come and go: who is spoken to, in which MAVLink version, and for how long."""
+
+import pytest
+from conversations import Upload, waypoints
+from world import GroundStation, World
+
+from bridge.bridge import split_text
+from bridge.station import Peer
+from bridge.stations import EXPIRY_S, MAX_PEERS
+from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import MissionResult
+
+m = messages
+
+
+def gcs_heartbeat() -> Message:
+    return m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+def versions(station: GroundStation, *, heartbeats: bool = True) -> set[int]:
+    """The MAVLink versions of the frames that came, by their first byte."""
+    heartbeat_ids = {(0xFE, 0), (0xFD, 0)}
+    frames = station.frames_heard
+    ids = [(frame[0], frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")) for frame in frames]
+    return {1 if magic == 0xFE else 2 for magic, msgid in ids if heartbeats or (magic, msgid) not in heartbeat_ids}
+
+
+def start() -> World:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    return world
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_each_is_answered_in_its_own_version(version: int) -> None:
+    world = start()
+    station = GroundStation(world, version=version)
+    other = GroundStation(world, "other", sysid=250, version=3 - version)
+    for one in (station, other):
+        one.send(gcs_heartbeat())
+    world.run(0.01)
+    station.frames_heard.clear()
+    assert Upload(station, waypoints(5)).run() is MissionResult.ACCEPTED
+    world.run(2.5)
+    assert versions(station, heartbeats=False) == {version}
+    assert versions(other, heartbeats=False) == {3 - version}
+    # Who speaks MAVLink 1 sees the vehicle in MAVLink 2 as well: Mission Planner changes over when it does.
+    assert versions(station) == ({1, 2} if version == 1 else {2})
+
+
+def test_who_changes_over_to_mavlink_2_is_answered_in_it() -> None:
+    world = start()
+    station = GroundStation(world, version=1)
+    station.send(gcs_heartbeat())
+    world.run(1.5)
+    station.version = 2
+    station.send(gcs_heartbeat())
+    world.run(0.01)
+    station.frames_heard.clear()
+    # It may still send a frame in MAVLink 1 now and then.
+    station.version = 1
+    station.send(gcs_heartbeat())
+    world.run(2)
+    assert versions(station) == {2}
+
+
+def test_the_vehicle_is_there_once_a_second_with_what_is_known_of_it() -> None:
+    world = start()
+    station = GroundStation(world)
+    station.send(gcs_heartbeat())
+    world.run(0.01)
+    station.take()
+    world.run(10)
+    beats = [at for at, message in station.heard if message.get_type() == "HEARTBEAT"]
+    assert len(beats) == 10
+    for name in ("SYS_STATUS", "ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "MISSION_CURRENT"):
+        assert 9 <= len(station.said(name)) <= 11
+    beat = station.said("HEARTBEAT")[-1]
+    assert (beat.get_srcSystem(), beat.get_srcComponent(), beat.autopilot, beat.type) == (1, 1, 3, 2)
+
+
+def test_the_heartbeat_tells_whether_a_flight_controller_is_there_and_armed() -> None:
+    world = World(speeds=(115200,), powered=False)
+    station = GroundStation(world)
+    station.send(gcs_heartbeat())
+    world.run(2)
+    assert station.said("HEARTBEAT")[-1].system_status == m.MAV_STATE_UNINIT
+    assert station.said("ATTITUDE", "GPS_RAW_INT") == []
+    world.power_on()
+    world.run(6)
+    assert station.said("HEARTBEAT")[-1].system_status == m.MAV_STATE_STANDBY
+    world.faults.armed = True
+    world.run(2)
+    beat = station.said("HEARTBEAT")[-1]
+    assert beat.system_status == m.MAV_STATE_ACTIVE
+    assert beat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
+    assert station.texts() == ["Found Harakiri with the mission extension"]
+
+
+def test_who_is_silent_for_a_minute_is_not_spoken_to_any_more() -> None:
+    world = start()
+    station = GroundStation(world)
+    station.send(gcs_heartbeat())
+    world.run(EXPIRY_S - 1)
+    assert station.take("HEARTBEAT")
+    world.run(3)
+    station.take()
+    world.run(5)
+    assert station.heard == []
+    assert world.bridge.peers() == []
+    station.send(gcs_heartbeat())
+    world.run(2)
+    assert station.said("HEARTBEAT")
+
+
+def test_who_keeps_speaking_stays() -> None:
+    world = start()
+    station = GroundStation(world)
+    for second in range(0, 200, 20):
+        world.after(second, lambda: station.send(gcs_heartbeat()))
+    world.run(210)
+    assert len(world.events("gcs.found")) == 1
+    assert world.events("gcs.silent") == []
+
+
+def test_a_default_peer_is_spoken_to_unasked_and_for_ever_in_both_versions() -> None:
+    world = start()
+    station = GroundStation(world, "fixed")
+    world.bridge.add_default_peer(station.peer, until_answered=False)
+    world.run(5)
+    assert versions(station) == {1, 2}
+    assert len(station.said("ATTITUDE")) >= 4
+    station.send(gcs_heartbeat())
+    world.run(EXPIRY_S + 5)
+    station.take()
+    world.run(5)
+    assert len(station.said("ATTITUDE")) >= 4
+    world.bridge.remove_default_peer(station.peer)
+    station.take()
+    world.run(3)
+    assert station.heard == []
+
+
+def test_a_broadcast_address_is_spoken_to_until_somebody_answers() -> None:
+    world = start()
+    everyone = GroundStation(world, "broadcast")
+    world.bridge.add_default_peer(everyone.peer, until_answered=True)
+    world.run(3)
+    assert everyone.said("HEARTBEAT")
+    station = GroundStation(world, "answers")
+    station.send(gcs_heartbeat())
+    world.run(0.01)
+    everyone.take()
+    world.run(5)
+    assert everyone.heard == []
+    assert station.said("HEARTBEAT")
+    world.run(EXPIRY_S)
+    assert everyone.said("HEARTBEAT")
+
+
+def test_strangers_by_the_hundred_take_no_memory_and_leave_room() -> None:
+    world = start()
+    station = GroundStation(world)
+    frame = GroundStation(world, "pack", sysid=9).pack(gcs_heartbeat())
+    for number in range(500):
+        world.bridge.gcs_received(Peer("udp", ("10.0.0.1", number)), frame, world.now, datagram=True)
+    assert len(world.bridge.peers()) <= MAX_PEERS
+    world.run(6)
+    # They fell silent: a new one finds room.
+    station.send(gcs_heartbeat())
+    world.run(1.5)
+    assert station.said("HEARTBEAT")
+
+
+def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
+    world = start()
+    station = GroundStation(world, "tcp")
+    data = station.pack(gcs_heartbeat()) + station.pack(
+        m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0)
+    )
+    for byte in data:
+        world.spoken_by(station, bytes((byte,)), datagram=False)
+    world.run(0.01)
+    assert len(station.said("COMMAND_ACK")) == 1
+    world.spoken_by(station, data[:9], datagram=False)
+    world.bridge.gcs_gone(station.peer)
+    # A new connection from the same address begins anew.
+    world.spoken_by(station, data, datagram=False)
+    world.run(0.01)
+    assert len(station.said("COMMAND_ACK")) == 2
+    world.bridge.gcs_gone(station.peer)
+    assert world.bridge.peers() == []
+    assert world.bridge._splitters == {}
+
+
+def test_a_datagram_with_a_cut_frame_does_not_spoil_the_next() -> None:
+    world = start()
+    station = GroundStation(world)
+    command = station.pack(m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0))
+    for datagram in (command[:10], b"\xfd\xff" + command, command + command, b"\xfe\x09" + command[:5]):
+        world.spoken_by(station, datagram)
+    world.run(0.01)
+    assert len(station.said("COMMAND_ACK")) == 3
+
+
+def test_our_own_frames_that_come_back_are_nobody() -> None:
+    world = start()
+    station = GroundStation(world)
+    station.send(gcs_heartbeat())
+    world.run(2)
+    echo = list(station.frames_heard)
+    before = len(world.bridge.peers())
+    for frame in echo:
+        world.bridge.gcs_received(Peer("udp", "echo"), frame, world.now, datagram=True)
+    assert len(world.bridge.peers()) == before
+
+
+def test_texts_fit_their_message_and_lose_nothing() -> None:
+    texts = [
+        "short",
+        "x" * 50,
+        "x" * 51,
+        "word " * 40,
+        "a" * 120 + " b",
+        "y" * 50 + " z",
+        "",
+    ]
+    for text in texts:
+        pieces = split_text(text)
+        assert all(len(piece) <= 50 for piece in pieces)
+        assert "".join("".join(pieces).split()) == "".join(text.split())
+        assert all(pieces) or not text
