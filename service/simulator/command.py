@@ -7,9 +7,12 @@ from pathlib import Path
 
 import click
 
+from service.simulator.compiled_core import CORE_CAPACITY, load_core
 from service.simulator.control import Control
 from service.simulator.flash import ERASED
+from service.simulator.mission_commands import MissionCommands
 from service.simulator.mission_slots import flash_size
+from service.simulator.missions import BootMissions
 from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
 from service.simulator.pty_link import PtyLink
@@ -35,6 +38,15 @@ def _open_flash(path: Path, size: int) -> memoryview:
         f"The state file {path} has {found} bytes, but this board's flash has {size}: "
         "give the same --capacity as before, or another file."
     )
+
+
+def _load_core(path: Path, capacity: int) -> BootMissions:
+    if capacity != CORE_CAPACITY:
+        raise click.ClickException(f"The compiled core holds {CORE_CAPACITY} records: leave --capacity away.")
+    try:
+        return load_core(path)
+    except OSError as error:
+        raise click.ClickException(f"Cannot load the core: {error}. Make it with: make -C firmware sim") from error
 
 
 async def _run(
@@ -86,6 +98,11 @@ async def _run(
 @click.option("--seed", type=int, default=0, help="Of the random faults.")
 @click.option("--hang-after", type=_PERIOD, help="Stop answering after this many seconds.")
 @click.option("--power-cut-after", type=_PERIOD, help="Lose power after this many seconds.")
+@click.option(
+    "--core",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Run the firmware's own mission core out of this shared library (make -C firmware sim).",
+)
 @click.option("--state", type=_PATH, help="File that keeps the flash's contents.")
 @click.option("--control", type=_PATH, help="Unix socket that takes lines from tests.")
 def sim(
@@ -103,6 +120,7 @@ def sim(
     seed: int,
     hang_after: float | None,
     power_cut_after: float | None,
+    core: Path | None,
     state: Path | None,
     control: Path | None,
 ) -> None:
@@ -118,4 +136,6 @@ def sim(
     )
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
     memory = _open_flash(state, flash_size(options)) if state else None
-    asyncio.run(_run(SimulatedNaze(options, faults, memory), link, control, hang_after, power_cut_after))
+    missions = _load_core(core, capacity) if core else MissionCommands
+    naze = SimulatedNaze(options, faults, memory, missions)
+    asyncio.run(_run(naze, link, control, hang_after, power_cut_after))

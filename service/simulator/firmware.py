@@ -13,8 +13,8 @@ from service.simulator import frsky
 from service.simulator.flash import FlashError, NorFlash
 from service.simulator.flight import FlightState, fly
 from service.simulator.mavlink_port import MavlinkSchedule, MavlinkSender
-from service.simulator.mission_commands import Board, MissionCommands
-from service.simulator.mission_slots import MissionSlots, StoredConfig
+from service.simulator.mission_slots import StoredConfig
+from service.simulator.missions import Board, BootMissions
 from service.simulator.msp_port import HarakiriCommand, MspAnswers, MspReceiver, reply
 from service.simulator.options import Counters, Faults, SimOptions, TelemetryProtocol
 from service.simulator.traps import Trap, TrapCounters
@@ -45,7 +45,14 @@ class Firmware:
     """Runs one main loop at a time; loops that would have nothing to do need not be run."""
 
     def __init__(
-        self, options: SimOptions, faults: Faults, counters: Counters, uart: Uart, flash: NorFlash, now: float
+        self,
+        options: SimOptions,
+        faults: Faults,
+        counters: Counters,
+        uart: Uart,
+        flash: NorFlash,
+        boot_missions: BootMissions,
+        now: float,
     ) -> None:
         self._options = options
         self._faults = faults
@@ -60,9 +67,8 @@ class Firmware:
         self._flown = 0.0
 
         self._config = StoredConfig(flash, options)
-        self._board = Board(armed=False, wp_radius_cm=self._config.load())
-        self._slots = MissionSlots(flash, options)
-        self._missions = MissionCommands(self._slots, self._board, options, faults) if faults.extension else None
+        self._board = Board(options, faults, self._config.load())
+        self._missions = boot_missions(flash, self._board) if faults.extension else None
         # The extension brings a buffer for its longest CHUNK: mask, number, records.
         self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
         self._answers = MspAnswers(lambda: (self._flight(), self.armed))
@@ -230,10 +236,9 @@ class Firmware:
         return any(frame.version == 1 for frame in self._mavlink.feed(bytes((byte,))))
 
     def _answer(self, command: int, payload: bytes) -> None:
-        answer = self._missions.answer(command, payload, self._clock) if self._missions else None
-        if answer is not None:
+        if self._missions and (answer := self._missions.answer(command, payload, self._clock)) is not None:
             frame = reply(command, answer)
-            self._counters.flash_writes = self._slots.writes
+            self._counters.flash_writes = self._missions.writes
         else:
             if command == HarakiriCommand.EEPROM_WRITE:
                 self._write_config()

@@ -23,6 +23,11 @@ class NorFlash:
         self.operations = 0
         self._busy_seconds = 0.0
 
+    @property
+    def memory(self) -> memoryview:
+        """The chip as the CPU sees it."""
+        return self._memory
+
     def read(self, offset: int, size: int) -> bytes:
         """Return `size` bytes."""
         return bytes(self._memory[offset : offset + size])

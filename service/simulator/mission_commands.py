@@ -1,4 +1,4 @@
-"""The flight controller's side of the mission extension: requests in, replies out (docs/msp-mission.md)."""
+"""A model of the flight controller's side of the mission extension: requests in, replies out (docs/msp-mission.md)."""
 
 import struct
 from dataclasses import dataclass
@@ -16,23 +16,14 @@ from protocols.msp.mission import (
     unmask,
 )
 from protocols.wp_record import RECORD_SIZE, ListIdentity, WpCommand
-from service.simulator.flash import FlashError
+from service.simulator.flash import FlashError, NorFlash
 from service.simulator.mission_slots import MissionSlots
-from service.simulator.options import Faults, SimOptions
+from service.simulator.missions import Board
 
 _LIST = struct.Struct("<HI")
 _READ = struct.Struct("<HBB")
 _RECORDS_HEADER = struct.Struct("<BH")
 _RADIUS = struct.Struct("<HH")
-
-
-@dataclass(slots=True)
-class Board:
-    """What the mission commands see and change of the rest of the firmware."""
-
-    armed: bool
-    wp_radius_cm: int
-    config_write_due: float | None = None
 
 
 @dataclass(slots=True)
@@ -45,13 +36,12 @@ class _Transfer:
 
 
 class MissionCommands:
-    """State of the extension since boot: an open transfer, or none."""
+    """State of the extension since boot: the slots, and an open transfer or none; see Missions."""
 
-    def __init__(self, slots: MissionSlots, board: Board, options: SimOptions, faults: Faults) -> None:
-        self._slots = slots
+    def __init__(self, flash: NorFlash, board: Board) -> None:
         self._board = board
-        self._options = options
-        self._faults = faults
+        self._options = board.options
+        self._slots = MissionSlots(flash, board.options)
         self._transfer: _Transfer | None = None
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
@@ -83,14 +73,20 @@ class MissionCommands:
                 self._transfer = None
 
     @property
-    def _write_pending(self) -> bool:
-        return self._board.config_write_due is not None or self._faults.busy
+    def stored(self) -> bytes:
+        """The stored list's records."""
+        return self._slots.read(0, self._slots.stored.count)
+
+    @property
+    def writes(self) -> int:
+        """How many lists were ever made valid in this flash."""
+        return self._slots.writes
 
     def _info(self) -> Info:
         flags = InfoFlag(0)
         if self._board.armed:
             flags |= InfoFlag.ARMED
-        if self._write_pending:
+        if self._board.write_pending:
             flags |= InfoFlag.WRITE_PENDING
         if self._transfer:
             flags |= InfoFlag.TRANSFER_OPEN
@@ -112,7 +108,7 @@ class MissionCommands:
     def _refusal(self) -> Status | None:
         if self._board.armed:
             return Status.ARMED
-        return Status.BUSY if self._write_pending else None
+        return Status.BUSY if self._board.write_pending else None
 
     def _progress(self, status: Status) -> Progress:
         """Where the transfer stands, whatever the status; zeros without one."""
@@ -220,8 +216,7 @@ class MissionCommands:
             return Status.ARMED
         if value == self._board.wp_radius_cm:
             return Status.OK
-        if self._write_pending:
+        if self._board.write_pending:
             return Status.BUSY
-        self._board.wp_radius_cm = value
-        self._board.config_write_due = now + self._options.config_write_delay_ms / 1000
+        self._board.set_wp_radius(value, now)
         return Status.OK

@@ -10,7 +10,9 @@ from math import inf
 
 from service.simulator.firmware import Firmware, Protocol, ResetError
 from service.simulator.flash import ERASED, NorFlash, PowerCutError
-from service.simulator.mission_slots import MissionSlots, flash_size
+from service.simulator.mission_commands import MissionCommands
+from service.simulator.mission_slots import flash_size
+from service.simulator.missions import Board, BootMissions
 from service.simulator.options import Counters, Faults, SimOptions
 from service.simulator.traps import HazardWatch
 from service.simulator.uart import GATHER_SECONDS, Uart
@@ -29,7 +31,7 @@ class SimulatedNaze:
     """A Naze32 with Harakiri, made without power: see `power_on`.
 
     `faults` may be changed and `counters` read at any time. `memory` is the flash chip, of `flash_size(options)` bytes;
-    without it the board has a blank one of its own.
+    without it the board has a blank one of its own. `boot_missions` makes the mission extension, at every boot.
     """
 
     def __init__(
@@ -37,6 +39,7 @@ class SimulatedNaze:
         options: SimOptions | None = None,
         faults: Faults | None = None,
         memory: memoryview | None = None,
+        boot_missions: BootMissions = MissionCommands,
     ) -> None:
         self.options = options or SimOptions()
         self.faults = faults or Faults()
@@ -44,6 +47,7 @@ class SimulatedNaze:
         if memory is None:
             memory = memoryview(bytearray((ERASED,)) * flash_size(self.options))
         self._flash = NorFlash(memory, self.faults)
+        self._boot_missions = boot_missions
         self._uart = Uart(self.options.baud, self.counters)
         self._random = random.Random(self.options.seed)
         self._hazards = HazardWatch()
@@ -76,8 +80,7 @@ class SimulatedNaze:
     @property
     def stored(self) -> bytes:
         """The mission records that are valid in flash, as the next boot would find them."""
-        slots = MissionSlots(self._flash, self.options)
-        return slots.read(0, slots.stored.count)
+        return self._boot_missions(self._flash, Board(self.options, self.faults, self.options.wp_radius_cm)).stored
 
     @property
     def flash_operations(self) -> int:
@@ -135,7 +138,9 @@ class SimulatedNaze:
                 self._run_loop(self._firmware, at)
             else:
                 self._uart.discard_arrived(at)
-                self._firmware = Firmware(self.options, self.faults, self.counters, self._uart, self._flash, at)
+                self._firmware = Firmware(
+                    self.options, self.faults, self.counters, self._uart, self._flash, self._boot_missions, at
+                )
         if self._firmware and self.faults.hang:
             self._firmware.hold(now)
 

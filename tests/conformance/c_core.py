@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from protocols.wp_record import RECORD_SIZE
+from service.simulator.compiled_core import open_library
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 
@@ -39,20 +40,22 @@ class PowerCut(Exception):
 
 
 @cache
-def _library() -> ctypes.CDLL:
+def library() -> Path:
+    """Make the shared library, with the core and its board of memory."""
     subprocess.run(["make", "-s", "-C", FIRMWARE, "sim"], check=True)
-    library = ctypes.CDLL(str(FIRMWARE / "build" / "libnaze_mission.so"))
-    for name, (result, arguments) in _SIGNATURES.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
-    return library
+    return FIRMWARE / "build" / "libnaze_mission.so"
+
+
+@cache
+def _functions() -> ctypes.CDLL:
+    return open_library(library(), _SIGNATURES)
 
 
 class CCore:
     """One board: flash as delivered, powered up, disarmed."""
 
     def __init__(self) -> None:
-        self._c = _library()
+        self._c = _functions()
         self._board = c_void_p(self._c.sim_create())
 
     def __del__(self) -> None:

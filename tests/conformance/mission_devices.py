@@ -1,12 +1,14 @@
-"""The two flight controllers that must not be told apart: the firmware's C core, and the simulator's model."""
+"""The flight controllers that must not be told apart: the firmware's C core, and what the simulated Naze runs."""
 
 from typing import Protocol
 
-from c_core import PowerCut
+from c_core import PowerCut, library
 
+from service.simulator.compiled_core import load_core
 from service.simulator.flash import ERASED, NorFlash, PowerCutError
-from service.simulator.mission_commands import Board, MissionCommands
-from service.simulator.mission_slots import MissionSlots, StoredConfig, flash_size
+from service.simulator.mission_commands import MissionCommands
+from service.simulator.mission_slots import StoredConfig, flash_size
+from service.simulator.missions import Board, BootMissions
 from service.simulator.options import Faults, SimOptions
 
 
@@ -39,10 +41,11 @@ class Device(Protocol):
         """The records that the firmware works with."""
 
 
-class Model:
-    """The simulator's model, in the same clothes as the C core."""
+class Simulated:
+    """The simulated Naze's mission extension, in the same clothes as the C core."""
 
-    def __init__(self) -> None:
+    def __init__(self, boot_missions: BootMissions) -> None:
+        self._boot_missions = boot_missions
         self._options = SimOptions()
         self._faults = Faults()
         size = flash_size(self._options)
@@ -54,7 +57,7 @@ class Model:
 
     def request(self, command: int, payload: bytes) -> bytes | None:
         try:
-            return self._commands.answer(command, payload, self._now)
+            return self._missions.answer(command, payload, self._now)
         except PowerCutError:
             raise PowerCut from None
 
@@ -67,7 +70,7 @@ class Model:
 
     def arm(self, armed: bool) -> None:
         self._board.armed = armed
-        self._commands.drop_stale(self._now)  # as the main loop does
+        self._missions.drop_stale(self._now)  # as the main loop does
 
     def set_busy(self, busy: bool) -> None:
         self._faults.busy = busy
@@ -77,17 +80,26 @@ class Model:
         self._faults.busy = False
         self.cut_power_at(0)
         self.fail_at(0)
-        self._slots = MissionSlots(self._flash, self._options)
-        self._board = Board(armed=False, wp_radius_cm=self._config.load())
-        self._commands = MissionCommands(self._slots, self._board, self._options, self._faults)
+        self._board = Board(self._options, self._faults, self._config.load())
+        self._missions = self._boot_missions(self._flash, self._board)
 
     def cut_power_at(self, operation: int) -> None:
         self._faults.power_cut_at_flash_operation = operation and self._flash.operations + operation
 
     def fail_at(self, operation: int) -> None:
-        assert operation in (0, 1), "the model lets the next operations fail, not a later one"
+        assert operation in (0, 1), "the simulated flash lets the next operations fail, not a later one"
         self._faults.flash_failures = operation
 
     @property
     def list(self) -> bytes:
-        return self._slots.read(0, self._slots.stored.count)
+        return self._missions.stored
+
+
+def model() -> Simulated:
+    """The simulated Naze with its own model."""
+    return Simulated(MissionCommands)
+
+
+def simulated_core() -> Simulated:
+    """The simulated Naze with the compiled core."""
+    return Simulated(load_core(library()))

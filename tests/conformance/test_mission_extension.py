@@ -12,7 +12,7 @@ from c_core import CCore, PowerCut
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from mission_devices import Device, Model
+from mission_devices import Device, model, simulated_core
 
 from protocols.msp import mission as ext
 from protocols.msp.frame import request
@@ -101,7 +101,7 @@ OLD, NEW = mission(4, seed=1), mission(20, seed=2)
 NOTHING = Progress(Status.OK, 0, 0)
 
 
-@pytest.fixture(params=[CCore, Model])
+@pytest.fixture(params=[CCore, model, simulated_core])
 def fc(request: pytest.FixtureRequest) -> Companion:
     companion = Companion(request.param())
     companion.push(OLD)
@@ -360,20 +360,20 @@ times = st.sampled_from([125, 1000, 2500, 5000, 5125])
 
 
 class SameAnswers(RuleBasedStateMachine):
-    """Both are asked the same; every answer must be the same, and the core must keep the flash's rules."""
+    """All are asked the same; every answer must be the same, and the core must keep the flash's rules."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.core, self.model = CCore(), Model()
+        self.core = CCore()
+        self.devices: tuple[Device, ...] = (self.core, model(), simulated_core())
         self.records = LISTS[0]
         self.next = 0
 
     def ask(self, command: int, payload: bytes) -> bytes | None:
-        replies = [self._ask_one(device, command, payload) for device in (self.core, self.model)]
-        assert replies[0] == replies[1], (MissionCommand(command).name, payload.hex())
+        replies = [self._ask_one(device, command, payload) for device in self.devices]
+        assert len(set(replies)) == 1, (MissionCommand(command).name, payload.hex(), replies)
         if replies[0] is None:
-            self.core.power_cycle()
-            self.model.power_cycle()
+            self.reset()
         return replies[0]
 
     def _ask_one(self, device: Device, command: int, payload: bytes) -> bytes | None:
@@ -450,34 +450,34 @@ class SameAnswers(RuleBasedStateMachine):
 
     @rule(milliseconds=times)
     def wait(self, milliseconds: int) -> None:
-        self.core.advance(milliseconds)
-        self.model.advance(milliseconds)
+        for device in self.devices:
+            device.advance(milliseconds)
 
     @rule(armed=st.booleans())
     def arm(self, armed: bool) -> None:
-        self.core.arm(armed)
-        self.model.arm(armed)
+        for device in self.devices:
+            device.arm(armed)
 
     @rule(busy=st.booleans())
     def set_busy(self, busy: bool) -> None:
-        self.core.set_busy(busy)
-        self.model.set_busy(busy)
+        for device in self.devices:
+            device.set_busy(busy)
 
     @rule()
     def reset(self) -> None:
-        self.core.power_cycle()
-        self.model.power_cycle()
+        for device in self.devices:
+            device.power_cycle()
 
     @rule(failing=st.booleans())
     def spoil_the_next_flash_operation(self, failing: bool) -> None:
-        for device in (self.core, self.model):
+        for device in self.devices:
             device.fail_at(int(failing))
             device.cut_power_at(int(not failing))
 
     @invariant()
     def same_state(self) -> None:
         self.send(ext.INFO_REQUEST)
-        assert self.core.list == self.model.list
+        assert len({device.list for device in self.devices}) == 1
         assert self.core.sound
 
 
