@@ -1,0 +1,42 @@
+"""`python -m benchmarks [NAME...]`: measure, print a table, keep it as JSON; exit 1 if a promise is broken."""
+
+import logging
+import sys
+from collections.abc import Callable
+
+import structlog
+
+from benchmarks import idle, push, search, upload
+from benchmarks.figure import Figure
+from benchmarks.report import keep_json, print_table
+
+_BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
+    "push": push.measure,
+    "upload": upload.measure,
+    "idle": idle.measure,
+    "search": search.measure,
+}
+
+
+def main() -> int:
+    """Run the benchmarks that were named, or all; return the exit status."""
+    names = sys.argv[1:] or list(_BENCHMARKS)
+    unknown = [name for name in names if name not in _BENCHMARKS]
+    if unknown:
+        print(f"There is no benchmark {unknown[0]!r}; there are {', '.join(_BENCHMARKS)}.", file=sys.stderr)
+        return 2
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.ERROR))
+    figures: list[Figure] = []
+    for name in names:
+        print(f"Measuring {name} ...", flush=True)
+        figures += _BENCHMARKS[name]()
+    print_table(figures)
+    print(f"Kept in {keep_json(figures)}")
+    missed = sum(figure.is_missed for figure in figures)
+    if missed:
+        print(f"{missed} of the targets missed")
+    return int(missed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

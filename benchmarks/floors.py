@@ -1,0 +1,54 @@
+"""The floors that need a program of their own: `python -m benchmarks.floors echo`, or `... poll LINK`.
+
+echo        sends every UDP datagram back; prints its port
+poll LINK   asks a flight controller what the idle daemon asks it, as often, and looks at nothing that comes back
+"""
+
+import asyncio
+import os
+import socket
+import sys
+
+import serial
+
+from bridge.vehicle_state import POLLS, Poll
+
+
+def _echo(loop: asyncio.AbstractEventLoop) -> None:
+    port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    port.bind(("127.0.0.1", 0))
+    port.setblocking(False)
+
+    def readable() -> None:
+        data, sender = port.recvfrom(2048)
+        port.sendto(data, sender)
+
+    loop.add_reader(port, readable)
+    print(port.getsockname()[1], flush=True)
+
+
+def _poll(loop: asyncio.AbstractEventLoop, link: str) -> None:
+    port = serial.Serial(link, 115200, timeout=0)
+    loop.add_reader(port.fileno(), lambda: os.read(port.fileno(), 4096))
+
+    def ask(poll: Poll) -> None:
+        os.write(port.fileno(), poll.frame)
+        loop.call_later(poll.interval_s, ask, poll)
+
+    for poll in POLLS:
+        ask(poll)
+
+
+def main() -> None:
+    """Run until SIGTERM."""
+    loop = asyncio.new_event_loop()
+    match sys.argv[1:]:
+        case ["echo"]:
+            _echo(loop)
+        case ["poll", link]:
+            _poll(loop, link)
+    loop.run_forever()
+
+
+if __name__ == "__main__":
+    main()

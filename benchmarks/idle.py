@@ -1,0 +1,126 @@
+"""What the daemon costs while nobody does anything: CPU, memory, and the time from its start to its first heartbeat.
+
+It polls a simulated Naze behind a pseudo-terminal at 115200 baud and sends telemetry to one ground station over UDP;
+the Naze has a process of its own and does not count.
+"""
+
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.figure import Figure, Floor
+from benchmarks.processes import ENVIRONMENT, Board, daemon, floor_program, simulated_naze
+from protocols.mavlink.dialect import messages
+from protocols.mavlink.frame import MavlinkSplitter
+
+_SETTLING_S = 3.0
+_WATCHED_S = 20.0
+_STARTS = 7
+_DIALECT = "from pymavlink.dialects.v20 import ardupilotmega"
+_LIBRARIES = f"import asyncio, sqlite3, serial, structlog, fastcrc; {_DIALECT}"
+
+
+def measure() -> list[Figure]:
+    """Measure one idle daemon, and several starts."""
+    with tempfile.TemporaryDirectory() as name, simulated_naze(Path(name)) as board:
+        _first_heartbeat_s(Path(name), board)  # compiles what is not yet compiled, which costs time and memory
+        return [*_idle(Path(name), board), *_starts(Path(name), board)]
+
+
+def _idle(folder: Path, board: Board) -> list[Figure]:
+    with floor_program(folder, "poll", str(board.link)) as (pid, _):
+        bare_percent = _cpu_percent(pid)
+    with _listener() as ground, daemon(folder, board.link, _udpout(ground)) as process:
+        process.wait_for_event("fc.found")
+        percent = _cpu_percent(process.pid)
+        resident_mb = _resident_mb(process.pid)
+    return [
+        Figure(
+            f"idle daemon, CPU of one core over {_WATCHED_S:.0f} s",
+            percent,
+            "%",
+            Floor(bare_percent, "bare polls"),
+            3.0,
+        ),
+        Figure("idle daemon, resident", resident_mb, "MB", Floor(_libraries_mb(), "its libraries"), 45.0),
+    ]
+
+
+def _starts(folder: Path, board: Board) -> list[Figure]:
+    seconds = [_first_heartbeat_s(folder, board) for _ in range(_STARTS)]
+    python, dialect = _start_s("pass"), _start_s(_DIALECT)
+    return [
+        Figure("python -c pass", python, "s"),
+        Figure(
+            f"start to first heartbeat, median of {_STARTS}",
+            statistics.median(seconds),
+            "s",
+            Floor(dialect, "python, MAVLink dialect"),
+            0.5,
+        ),
+        Figure(f"start to first heartbeat, worst of {_STARTS}", max(seconds), "s", Floor(dialect, "the same")),
+    ]
+
+
+def _first_heartbeat_s(folder: Path, board: Board) -> float:
+    with _listener() as ground, daemon(folder, board.link, _udpout(ground)) as process:
+        while True:
+            frames = MavlinkSplitter().feed(ground.recv(2048))
+            if any(frame.msgid == messages.MAVLINK_MSG_ID_HEARTBEAT for frame in frames):
+                return time.time() - process.started_at
+
+
+def _start_s(program: str) -> float:
+    """Return how long Python takes from its start to the end of a program, median."""
+    times = []
+    for _ in range(_STARTS):
+        began_at = time.perf_counter()
+        subprocess.run([sys.executable, "-c", program], env=ENVIRONMENT, check=True)
+        times.append(time.perf_counter() - began_at)
+    return statistics.median(times)
+
+
+def _libraries_mb() -> float:
+    """Return the resident size of a Python that has loaded the daemon's libraries, and nothing of the daemon."""
+    show = "print(open('/proc/self/status').read())"
+    command = [sys.executable, "-c", f"{_LIBRARIES}; {show}"]
+    result = subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, text=True)
+    return _rss_mb(result.stdout)
+
+
+def _listener() -> socket.socket:
+    ground = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    ground.bind(("127.0.0.1", 0))
+    ground.settimeout(10)
+    return ground
+
+
+def _udpout(ground: socket.socket) -> str:
+    return f"udpout:127.0.0.1:{ground.getsockname()[1]}"
+
+
+def _cpu_percent(pid: int) -> float:
+    """Watch a process for a while; return its user and system time in percent of one core."""
+    time.sleep(_SETTLING_S)
+    before, began_at = _cpu_s(pid), time.perf_counter()
+    time.sleep(_WATCHED_S)
+    return (_cpu_s(pid) - before) / (time.perf_counter() - began_at) * 100
+
+
+def _cpu_s(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    user, system = int(fields[11]), int(fields[12])
+    return (user + system) / os.sysconf("SC_CLK_TCK")
+
+
+def _resident_mb(pid: int) -> float:
+    return _rss_mb(Path(f"/proc/{pid}/status").read_text())
+
+
+def _rss_mb(status: str) -> float:
+    return int(status.partition("VmRSS:")[2].split()[0]) * 1024 / 1e6

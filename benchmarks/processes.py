@@ -1,0 +1,131 @@
+"""The programs under measurement, each in a process of its own, so that only its own CPU and memory count."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+#: Where figures are kept (git-ignored).
+RESULTS = ROOT / "benchmarks" / "results"
+#: What is measured starts from compiled bytecode, as an installed daemon does, whatever the shell says about that.
+ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"} | {
+    "PYTHONPYCACHEPREFIX": str(RESULTS / "bytecode")
+}
+#: The console script, without depending on where it is installed.
+_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main()"]
+_PATIENCE_S = 30.0
+_POLL_S = 0.002
+
+
+class BenchmarkError(Exception):
+    """A program under measurement did not do what the measurement needs."""
+
+
+@contextmanager
+def running(command: Sequence[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a program, its output in `log`; end it with SIGTERM."""
+    with log.open("wb") as output:
+        process = subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stdout=output, stderr=output)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    """Wait until `condition` holds; BenchmarkError if it takes too long."""
+    end = time.monotonic() + _PATIENCE_S
+    while not condition():
+        if time.monotonic() > end:
+            raise BenchmarkError(f"waited {_PATIENCE_S:.0f} s in vain until {what}")
+        time.sleep(_POLL_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A simulated Naze behind a pseudo-terminal that keeps the pace of a UART."""
+
+    link: Path
+    control: Path
+
+    def tell(self, *lines: str) -> None:
+        """Switch a fault, a plug or the power (service.simulator.control)."""
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(self.control))
+            with connection.makefile("rw") as stream:
+                for line in lines:
+                    stream.write(f"{line}\n")
+                    stream.flush()
+                    if (answer := stream.readline().strip()) != "ok":
+                        raise BenchmarkError(f"the simulated Naze answers {answer!r} to {line!r}")
+
+
+@contextmanager
+def simulated_naze(folder: Path, *options: str) -> Iterator[Board]:
+    """Run `naze-bridge sim` with `options`."""
+    board = Board(folder / "naze", folder / "sim.sock")
+    command = [*_NAZE_BRIDGE, "sim", "--link", str(board.link), "--control", str(board.control), *options]
+    log = folder / "sim.log"
+    with running(command, log):
+        wait_for(lambda: b"Simulated Naze at" in log.read_bytes(), "the simulated Naze is there")
+        yield board
+
+
+@dataclass(frozen=True, slots=True)
+class DaemonProcess:
+    """A running `naze-bridge run`."""
+
+    pid: int
+    started_at: float  # time.time() just before the process was made
+    _log: Path
+
+    def events(self, name: str) -> list[dict[str, Any]]:
+        """Return what it has logged under that name, oldest first."""
+        lines = self._log.read_bytes().splitlines(keepends=True)
+        events = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"\n")]
+        return [event for event in events if event["event"] == name]
+
+    def wait_for_event(self, name: str, count: int = 1) -> dict[str, Any]:
+        """Wait until it has logged that event `count` times; return the last of these."""
+        wait_for(lambda: len(self.events(name)) >= count, f"the daemon logs {name} (see {self._log})")
+        return self.events(name)[count - 1]
+
+
+def logged_at(event: dict[str, Any]) -> float:
+    """Return when an event was logged, as time.time() counts."""
+    return datetime.fromisoformat(event["timestamp"]).timestamp()
+
+
+@contextmanager
+def daemon(folder: Path, fc: Path, gcs: str, *options: str) -> Iterator[DaemonProcess]:
+    """Run the daemon with a mission store of its own."""
+    command = [*_NAZE_BRIDGE, "run", "--fc", str(fc), "--gcs", gcs, "--state-dir", str(folder / "state"), *options]
+    started_at = time.time()
+    with running(command, folder / "daemon.log") as process:
+        yield DaemonProcess(process.pid, started_at, folder / "daemon.log")
+
+
+@contextmanager
+def floor_program(folder: Path, *arguments: str) -> Iterator[tuple[int, Path]]:
+    """Run one of benchmarks.floors; yield its process id and the file with its output."""
+    log = folder / "floor.log"
+    with running([sys.executable, "-m", "benchmarks.floors", *arguments], log) as process:
+        yield process.pid, log
+
+
+def free_udp_port() -> int:
+    """Return a port of the loopback on which nobody listens."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port

@@ -1,0 +1,104 @@
+"""Push 146 records at 115200 baud, against the time that their bare bytes take at line rate.
+
+The daemon (service.daemon.Daemon with its own port, links and timers) runs on this process's event loop; the simulated
+Naze runs in another process behind a pseudo-terminal and keeps the pace of the UART both ways. The clock is read
+within the conversation itself: it starts when the push hands over its first CHUNK, a little before that frame's first
+byte is written, and stops when the push has judged the reply to COMMIT, whose checksum the flight controller computed
+over its flash. So nothing stands between daemon and terminal that could cost or save time, and what encoding and
+waking up cost is in the figure.
+
+Flash stalls are excluded by a simulated flash that takes no time to program a record (BEGIN, which erases, comes before
+the clock starts). Beside it stands the figure with the time that real flash takes: most of that is hidden behind the
+line, but not what the last chunk brings.
+"""
+
+import asyncio
+import statistics
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.figure import Figure, Floor
+from benchmarks.missions import COUNT, random_mission
+from benchmarks.processes import BenchmarkError, free_udp_port, simulated_naze
+from bridge.mission_check import RuleProfile, check_list
+from bridge.mission_dialect import PushResult
+from bridge.procedure import Procedure, Send
+from protocols.msp.mission import MissionCommand
+from protocols.wp_record import RECORD_SIZE, WpRecord
+from service.connection import GcsAddress, SerialFc
+from service.daemon import Daemon
+from service.settings import Settings
+
+_BAUD = 115200
+_RUNS = 20
+_LINE_S = COUNT * RECORD_SIZE * 10 / _BAUD
+
+
+def measure() -> list[Figure]:
+    """Measure `_RUNS` pushes of different lists, without and with the flash's own time."""
+    floor = Floor(_LINE_S * 1000, f"{COUNT} * {RECORD_SIZE} bytes at {_BAUD} 8N1")
+    bare, whole = _times_ms("--program-stall", "0"), _times_ms()
+    name = f"push of {COUNT} records, {_RUNS} runs"
+    return [
+        Figure(f"{name}, median", statistics.median(bare), "ms", floor, 1.10, times_floor=True),
+        Figure(f"{name}, worst", max(bare), "ms", floor),
+        Figure(f"{name}, flash stall included, median", statistics.median(whole), "ms", floor),
+        Figure(f"{name}, flash stall included, worst", max(whole), "ms", floor),
+    ]
+
+
+def _times_ms(*options: str) -> list[float]:
+    with tempfile.TemporaryDirectory() as name, simulated_naze(Path(name), "--baud", str(_BAUD), *options) as board:
+        return [seconds * 1000 for seconds in asyncio.run(_push_all(board.link))]
+
+
+async def _push_all(link: Path) -> list[float]:
+    settings = Settings(SerialFc(str(link), _BAUD), [GcsAddress("udpout", "127.0.0.1", free_udp_port())])
+    daemon = Daemon(settings)
+    running = asyncio.create_task(daemon.run())
+    try:
+        while daemon.bridge.desk.dialect is None:  # noqa: ASYNC110 - the daemon tells its log, and nobody else
+            await asyncio.sleep(0.01)
+        return [await _push(daemon, _records(seed)) for seed in range(_RUNS)]
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+def _records(seed: int) -> tuple[WpRecord, ...]:
+    records = check_list(random_mission(seed), RuleProfile()).records
+    assert len(records) == COUNT
+    return records
+
+
+async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
+    """Push one list; return the seconds from the first CHUNK to the verified checksum."""
+    loop = asyncio.get_running_loop()
+    dialect = daemon.bridge.desk.dialect
+    assert dialect is not None
+    begun_at: list[float] = []
+    done: asyncio.Future[tuple[PushResult | None, float]] = loop.create_future()
+    push = _noting_first_chunk(dialect.push(records, lambda _: None), lambda: begun_at.append(loop.time()))
+    daemon.bridge.runner.start(push, lambda result, _: done.set_result((result, loop.time())), loop.time())
+    daemon.flush()
+    result, ended_at = await done
+    if result is None or result.failure or result.unchanged:
+        raise BenchmarkError(f"the push ended with {result}")
+    return ended_at - begun_at[0]
+
+
+def _noting_first_chunk(push: Procedure[PushResult], note: Callable[[], None]) -> Procedure[PushResult]:
+    """Pass the conversation through, and call `note` when its first CHUNK comes by."""
+    noted = False
+    effect = next(push)
+    while True:
+        if not noted and isinstance(effect, Send) and effect.command == MissionCommand.CHUNK:
+            noted = True
+            note()
+        answer = yield effect
+        try:
+            effect = push.send(answer)
+        except StopIteration as stop:
+            result: PushResult = stop.value
+            return result

@@ -1,0 +1,125 @@
+"""How long the daemon takes to find a flight controller, and to find it again, and what it makes of noise.
+
+Daemon and simulated Naze have a process of their own each. The daemon runs and the port is missing when the clock
+starts: the port appears, a flight controller answers on it, and the clock stops with a line of the daemon's own log, so
+what it takes to notice the port is in the figures. "Sensed" (fc.sensed) is what autosense promises: protocol and speed
+are known. "Identified" (fc.found): the board has also said who it is, everything twice, which at 1200 baud is three
+seconds of line time.
+
+Noise needs no port: Autosense is fed with it directly, in its own time, as a line at full load would.
+"""
+
+import random
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.figure import Figure
+from benchmarks.processes import BenchmarkError, Board, DaemonProcess, daemon, free_udp_port, logged_at, simulated_naze
+from bridge.autosense import SPEEDS, Autosense
+
+_RUNS = 5
+_RETURNS = 8
+_SEED = 1
+_BITS_PER_BYTE = 10
+_READ_BYTES = 256
+_NOISE_BYTES = 64_000_000
+
+
+def measure() -> list[Figure]:
+    """Measure finding at every speed, finding again, and noise."""
+    first, *others = dict.fromkeys(SPEEDS)
+    return [*_first_speed(first), *_other_speeds(others), *_returns(first), _noise()]
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Seconds from the appearance of the port."""
+
+    sensed: float
+    identified: float
+
+
+def _first_speed(baud: int) -> list[Figure]:
+    found = [_find(baud) for _ in range(_RUNS)]
+    return [
+        Figure(f"sensed at {baud} baud, worst of {_RUNS}", max(each.sensed for each in found), "s", None, 1.5),
+        Figure(f"identified at {baud} baud, worst of {_RUNS}", max(each.identified for each in found), "s"),
+    ]
+
+
+def _other_speeds(speeds: Sequence[int]) -> list[Figure]:
+    found = {baud: _find(baud) for baud in speeds}
+    slowest = min(speeds)
+    return [
+        *(Figure(f"sensed at {baud} baud", each.sensed, "s", None, 8.0) for baud, each in found.items()),
+        Figure(f"identified at {slowest} baud", found[slowest].identified, "s"),
+    ]
+
+
+def _find(baud: int) -> _Found:
+    with tempfile.TemporaryDirectory() as name, _waiting_daemon(Path(name), baud) as (board, process):
+        return _plug(board, process, baud)
+
+
+def _returns(baud: int) -> list[Figure]:
+    chance = random.Random(_SEED)
+    with tempfile.TemporaryDirectory() as name, _waiting_daemon(Path(name), baud) as (board, process):
+        _plug(board, process, baud)
+
+        def lose_and_return(lost: Sequence[str], returned: Sequence[str]) -> float:
+            time.sleep(chance.uniform(0, 1))
+            board.tell("unplug", *lost)
+            time.sleep(chance.uniform(0.1, 2))
+            return _plug(board, process, baud, *returned).identified
+
+        replugs = [lose_and_return((), ()) for _ in range(_RETURNS)]
+        power_cycles = [lose_and_return(("power off",), ("power on",)) for _ in range(_RETURNS)]
+    return [
+        Figure(f"identified again after the port's return, worst of {_RETURNS}", max(replugs), "s", None, 3.0),
+        Figure(f"the same with a board that boots for 2 s, worst of {_RETURNS}", max(power_cycles), "s", None, 3.0),
+    ]
+
+
+@contextmanager
+def _waiting_daemon(folder: Path, baud: int) -> Iterator[tuple[Board, DaemonProcess]]:
+    """Run a daemon that looks for a port which is not there yet."""
+    with simulated_naze(folder, "--baud", str(baud)) as board:
+        board.tell("unplug")
+        with daemon(folder, board.link, f"udpin:127.0.0.1:{free_udp_port()}", "--verbose") as process:
+            process.wait_for_event("fc.port_unavailable")
+            yield board, process
+
+
+def _plug(board: Board, process: DaemonProcess, baud: int, *before: str) -> _Found:
+    """Let the port appear; return how long the daemon then took. BenchmarkError if it found something else."""
+    known = len(process.events("fc.found"))
+    plugged_at = time.time()
+    board.tell(*before, "plug")
+    found = process.wait_for_event("fc.found", known + 1)
+    if (found["protocol"], found["speed_baud"]) != ("MSP", baud):
+        raise BenchmarkError(f"at {baud} baud the daemon found {found}")
+    sensed_at = logged_at(process.events("fc.sensed")[-1])
+    return _Found(sensed_at - plugged_at, logged_at(found) - plugged_at)
+
+
+def _noise() -> Figure:
+    """Feed random bytes, each search anew after a verdict; every verdict is a wrong one."""
+    chance = random.Random(_SEED)
+    wrong = fed = 0
+    now = 0.0
+    search = Autosense(SPEEDS, None, now)
+    while fed < _NOISE_BYTES:
+        assert search.speed is not None
+        now += _READ_BYTES * _BITS_PER_BYTE / search.speed
+        search.receive(chance.randbytes(_READ_BYTES), now)
+        fed += _READ_BYTES
+        search.tick(now)
+        search.take_output()
+        if search.found:
+            wrong += 1
+            search = Autosense(SPEEDS, None, now)
+    return Figure(f"wrong verdicts on {fed / 1e6:.0f} MB of noise", wrong, "", None, 0)
