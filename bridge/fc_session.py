@@ -173,6 +173,7 @@ class FcSession:
             return
         self._output += self._search.take_output()
         self._search = None
+        self._journal("debug", "fc.sensed", protocol=found.spoken.value, speed_baud=found.speed, why=found.why)
         if found.spoken is Spoken.MSP or self._known_speed is None:
             # A Harakiri that arms may go to another speed for MAVLink; disarmed, it comes back to this one.
             self._known_speed = found.speed
