@@ -1,6 +1,7 @@
 """Ground stations over UDP and TCP. Nothing here ever waits for a slow peer."""
 
 import asyncio
+import errno
 import socket
 from collections.abc import Callable
 from typing import Protocol
@@ -58,7 +59,8 @@ def open_link(address: GcsAddress, events: GcsEvents) -> GcsLink:
             return TcpLink(address, events)
         return UdpLink(address, events)
     except OSError as error:
-        raise LinkError(f"{address} cannot be opened: {error.strerror or error}") from error
+        hint = "; stop the program that has it, or name another port" if error.errno == errno.EADDRINUSE else ""
+        raise LinkError(f"{address} cannot be opened: {error.strerror or error}{hint}") from error
 
 
 class UdpLink:

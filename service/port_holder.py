@@ -22,7 +22,7 @@ def explain_port_error(path: str, error: OSError) -> str:
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
         holder = find_holder(path)
         return f"{path} is busy: {holder or 'another program'} has it open; stop that, or name another port"
-    if code == errno.ENOTTY:
+    if code in (errno.ENOTTY, errno.EISDIR):
         return f"{path} is no serial port"
     return f"{path} cannot be opened: {error.strerror or error}"
 
