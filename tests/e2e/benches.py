@@ -23,9 +23,9 @@ class Bench:
     stack: ExitStack
 
     def mission_planner(self, address: tuple[str, int] | None = None, **habits: Any) -> MissionPlanner:
-        """A Mission Planner that has met the vehicle; `habits` are the arguments of MissionPlanner."""
+        """A connected Mission Planner; `habits` are the arguments of MissionPlanner."""
         planner = self.stack.enter_context(MissionPlanner(address or self.daemon.address, **habits))
-        planner.meet()
+        planner.be_connected()
         return planner
 
     def lossy_link(self, **faults: float) -> LossyUdp:

@@ -206,6 +206,11 @@ class MissionPlanner:
                     return
         raise TimedOut("No Heartbeat Packets Received")
 
+    def be_connected(self) -> None:
+        """Go on as one that met the daemon's vehicle some time ago."""
+        self.vehicle = (1, 1)
+        self._sees_mavlink_2 = True
+
     def connect(self) -> None:
         """All that it asks of a vehicle in its first seconds."""
         m = messages
