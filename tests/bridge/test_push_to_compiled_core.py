@@ -1,0 +1,128 @@
+"""The whole bridge against the firmware's compiled core on the simulated board, in simulated time.
+
+Whatever happens, the board's flash holds the old list or the new one, whole; and then a push works.
+"""
+
+import random
+from collections.abc import Callable, Sequence
+from functools import cache
+
+import pytest
+from c_core import library
+from conversations import records_of, waypoints
+from world import World
+
+from protocols.mission_item import MissionItem, MissionResult
+from service.simulator.compiled_core import load_core
+from service.simulator.flash import ERASED
+from service.simulator.mission_slots import flash_size
+from service.simulator.naze import Power, SimulatedNaze
+from service.simulator.options import Faults, SimOptions
+
+OLD, NEW = waypoints(20, seed=77), waypoints(146, seed=5)
+OLD_RECORDS, NEW_RECORDS = records_of(OLD), records_of(NEW)
+# Three erased pages, the records, the header, the seal.
+OPERATIONS = 3 + len(NEW) + 2
+
+Inject = Callable[[World, random.Random], None]
+
+
+def make_world(flash: bytearray, seed: int = 0) -> World:
+    options, faults = SimOptions(seed=seed, boot_ms=500), Faults()
+    naze = SimulatedNaze(options, faults, memoryview(flash), load_core(library()))
+    world = World(options, faults, speeds=(115200,), seed=seed, peer=naze)
+    world.wait_ready()
+    return world
+
+
+def pushed(world: World, items: Sequence[MissionItem], seconds: float = 90) -> bool:
+    """Push; tell whether the flight controller is said to have it."""
+    outcome = world.push(items)
+    world.wait_until(lambda _: bool(outcome), seconds)
+    return outcome[0][0].ack is MissionResult.ACCEPTED
+
+
+@cache
+def old_flash() -> bytes:
+    flash = bytearray((ERASED,)) * flash_size(SimOptions())
+    assert pushed(make_world(flash), OLD)
+    return bytes(flash)
+
+
+def push_under(inject: Inject, seed: int) -> bool:
+    """Push the new list while faults come; tell whether it was accepted."""
+    world = make_world(bytearray(old_flash()), seed)
+    assert world.stored == OLD_RECORDS
+    inject(world, random.Random(seed))
+    accepted = pushed(world, NEW)
+    if accepted:
+        assert world.stored == NEW_RECORDS
+    assert world.stored in (OLD_RECORDS, NEW_RECORDS)
+    world.run(4)
+    for name in Faults.__dataclass_fields__:
+        setattr(world.faults, name, getattr(Faults(), name))
+    world.power_on()
+    world.run(3)
+    world.wait_until(lambda w: w.is_found, 5)
+    assert pushed(world, NEW, 10)
+    assert world.stored == NEW_RECORDS
+    return accepted
+
+
+def setting(fault: str, value: float) -> Inject:
+    return lambda world, _: setattr(world.faults, fault, value)
+
+
+def resetting(world: World, draw: random.Random) -> None:
+    begin = draw.random() * 0.4
+    world.after(begin, world.power_off)
+    world.after(begin + draw.random(), world.power_on)
+
+
+def arming(world: World, draw: random.Random) -> None:
+    world.after(draw.random() * 0.4, lambda: setattr(world.faults, "armed", True))
+
+
+def test_146_records_there_read_back_and_cleared() -> None:
+    flash = bytearray(old_flash())
+    world = make_world(flash)
+    assert pushed(world, NEW, 5)
+    assert world.stored == NEW_RECORDS
+    # As naze_mission.h says: the second of two slots, its header and seal, and the records bit for bit.
+    assert flash[3072:3074] == b"NM"
+    assert flash[3088:3090] == b"\0\0"
+    assert flash[3104 : 3104 + 16 * 146] == b"".join(record.pack() for record in NEW_RECORDS)
+    assert world.naze.counters.flash_writes == 2
+    assert pushed(world, NEW, 5)
+    assert world.naze.counters.flash_writes == 2
+    assert pushed(world, (), 5)
+    assert world.stored == ()
+    world.assert_line_was_clean()
+
+
+def test_a_power_cut_at_every_flash_operation_leaves_the_old_list() -> None:
+    for operation in range(1, OPERATIONS + 1):
+        world = make_world(bytearray(old_flash()))
+        world.faults.power_cut_at_flash_operation = operation
+        outcome = world.push(NEW)
+        world.wait_until(lambda w: w.naze.power is Power.OFF, 2)
+        assert world.stored == OLD_RECORDS
+        world.power_on()
+        world.wait_until(lambda _, outcome=outcome: bool(outcome), 20)  # type: ignore[misc]
+        assert world.stored == (NEW_RECORDS if outcome[0][0].ack is MissionResult.ACCEPTED else OLD_RECORDS)
+
+
+@pytest.mark.parametrize(
+    ("inject", "least"),
+    [
+        (setting("bit_error_rate", 1e-3), 8),
+        (setting("lost_byte_rate", 1e-3), 10),
+        (setting("flash_failures", 2), 10),
+        (setting("flash_failures", 50), 0),
+        (resetting, 0),
+        (arming, 0),
+    ],
+    ids=["bit errors", "lost bytes", "flash fails twice", "flash fails", "resets", "arming"],
+)
+def test_faults_cost_time_or_the_push_but_never_a_list(inject: Inject, least: int) -> None:
+    assert sum(push_under(inject, seed) for seed in range(10)) >= least

@@ -1,0 +1,133 @@
+"""MAVSDK, daemon, pty, simulated UART, and behind it the very C code that goes onto the flight controller."""
+
+import random
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from benches import Bench, Starter
+from c_core import library
+from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawError, MissionRawResult
+from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
+from plan import expected_fields, judge, mixed_plan, plain_plan, records_of
+from programs import run_naze_bridge, until
+from test_mavsdk import fields, raw_items, refusal_of, vehicle_at
+
+OLD, NEW = mixed_plan(60), plain_plan(146, start=40)
+OLD_RECORDS, NEW_RECORDS = records_of(judge(OLD)), records_of(judge(NEW))
+# Three erased pages, the records, the header, the seal: what a list costs.
+OLD_OPERATIONS, NEW_OPERATIONS = (3 + len(records) + 2 for records in (OLD_RECORDS, NEW_RECORDS))
+
+
+def start_on_core(start: Starter) -> tuple[Bench, Path]:
+    """Start daemon and board, whose flash is the file that is returned."""
+    flash = start.directory / "flash"
+    return start.bench("--core", str(library()), "--state", str(flash)), flash
+
+
+def sealed_slots(flash: Path, records: list[str]) -> int:
+    """Count the slots that hold these records, as firmware/naze_mission.h lays them out."""
+    chip, wanted = flash.read_bytes(), bytes.fromhex("".join(records))
+    slots = (chip[at : at + 3072] for at in (0, 3072))
+    return sum(slot[:2] == b"NM" and slot[16:18] == b"\0\0" and slot[32:].startswith(wanted) for slot in slots)
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bench, Path]]:
+    with ExitStack() as stack:
+        bench, flash = start_on_core(Starter(tmp_path_factory.mktemp("core"), stack))
+        yield bench, flash
+        bench.board.assert_was_treated_well()
+
+
+async def hear_of(vehicle: Any, *, armed: bool) -> None:
+    async for now in TelemetryAsync(vehicle).subscribe_armed():
+        if now is armed:
+            break
+
+
+async def test_146_items_there_and_back(core: tuple[Bench, Path]) -> None:
+    (bench, flash), plan = core, mixed_plan(146)
+    board, records = bench.board, records_of(judge(plan))
+    async with vehicle_at(bench.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        await missions.upload_mission(raw_items(plan))
+        assert board.records() == records
+        assert sealed_slots(flash, records) == 1
+        assert [fields(item) for item in await missions.download_mission()] == expected_fields(plan)
+        written = board.stats()["flash_writes"]
+        await missions.upload_mission(raw_items(plan))
+        assert board.stats()["flash_writes"] == written
+        clear_all = '{"target_system": 1, "target_component": 1, "mission_type": 0}'
+        await MavlinkDirectAsync(vehicle).send_message(MavlinkMessage("MISSION_CLEAR_ALL", 245, 190, 1, 1, clear_all))
+        until(lambda: board.records() == [], "an empty board")
+        assert await missions.download_mission() == []
+        assert board.stats()["flash_writes"] == written + 1
+
+
+async def test_refused_when_armed(core: tuple[Bench, Path]) -> None:
+    bench, _ = core
+    bench.daemon.push(OLD)
+    async with vehicle_at(bench.daemon.port) as vehicle:
+        bench.board.set("armed 1")
+        await hear_of(vehicle, armed=True)
+        assert await refusal_of(MissionRawAsync(vehicle), NEW) == MissionRawResult.DENIED
+        assert bench.board.records() == OLD_RECORDS
+        bench.board.set("armed 0")
+        await hear_of(vehicle, armed=False)
+        await MissionRawAsync(vehicle).upload_mission(raw_items(NEW))
+    assert bench.board.records() == NEW_RECORDS
+
+
+@pytest.mark.parametrize("seed", range(2))
+async def test_a_power_cut_while_it_is_written(start: Starter, seed: int) -> None:
+    bench, flash = start_on_core(start)
+    bench.daemon.push(OLD)
+    cut = OLD_OPERATIONS + random.Random(seed).randint(1, NEW_OPERATIONS)
+    bench.board.set(f"power_cut_at_flash_operation {cut}")
+    async with vehicle_at(bench.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        assert await refusal_of(missions, NEW) == MissionRawResult.DENIED
+        assert bench.board.stats()["power"] == "OFF"
+        assert bench.board.records() == OLD_RECORDS
+        assert (sealed_slots(flash, OLD_RECORDS), sealed_slots(flash, NEW_RECORDS)) == (1, 0)
+        bench.board.set("power on")
+        bench.daemon.wait()
+        assert bench.daemon.held()["records"] == OLD_RECORDS
+        await missions.upload_mission(raw_items(NEW))
+    assert bench.board.records() == bench.daemon.held()["records"] == NEW_RECORDS
+
+
+async def test_bit_errors_and_cut_frames(start: Starter) -> None:
+    bench, _ = start_on_core(start)
+    bench.daemon.push(OLD)
+    bench.board.set("bit_error_rate 0.001")
+    bench.board.set("lost_byte_rate 0.0005")
+    async with vehicle_at(bench.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        for _ in range(5):
+            try:
+                await missions.upload_mission(raw_items(NEW))
+            except MissionRawError:
+                assert bench.board.records() in (OLD_RECORDS, NEW_RECORDS)
+                bench.daemon.wait()
+            else:
+                break
+        assert bench.board.records() == NEW_RECORDS
+
+
+def test_a_library_that_is_not_the_core(tmp_path: Path) -> None:
+    wrong = tmp_path / "core.so"
+    wrong.write_text("not a library")
+    for options, said in [
+        (("--core", str(wrong)), "Cannot load the core"),
+        (("--core", str(tmp_path / "none.so")), "does not exist"),
+        (("--core", str(library()), "--capacity", "20"), "holds 146 records: leave --capacity away"),
+    ]:
+        result = run_naze_bridge("sim", "--link", str(tmp_path / "naze"), *options)
+        assert result.returncode != 0
+        assert said in result.stderr
+        assert "Traceback" not in result.stderr
