@@ -141,8 +141,10 @@ class Bridge:
             if message is not None and self._is_for_us(message):
                 self._inbox.take(Station(peer, frame.sysid, frame.compid), message, now)
 
-    def gcs_gone(self, peer: Peer) -> None:
+    def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""
+        self._now = now
+        self._uploads.peer_gone(peer, now)
         self._stations.gone(peer)
         self._splitters.pop(peer, None)
 

@@ -14,7 +14,7 @@ from bridge.mission_desk import ARMED, Delivery, MissionDesk, Refusal
 from bridge.mission_dialect import StoreReport
 from bridge.mission_log import ArrivedMission
 from bridge.runner import Runner
-from bridge.station import Post, Severity, Station
+from bridge.station import Peer, Post, Severity, Station
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
@@ -201,6 +201,12 @@ class MissionUploads:
         transfer = self._transfer
         if transfer is not None and transfer.phase is not Phase.DELIVERING:
             self._abandon(transfer, ARMED, now)
+
+    def peer_gone(self, peer: Peer, now: float) -> None:
+        """A ground station's connection is closed: others need not wait for its upload to time out."""
+        transfer = self._transfer
+        if transfer is not None and transfer.station.peer == peer and transfer.phase is not Phase.DELIVERING:
+            self._cancel(now, "ended, the ground station hung up")
 
     def link_lost(self, now: float) -> None:
         """The flight controller is gone: so is the reason to go on receiving."""

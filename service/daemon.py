@@ -84,7 +84,8 @@ class Daemon:
 
     def gcs_gone(self, peer: Peer) -> None:
         """Forget a ground station."""
-        self.bridge.gcs_gone(peer)
+        self.bridge.gcs_gone(peer, self._loop.time())
+        self.flush()
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """Speak to `peer` unasked."""

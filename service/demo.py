@@ -1,6 +1,7 @@
 """`naze-bridge demo`: the main job on a simulated Naze, from a mission file to the proof."""
 
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -33,6 +34,8 @@ _PATIENCE_S = 15.0
 def demo(file: Path, once: bool, port: int) -> None:
     """Start the daemon on a simulated Naze, write a mission FILE into it over UDP, show what became of it."""
     console = Console(highlight=False)
+    # The daemon is a child of this program: whoever ends the one ends the other.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
         items = load_mission(file)
         state_dir = Path(tempfile.mkdtemp(prefix="naze-bridge-demo-"))

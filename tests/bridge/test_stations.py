@@ -183,12 +183,12 @@ def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
     world.run(0.01)
     assert len(station.said("COMMAND_ACK")) == 1
     world.spoken_by(station, data[:9], datagram=False)
-    world.bridge.gcs_gone(station.peer)
+    world.bridge.gcs_gone(station.peer, world.now)
     # A new connection from the same address begins anew.
     world.spoken_by(station, data, datagram=False)
     world.run(0.01)
     assert len(station.said("COMMAND_ACK")) == 2
-    world.bridge.gcs_gone(station.peer)
+    world.bridge.gcs_gone(station.peer, world.now)
     assert world.bridge.peers() == []
     assert world.bridge._splitters == {}
 
