@@ -1,6 +1,7 @@
 """`python -m benchmarks [NAME...]`: measure, print a table, keep it as JSON; exit 1 if a promise is broken."""
 
 import logging
+import os
 import sys
 from collections.abc import Callable
 
@@ -26,12 +27,15 @@ def main() -> int:
         print(f"There is no benchmark {unknown[0]!r}; there are {', '.join(_BENCHMARKS)}.", file=sys.stderr)
         return 2
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.ERROR))
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    if load > cores / 2:
+        print(f"Other programs keep this machine busy (load {load:.1f} on {cores} cores): expect figures to be worse.")
     figures: list[Figure] = []
     for name in names:
         print(f"Measuring {name} ...", flush=True)
         figures += _BENCHMARKS[name]()
     print_table(figures)
-    print(f"Kept in {keep_json(figures)}")
+    print(f"Kept in {keep_json(figures, load)}")
     missed = sum(figure.is_missed for figure in figures)
     if missed:
         print(f"{missed} of the targets missed")

@@ -43,8 +43,8 @@ def print_table(figures: Sequence[Figure]) -> None:
     Console(width=None if sys.stdout.isatty() else _WIDTH_IN_FILES).print(table)
 
 
-def keep_json(figures: Sequence[Figure]) -> Path:
-    """Write the figures to a new file below benchmarks/results; return its path."""
+def keep_json(figures: Sequence[Figure], load: float) -> Path:
+    """Write the figures, and the machine's load before, to a new file below benchmarks/results; return its path."""
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / time.strftime("%Y-%m-%dT%H-%M-%S.json")
     commit = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S607
@@ -52,6 +52,7 @@ def keep_json(figures: Sequence[Figure]) -> Path:
         "commit": commit.stdout.strip() or None,
         "python": platform.python_version(),
         "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",
+        "load_before": load,
         "figures": [asdict(figure) | {"ratio": figure.ratio, "missed": figure.is_missed} for figure in figures],
     }
     path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

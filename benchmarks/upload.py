@@ -17,7 +17,7 @@ from benchmarks.processes import daemon, floor_program, free_udp_port, simulated
 from benchmarks.station import Station
 
 _UPLOADS = 10
-_SLOW_UPLOADS = 3
+_SLOW_UPLOADS = 5
 _ROUND_TRIP_S = 0.020
 _FLASH_STALL_MS = 300
 _LINE_MS = COUNT * 16 * 10 / 115.2
@@ -49,14 +49,18 @@ def _steps(echo_port: int) -> list[Figure]:
 
 
 def _slow_link(echo_port: int) -> list[Figure]:
-    with _station(echo_port, _ROUND_TRIP_S) as station:
-        # The station waits before it sends, so an echo's time includes no wait: take both.
-        floor_s = sum(station.echo(_ITEM_SIZE) + _ROUND_TRIP_S for _ in range(COUNT + 1))
-    with _bridge() as port, _station(port, _ROUND_TRIP_S) as station:
-        total_s = statistics.median(station.upload(random_mission(seed)).total for seed in range(_SLOW_UPLOADS))
-    name = f"upload at {_ROUND_TRIP_S * 1000:.0f} ms round trip, count to final ack"
-    floor = Floor(floor_s * 1000, f"{COUNT + 1} echoes")
-    return [Figure(name, (total_s + _ROUND_TRIP_S) * 1000, "ms", floor, 1.15, times_floor=True)]
+    """Take turns with the floor: both see the same load of the machine.
+
+    The station waits before it sends, and for the answer to the last item, too: the final ack comes after all 147.
+    """
+    floors_s, totals_s = [], []
+    with _bridge() as port, _station(port, _ROUND_TRIP_S) as station, _station(echo_port, _ROUND_TRIP_S) as echo:
+        for seed in range(_SLOW_UPLOADS):
+            floors_s.append(sum(echo.echo(_ITEM_SIZE) + _ROUND_TRIP_S for _ in range(COUNT + 1)))
+            totals_s.append(station.upload(random_mission(seed)).total + _ROUND_TRIP_S)
+    name = f"upload at {_ROUND_TRIP_S * 1000:.0f} ms round trip, count to final ack, median of {_SLOW_UPLOADS}"
+    floor = Floor(statistics.median(floors_s) * 1000, f"{COUNT + 1} echoes")
+    return [Figure(name, statistics.median(totals_s) * 1000, "ms", floor, 1.15, times_floor=True)]
 
 
 def _slow_flash() -> list[Figure]:
