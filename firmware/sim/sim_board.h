@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
  * A flight controller of memory around the mission core: for the host tests, the emulated Cortex-M3, the fuzzer and, as a
- * shared library, for Python (tests/firmware/c_core.py).
+ * shared library, for Python (tests/conformance/c_core.py).
  *
  * Its flash keeps the rules of the STM32F103's: erase works on whole pages and sets every bit; program works on half-words that
  * must be erased, or writes 0000. Anything else is refused and counted in `violations`. Behind the core's pages lies a page

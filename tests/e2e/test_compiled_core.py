@@ -101,11 +101,10 @@ async def test_a_power_cut_while_it_is_written(start: Starter, seed: int) -> Non
     assert bench.board.records() == bench.daemon.held()["records"] == NEW_RECORDS
 
 
-async def test_bit_errors_and_cut_frames(start: Starter) -> None:
+async def test_bit_errors(start: Starter) -> None:
     bench, _ = start_on_core(start)
     bench.daemon.push(OLD)
     bench.board.set("bit_error_rate 0.001")
-    bench.board.set("lost_byte_rate 0.0005")
     async with vehicle_at(bench.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
         for _ in range(5):
