@@ -1,0 +1,203 @@
+"""What the flight controller's rings must bear: never more reply bytes outstanding than it can hold, stalled or not."""
+
+import random
+from itertools import pairwise
+
+import pytest
+from conversations import Download, records_of, waypoints
+from world import GroundStation, World, flash_holding
+
+from bridge.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
+from bridge.procedure import Send
+from protocols.mavlink.dialect import messages
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
+from service.simulator.options import Faults, SimOptions
+
+FULL_RECORDS = records_of(waypoints(146, 3))
+FULL_FLASH = flash_holding(FULL_RECORDS)
+
+
+def question(command: int, reply_payload: int, *, exclusive: bool = False) -> Send:
+    return Send(request(command), command, reply_payload + FRAME_OVERHEAD, exclusive)
+
+
+def reply(command: int, size: int = 7) -> bytes:
+    return MspFrame(Direction.REPLY, command, bytes(size)).encode()
+
+
+def sent(link: MspLink) -> list[int]:
+    return [frame.command for data in link.take_output() for frame in MspParser().feed(data)]
+
+
+@pytest.mark.parametrize("stall_ms", [150.0, 300.0])
+def test_a_read_that_meets_the_writing_of_the_configuration(stall_ms: float) -> None:
+    """Mission Planner sets the radius after a Write; a second later the board stalls, and a Read may be under way."""
+    for seed in range(8):
+        draw = random.Random(seed)
+        options = SimOptions(config_write_ms=stall_ms, config_write_delay_ms=draw.random() * 300)
+        world = World(options, speeds=(115200,), flash=FULL_FLASH)
+        world.wait_ready()
+        world.bridge.desk.held = None
+        station = GroundStation(world)
+        station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0 + seed, 9))
+        world.run(draw.random() * 0.3)
+        assert len(Download(station).run(20)) == 146
+        world.assert_line_was_clean()
+        assert world.naze.counters.max_outstanding_reply_bytes <= MAX_OUTSTANDING_BYTES
+
+
+@pytest.mark.parametrize("baud", [115200, 38400, 9600])
+def test_all_at_once_at_every_speed(baud: int) -> None:
+    """A push, readings, parameters and telemetry."""
+    world = World(SimOptions(baud=baud), speeds=(baud,), flash=FULL_FLASH)
+    world.wait_ready(40)
+    station = GroundStation(world)
+    outcome = world.push(waypoints(60))
+    for number in range(40):
+        world.after(number * 0.1, lambda: station.send(messages.MAVLink_mission_request_list_message(1, 1, 0)))
+        world.after(number * 0.1, lambda: setattr(world.bridge.desk, "held", None))
+    world.wait_until(lambda _: bool(outcome), 60)
+    world.run(30)
+    assert station.said("MISSION_COUNT")
+    assert world.bridge.session.vehicle.attitude is not None
+    world.assert_line_was_clean()
+    assert world.naze.counters.max_outstanding_reply_bytes <= MAX_OUTSTANDING_BYTES
+
+
+@pytest.mark.parametrize("extension", [True, False])
+@pytest.mark.parametrize("rate", [1e-3, 1e-2])
+def test_lost_bytes_make_no_ring_overflow(rate: float, extension: bool) -> None:
+    """Cut frames, repeats, and the filling up of a parser that has no time-out."""
+    for seed in range(4):
+        world = World(SimOptions(seed=seed), Faults(lost_byte_rate=rate, extension=extension), speeds=(115200,))
+        world.run(20)
+        world.assert_line_was_clean()
+        if not extension and rate == 1e-2:
+            assert any(RESYNC in data for _, _, data in world.written)
+
+
+def test_polls_keep_their_pace() -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    world.written.clear()
+    world.run(20)
+    times = [at for at, _, data in world.written if data == request(101)]
+    assert len(times) == pytest.approx(80, abs=4)
+    assert max(later - earlier for earlier, later in pairwise(times)) < 0.4
+
+
+# The link alone.
+
+
+def test_no_more_goes_out_than_may_come_back() -> None:
+    link = MspLink(115200, 0.0)
+    for _ in range(5):
+        link.send(question(195, 99), 0.0)
+    assert sent(link) == [195, 195]
+    assert link.outstanding_bytes == 210
+    assert not link.may_send(20)
+    link.receive(reply(195, 99), 0.02)
+    assert sent(link) == [195]
+
+
+def test_what_timed_out_counts_until_its_answer_cannot_come_any_more() -> None:
+    link = MspLink(115200, 0.0)
+    link.receiver_timeout_s = 0.05
+    link.send(question(195, 99), 0.0)
+    link.send(question(195, 99), 0.0)
+    sent(link)
+    for _ in range(2):
+        now = link.next_deadline() or 0.0
+        link.tick(now)
+    assert not link.awaits(frozenset((195,)))
+    assert link.outstanding_bytes == 210
+    link.send(question(195, 99), now)
+    # There is no room for it; a short question behind those two finds out whether they are over.
+    assert sent(link) == [1]
+    link.receive(MspFrame(Direction.ERROR, 1).encode(), now + 0.01)
+    assert sent(link) == [195]
+    assert link.outstanding_bytes == 105
+
+
+def test_what_is_never_answered_is_forgotten_after_the_longest_stall() -> None:
+    link = MspLink(115200, 0.0)
+    link.receiver_timeout_s = 0.05
+    link.send(question(195, 99), 0.0)
+    link.send(question(195, 99), 0.0)
+    link.send(question(195, 99), 0.0)
+    now = 0.0
+    for _ in range(12):
+        now = link.next_deadline() or now
+        link.tick(now)
+    assert 1.0 < now < 8
+    assert sent(link).count(195) == 3
+
+
+def test_a_late_answer_is_not_measured_and_not_counted_twice() -> None:
+    link = MspLink(115200, 0.0)
+    link.receiver_timeout_s = 0.05
+    link.send(question(101, 11), 0.0)
+    link.tick(link.next_deadline() or 0.0)
+    link.send(question(101, 11), 0.2)
+    before = link.round_trip_s
+    link.receive(reply(101, 11), 0.201)
+    assert link.round_trip_s == before
+    # Either of the two was answered; the other may still come.
+    assert link.outstanding_bytes == 17
+    link.receive(reply(101, 11), 0.202)
+    assert link.outstanding_bytes == 0
+
+
+def test_an_answer_tells_that_what_was_asked_before_is_over() -> None:
+    link = MspLink(115200, 0.0)
+    for command in (101, 106, 108):
+        link.send(question(command, 11), 0.0)
+    link.receive(reply(108, 11), 0.02)
+    assert link.outstanding_bytes == 0
+    assert link.requests_lost == 2
+
+
+def test_nothing_is_sent_beside_an_exclusive_request() -> None:
+    link = MspLink(115200, 0.0)
+    link.send(question(191, 7, exclusive=True), 0.0)
+    link.send(question(101, 11), 0.0)
+    assert sent(link) == [191]
+    assert not link.may_send(6)
+    link.receive(reply(191), 0.2)
+    assert sent(link) == [101]
+
+
+def test_our_own_echo_is_no_answer() -> None:
+    link = MspLink(115200, 0.0)
+    link.send(question(101, 11), 0.0)
+    assert link.receive(request(101), 0.01) == []
+    assert link.outstanding_bytes == 17
+    assert link.last_heard_at == 0.0
+
+
+def test_a_reply_behind_a_false_header_is_found_when_the_line_falls_silent() -> None:
+    link = MspLink(115200, 0.0)
+    link.send(question(101, 11), 0.0)
+    assert link.receive(b"$M>\xf0" + reply(101, 11), 0.005) == []
+    (found,) = link.tick(link.next_deadline() or 0.0)
+    assert found.command == 101
+    assert link.requests_lost == 0
+
+
+def test_half_a_reply_is_not_thrown_away_because_another_request_timed_out() -> None:
+    link = MspLink(1200, 0.0)
+    link.send(question(101, 11), 0.0)
+    link.send(question(106, 18), 0.0)
+    long_one = reply(106, 18)
+    deadline = link.next_deadline() or 0.0
+    assert link.receive(long_one[:10], deadline - 0.01) == []
+    link.tick(deadline)
+    (found,) = link.receive(long_one[10:], deadline + 0.1)
+    assert found.command == 106
+
+
+def test_a_frame_with_a_hazard_byte_is_never_sent() -> None:
+    link = MspLink(115200, 0.0)
+    with pytest.raises(AssertionError, match="hazard"):
+        link.send(Send(request(100, b"\x0d"), 100, 13), 0.0)
+    assert link.take_output() == []
