@@ -112,12 +112,18 @@ def global_position_int(vehicle: VehicleState, boot_ms: int) -> Message | None:
         gps.lat_e7,
         gps.lon_e7,
         gps.altitude_m * 1000,
-        0 if height is None else height.height_cm * 10,
+        0 if height is None else _fit(height.height_cm * 10, 32),
         0,
         0,
-        0 if height is None else -height.climb_cms,
+        0 if height is None else _fit(-height.climb_cms, 16),
         heading_cdeg,
     )
+
+
+def _fit(value: int, bits: int) -> int:
+    """Keep a value within a signed field: a damaged reply may say anything."""
+    limit = 1 << bits - 1
+    return min(max(value, -limit), limit - 1)
 
 
 def sys_status(vehicle: VehicleState) -> Message | None:
