@@ -20,6 +20,8 @@ _BUSY_INTERVAL_S = 0.1
 _MAX_BEGINS = 3
 #: Unanswered requests in a row after which the flight controller counts as gone.
 _MAX_SILENCE = 5
+#: Losses in a row without a record more, silent or told, after which it is no use.
+_MAX_VAIN = 20
 
 #: What is told if this status ends the last attempt; those that are missing say nothing but "the line is bad".
 _FAILURES = {
@@ -170,7 +172,7 @@ class HarakiriMissions:
         in_flight = 0  # unanswered chunks
         committing = False
         most = self.info.chunk_records
-        silence = 0
+        silence = vain = 0
         while True:
             while sent < total and in_flight < self.info.chunk_window:
                 chunk = ext.encode_chunk(records, sent, most)
@@ -194,6 +196,7 @@ class HarakiriMissions:
                 confirmed = self._confirmed(records, answer)
                 if confirmed > acked:
                     acked = confirmed
+                    vain = 0
                     progress(acked)
                 if answer.status is Status.OK:
                     continue
@@ -204,6 +207,9 @@ class HarakiriMissions:
                     raise _Retry(PushFailure.FLASH)
                 return
             # Something was lost. A line that loses frames loses long ones most.
+            vain += 1
+            if vain > _MAX_VAIN:
+                raise _GiveUp(PushFailure.NO_ANSWER)
             in_flight = 0
             sent = acked
             committing = False
@@ -230,7 +236,7 @@ class HarakiriMissions:
         total = info.stored.count
         missing = range(0, total, step)
         parts: dict[int, Sequence[WpRecord]] = {}
-        silence = 0
+        vain = 0
         in_flight = 0
         waiting: list[int] = list(missing)
         while len(parts) < len(missing):
@@ -242,8 +248,8 @@ class HarakiriMissions:
             reply = yield from receive(MissionCommand.READ)
             answer = None if reply is None else ext.decode_records(reply.payload)
             if answer is None:
-                silence += 1
-                if silence > _MAX_SILENCE:
+                vain += 1
+                if vain > _MAX_SILENCE:
                     return None
                 in_flight = 0
                 waiting = [first for first in missing if first not in parts]
@@ -251,9 +257,9 @@ class HarakiriMissions:
             in_flight = max(in_flight - 1, 0)
             if answer.status is not Status.OK:
                 return None
-            silence = 0
             # Damage that the XOR let pass may show as another place.
             if answer.first in missing and len(answer.records) == min(step, total - answer.first):
+                vain = 0 if answer.first not in parts else vain
                 parts[answer.first] = answer.records
         return tuple(record for first in missing for record in parts[first])
 

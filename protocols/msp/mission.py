@@ -11,6 +11,8 @@ from protocols.wp_record import ListIdentity, WpRecord, pack_records, unpack_rec
 
 VERSION = 1
 MAX_RADIUS_CM = 2000
+#: Mask, place and records of a CHUNK must fit a frame's 255 bytes.
+MAX_CHUNK_RECORDS = 15
 
 
 class MissionCommand(IntEnum):
@@ -270,8 +272,8 @@ class Chunk:
 
 
 def encode_chunk(records: Sequence[WpRecord], first: int, most: int) -> Chunk:
-    """Encode the largest clean CHUNK of at most `most` records from `first` on."""
-    for count in range(min(most, len(records) - first), 0, -1):
+    """Encode the largest clean CHUNK of at most `most` records (15 fit a frame) from `first` on."""
+    for count in range(min(most, MAX_CHUNK_RECORDS, len(records) - first), 0, -1):
         body = struct.pack("<H", first) + pack_records(records[first : first + count])
         frame = _masked_request(MissionCommand.CHUNK, body)
         if frame is not None:
