@@ -1,0 +1,157 @@
+"""Flight controllers that answer anything at all: every procedure ends, nothing raises, nothing is believed."""
+
+import random
+
+import pytest
+from conversations import Download, Upload, records_of, waypoints
+from fake_controllers import HARAKIRI_CAPABILITY, QuietLine, ident
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from world import GroundStation, World
+
+from bridge.flight_controller import Kind
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionResult
+from protocols.msp.frame import Direction, MspFrame, MspParser
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Records, Status, Stored
+from protocols.wp_record import ListIdentity, identify
+
+BOXES = b"ANGLE;ARM;GTUNE;"
+INFO = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(0, 0), 200, 50, 0, 0)
+TELEMETRY = {101: 11, 106: 18, 108: 8, 109: 10, 110: 7, 118: 21}
+
+
+class Odd(QuietLine):
+    """Says that it is a Harakiri with the extension; what else it answers is `answer`'s business."""
+
+    def __init__(self, seed: int = 0, info: Info = INFO) -> None:
+        super().__init__()
+        self.random = random.Random(seed)
+        self.info = info
+        self.telemetry: dict[int, bytes] = {}
+        self._parser = MspParser()
+
+    def receive(self, data: bytes, now: float) -> None:
+        for frame in self._parser.feed(data):
+            match frame.command:
+                case 100:
+                    payload: bytes | None = ident(211, HARAKIRI_CAPABILITY)
+                case 116:
+                    payload = BOXES
+                case MissionCommand.INFO:
+                    payload = self.info.encode()
+                case command if command in TELEMETRY:
+                    payload = self.telemetry.get(command, bytes(TELEMETRY[command]))
+                case _:
+                    payload = self.answer(frame)
+            if payload is not None:
+                self.outgoing += MspFrame(Direction.REPLY, frame.command, payload).encode()
+
+    def answer(self, frame: MspFrame) -> bytes | None:
+        """Answer a command of the extension; None: not at all."""
+        draw = self.random
+        status = draw.choice((Status.OK, Status.OK, *Status))
+        count, checksum = draw.choice((0, 1, 5, 146, 65535)), draw.choice((0, 1, 0xFFFFFFFF))
+        match draw.randrange(8):
+            case 0:
+                return None
+            case 1:
+                return draw.randbytes(draw.randrange(120))
+            case 2:
+                return b""
+            case 3:
+                return Stored(status, ListIdentity(count, checksum)).encode()
+            case 4:
+                return Records(status, draw.choice((0, 6, 12, 7, 65535)), records_of(waypoints(6))).encode()
+        return Progress(status, count, checksum).encode()
+
+
+class Stubborn(Odd):
+    """Answers every CHUNK, COMMIT or READ in the same way, for ever."""
+
+    def __init__(self, answers: dict[int, bytes], info: Info = INFO) -> None:
+        super().__init__(info=info)
+        self.answers = answers
+
+    def answer(self, frame: MspFrame) -> bytes | None:
+        return self.answers.get(frame.command, Progress(Status.OK, 0, 0).encode())
+
+
+def found(peer: QuietLine) -> tuple[World, GroundStation]:
+    world = World(speeds=(115200,), peer=peer)
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 5)
+    return world, GroundStation(world)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_every_procedure_ends_whatever_is_answered(seed: int) -> None:
+    world, station = found(Odd(seed, Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0)))
+    assert Upload(station, waypoints(30, seed)).run(120) not in (None, MissionResult.ACCEPTED)
+    Download(station).run(60)
+    station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0, 9))
+    world.wait_until(lambda w: not w.bridge.runner.is_busy, 60)
+    assert world.bridge._uploads.phase is None
+
+
+PROOF = Stored(Status.OK, identify(records_of(waypoints(30)))).encode()
+
+
+@pytest.mark.parametrize(
+    "answers",
+    [
+        {MissionCommand.CHUNK: Progress(Status.SEQUENCE, 0, 0).encode()},
+        {MissionCommand.CHUNK: Progress(Status.OK, 0, 0).encode()},
+        {MissionCommand.COMMIT: Stored(Status.INCOMPLETE, ListIdentity(0, 0)).encode()},
+        {MissionCommand.COMMIT: Stored(Status.OK, ListIdentity(0, 0)).encode()},
+        {MissionCommand.COMMIT: Stored(Status.ARMED, ListIdentity(0, 0)).encode()},
+        {MissionCommand.BEGIN: Progress(Status.SAME, 0, 0).encode()},
+        {MissionCommand.BEGIN: Progress(Status.BUSY, 0, 0).encode()},
+        {MissionCommand.BEGIN: Progress(Status.OK, 30, 0).encode()},
+        {MissionCommand.BEGIN: b"\xff"},
+    ],
+)
+def test_a_board_that_insists_is_given_up(answers: dict[int, bytes]) -> None:
+    _, station = found(Stubborn(answers))
+    assert Upload(station, waypoints(30)).run(60) is MissionResult.DENIED
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        Records(Status.OK, 0, []),
+        Records(Status.OK, 0, records_of(waypoints(3))),
+        Records(Status.OK, 6, records_of(waypoints(6))),
+        Records(Status.OK, 7, records_of(waypoints(6))),
+        Records(Status.RANGE, 0, []),
+    ],
+)
+def test_a_reading_that_makes_no_progress_ends(answer: Records) -> None:
+    info = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0)
+    _, station = found(Stubborn({MissionCommand.READ: answer.encode()}, info))
+    download = Download(station, repeat_s=30)
+    download.run(30)
+    assert download.result is MissionResult.DENIED
+
+
+@pytest.mark.parametrize("records", [15, 16, 40, 255])
+def test_a_board_that_offers_more_than_a_frame_holds_gets_what_fits(records: int) -> None:
+    info = Info(1, InfoFlag(0), records, 255, records, 146, ListIdentity(0, 0), 200, 50, 0, 0)
+    _, station = found(Stubborn({}, info))
+    assert Upload(station, waypoints(60)).run(60) is MissionResult.DENIED
+
+
+@given(
+    st.lists(
+        st.one_of(st.binary(max_size=24), st.sampled_from([b"\xff" * 24, b"\x80" * 24, b"\x7f" * 24, b"\0\x80" * 12])),
+        min_size=6,
+        max_size=6,
+    )
+)
+@settings(max_examples=60, deadline=None)
+def test_any_telemetry_is_shown_or_dropped(payloads: list[bytes]) -> None:
+    board = Odd()
+    board.telemetry = dict(zip(TELEMETRY, payloads, strict=True))
+    world, station = found(board)
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.run(3)
+    assert len(station.said("HEARTBEAT")) >= 2
