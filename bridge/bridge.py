@@ -135,6 +135,8 @@ class Bridge:
                 if not self._stations.add(peer, frame.version, now):
                     return
                 self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
+                # Who comes later must hear of home, too.
+                self._announced_home = None
             if not self._inbox.understands(frame.msgid):
                 continue
             message = self._decoder.decode(frame)
@@ -254,6 +256,7 @@ class Bridge:
         boot_ms = self._boot_ms()
         for message in (
             vehicle_messages.sys_status(vehicle),
+            vehicle_messages.battery_status(vehicle),
             vehicle_messages.attitude(vehicle, boot_ms),
             vehicle_messages.gps_raw_int(vehicle, boot_ms),
             vehicle_messages.global_position_int(vehicle, boot_ms),

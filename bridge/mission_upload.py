@@ -295,7 +295,8 @@ class MissionUploads:
     def _deliver(self, transfer: _Transfer, verdict: Verdict, items: tuple[MissionItem, ...], now: float) -> None:
         self._transfer = transfer
         transfer.phase = Phase.DELIVERING
-        self._tell(verdict.findings)
+        # The finding that rejects a list is said once, as the error that ends it.
+        self._tell(verdict.findings[:-1] if verdict.result is Result.REJECTED else verdict.findings)
         arrived = ArrivedMission(str(transfer.station), items, verdict)
         self._runner.start(
             self._desk.deliver(arrived, _ignore),

@@ -46,7 +46,8 @@ class Parameters:
             self._post.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm")
             self._send(station, name)
             return
-        wanted_cm = int(value)
+        # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
+        wanted_cm = round(value)
         if wanted_cm == dialect.wp_radius_cm:
             # An equal value is not written: the board's whole configuration would be erased for it.
             self._send(station, name)

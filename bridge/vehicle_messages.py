@@ -134,6 +134,14 @@ def sys_status(vehicle: VehicleState) -> Message | None:
     return messages.MAVLink_sys_status_message(0, 0, 0, 0, voltage_mv, -1, -1, 0, 0, 0, 0, 0, 0)
 
 
+def battery_status(vehicle: VehicleState) -> Message | None:
+    """BATTERY_STATUS: the voltage in mV, which Mission Planner reads only here; all else unknown."""
+    if vehicle.analog is None:
+        return None
+    voltages_mv = [vehicle.analog.battery_dv * 100, *[65535] * 9]
+    return messages.MAVLink_battery_status_message(0, 0, 0, 32767, voltages_mv, -1, -1, -1, -1)
+
+
 def home_position(home: tuple[int, int] | None) -> Message | None:
     """HOME_POSITION: degrees * 1e7; the height of the launch point is not known to an MSP flight controller."""
     if home is None:

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 _HEADER = struct.Struct("<HBBBBBBI")
 _PAYLOAD_SIZE = 251
 _NAK = 129
-_UNKNOWN_COMMAND = 7
+#: The one code that Mission Planner takes for an end: it ignores "unknown command" and repeats for 70 s.
+_FAIL_ERRNO = 2
+_EOPNOTSUPP = 95
 
 
 def refuse(payload: Sequence[int]) -> list[int] | None:
@@ -17,5 +19,5 @@ def refuse(payload: Sequence[int]) -> list[int] | None:
     seq, session, opcode, *_ = _HEADER.unpack_from(request)
     if opcode >= _NAK - 1:
         return None
-    header = _HEADER.pack((seq + 1) & 0xFFFF, session, _NAK, 1, opcode, 0, 0, 0)
-    return list((header + bytes((_UNKNOWN_COMMAND,))).ljust(_PAYLOAD_SIZE, b"\0"))
+    header = _HEADER.pack((seq + 1) & 0xFFFF, session, _NAK, 2, opcode, 0, 0, 0)
+    return list((header + bytes((_FAIL_ERRNO, _EOPNOTSUPP))).ljust(_PAYLOAD_SIZE, b"\0"))

@@ -73,7 +73,7 @@ def test_the_vehicle_is_there_once_a_second_with_what_is_known_of_it() -> None:
     world.run(10)
     beats = [at for at, message in station.heard if message.get_type() == "HEARTBEAT"]
     assert len(beats) == 10
-    for name in ("SYS_STATUS", "ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "MISSION_CURRENT"):
+    for name in ("SYS_STATUS", "BATTERY_STATUS", "ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "MISSION_CURRENT"):
         assert 9 <= len(station.said(name)) <= 11
     beat = station.said("HEARTBEAT")[-1]
     assert (beat.get_srcSystem(), beat.get_srcComponent(), beat.autopilot, beat.type) == (1, 1, 3, 2)
