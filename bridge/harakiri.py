@@ -169,15 +169,16 @@ class HarakiriMissions:
         wanted = identify(records)
         total = len(records)
         acked = sent = self._confirmed(records, begun)
-        in_flight = 0  # unanswered chunks
+        in_flight: list[int] = []  # first record of each unanswered chunk
+        stale = 0  # chunks before which one was lost, and which will be answered all the same
         committing = False
         most = self.info.chunk_records
         silence = vain = 0
         while True:
-            while sent < total and in_flight < self.info.chunk_window:
+            while sent < total and len(in_flight) + stale < self.info.chunk_window:
                 chunk = ext.encode_chunk(records, sent, most)
                 yield from send(chunk.frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
-                in_flight += 1
+                in_flight.append(sent)
                 sent += chunk.count
             if sent == total and not committing:
                 # As long as a chunk may have to be repeated, COMMIT must not keep the line to itself.
@@ -189,17 +190,22 @@ class HarakiriMissions:
             silence = silence + 1 if answer is None else 0
             if silence > _MAX_SILENCE:
                 raise _GiveUp(PushFailure.NO_ANSWER)
+            behind = 0
             if isinstance(answer, Progress):
-                in_flight = max(in_flight - 1, 0)
                 if answer.status not in (Status.OK, Status.SEQUENCE):
                     raise _again(answer.status)
                 confirmed = self._confirmed(records, answer)
                 if confirmed > acked:
                     acked = confirmed
-                    vain = 0
+                    stale = vain = 0
                     progress(acked)
                 if answer.status is Status.OK:
+                    in_flight = in_flight[1:]
                     continue
+                if stale:
+                    stale -= 1
+                    continue
+                behind = max(sum(first > confirmed for first in in_flight) - 1, 0)
             elif isinstance(answer, Stored) and answer.status is not Status.INCOMPLETE:
                 if answer.status is not Status.OK:
                     raise _again(answer.status)
@@ -210,7 +216,7 @@ class HarakiriMissions:
             vain += 1
             if vain > _MAX_VAIN:
                 raise _GiveUp(PushFailure.NO_ANSWER)
-            in_flight = 0
+            in_flight, stale = [], behind
             sent = acked
             committing = False
             most = max(most // 2, 1)
