@@ -11,6 +11,9 @@ from service.simulator.options import Faults
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+#: What comes every second by itself.
+TELEMETRY = {"HEARTBEAT", "SYS_STATUS", "BATTERY_STATUS", "ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT",
+             "MISSION_CURRENT"}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
