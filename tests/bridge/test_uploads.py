@@ -715,6 +715,20 @@ def test_uploads_over_bad_air_are_exact_or_refused() -> None:
     assert accepted >= 24
 
 
+@pytest.mark.parametrize("late_s", [0.02, 0.2])
+def test_a_machine_that_wakes_late_loses_nothing(late_s: float) -> None:
+    for seed in range(4):
+        world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH, late_s=late_s)
+        world.wait_ready()
+        station = GroundStation(world, air=Air(loss=0.05, repeat=0.05, delay_s=0.02, spread_s=0.02))
+        items = waypoints(40, seed)
+        assert Upload(station, items).run(60) is A.ACCEPTED
+        assert world.stored == records_of(items)
+        world.run(10)
+        assert world.events("fc.lost") == []
+        world.assert_line_was_clean()
+
+
 def test_a_station_that_hammers_fills_nothing() -> None:
     """The world asserts that the queue of procedures stays short; nothing else may grow without bound either."""
     world, station = holding()

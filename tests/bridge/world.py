@@ -92,6 +92,7 @@ class World:
     """The board has power and has booted at time 0, and the port opens then, unless told otherwise.
 
     `flash`: what its flash holds. `peer`: what is on the line instead of a simulated Naze (fake_controllers).
+    `late_s`: how much later than it asked for a busy machine may wake the bridge.
     """
 
     def __init__(
@@ -105,6 +106,7 @@ class World:
         plugged: bool = True,
         flash: bytes | None = None,
         peer: Any = None,
+        late_s: float = 0.0,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
@@ -120,6 +122,8 @@ class World:
         self._events: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
         self._plugged = False
+        self._late_s = late_s
+        self._lateness_s = 0.0
         self.bridge = Bridge(BridgeConfig(speeds), self._note, self.now)
         if powered:
             self.naze.power_on_booted(self.now)
@@ -228,7 +232,7 @@ class World:
     def _step(self, end: float) -> None:
         """Go to the next moment at which anything happens, and let it happen."""
         wakeup = max(self.naze.next_wakeup(self.now), self.now + 1e-6)
-        wanted = min(self.bridge.next_deadline(), wakeup, end)
+        wanted = min(self.bridge.next_deadline() + self._lateness_s, wakeup, end)
         if self._events:
             wanted = min(wanted, self._events[0][0])
         self.now = max(self.now, wanted)
@@ -240,6 +244,10 @@ class World:
                 self._flush()
         while self._events and self._events[0][0] <= self.now:
             heapq.heappop(self._events)[2]()
+        assert len(self.bridge.runner._queue) <= MAX_QUEUED
+        if self.bridge.next_deadline() + self._lateness_s > self.now:
+            return
+        self._lateness_s = self.random.random() * self._late_s
         for _ in range(_MAX_TICKS_AT_ONCE):
             if self.bridge.next_deadline() > self.now:
                 break
@@ -247,7 +255,6 @@ class World:
             self._flush()
         else:
             raise AssertionError(f"the bridge spins at {self.now}: {self.bridge.session.state}")
-        assert len(self.bridge.runner._queue) <= MAX_QUEUED
 
     def _flush(self) -> None:
         for data in self.bridge.take_fc_output():
