@@ -96,11 +96,13 @@ class Bridge:
         """Take bytes from the port."""
         self._now = now
         self.session.received(data, now)
-        armed = bool(self.session.vehicle.armed)
-        if armed and not self._was_armed:
+        armed = self.session.vehicle.armed
+        if armed is None or armed == self._was_armed:
+            # What is not known is no change: a Harakiri that arms may fall silent first.
+            return
+        if armed:
             self._uploads.armed(now)
-        if armed != self._was_armed:
-            self._journal("info", "vehicle.armed" if armed else "vehicle.disarmed")
+        self._journal("info", "vehicle.armed" if armed else "vehicle.disarmed")
         self._was_armed = armed
 
     def take_fc_output(self) -> list[bytes]:

@@ -194,6 +194,8 @@ def test_armed_it_may_turn_to_mavlink_and_back(protocol: TelemetryProtocol, baud
         world.run(0.5)
         assert thinks_armed(world) is False
         world.run(3)
+    told = [event.name for event in world.journal if event.name.startswith("vehicle.")]
+    assert told == ["vehicle.armed", "vehicle.disarmed"] * 2
     world.assert_line_was_clean()
 
 
