@@ -1,13 +1,16 @@
 """Ground stations that come and go: who is spoken to, in which MAVLink version, and for how long."""
 
+import random
+
 import pytest
 from conversations import Upload, waypoints
+from fastcrc.crc16 import mcrf4xx
 from world import GroundStation, World
 
 from bridge.bridge import split_text
 from bridge.station import Peer
 from bridge.stations import EXPIRY_S, MAX_PEERS
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mission_item import MissionResult
 
 m = messages
@@ -230,3 +233,28 @@ def test_texts_fit_their_message_and_lose_nothing() -> None:
         assert all(len(piece) <= 50 for piece in pieces)
         assert "".join("".join(pieces).split()) == "".join(text.split())
         assert all(pieces) or not text
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
+    """Checksums are right, contents are anything: too short, too long, not a number, no text."""
+    world = start()
+    station = GroundStation(world)
+    draw = random.Random(seed)
+    understood = [msgid for msgid in CRC_EXTRA if world.bridge._inbox.understands(msgid)]
+    assert len(understood) > 15
+    for number in range(1500):
+        msgid = draw.choice(understood)
+        size = draw.choice((draw.randrange(256), draw.randrange(60)))
+        alphabet = draw.choice((bytes(range(256)), b"\x00\x01\xff", b"\x00\x00\xc0\x7f", b"\x01"))
+        payload = bytes(draw.choices(alphabet, k=size))
+        if msgid in (44, 45) and draw.random() < 0.5:
+            # The targets at their place, so that it reaches the transfer.
+            payload = payload[:2].ljust(2, b"\0") + b"\x01\x01\x00"
+        header = bytes((len(payload), 0, 0, number % 256, 255, 190)) + msgid.to_bytes(3, "little")
+        crc = mcrf4xx(header + payload + bytes((CRC_EXTRA[msgid],)))
+        world.spoken_by(station, b"\xfd" + header + payload + crc.to_bytes(2, "little"))
+        if number % 20 == 0:
+            world.run(0.02)
+    world.run(12)
+    assert Upload(station, waypoints(5)).run() is MissionResult.ACCEPTED
