@@ -172,7 +172,7 @@ class Autosense:
             and (before.sysid, before.compid) == (frame.sysid, frame.compid)
             and frame.seq == (before.seq + 1) % 256
         )
-        if follows or _is_plausible_heartbeat(frame):
+        if follows or is_plausible_heartbeat(frame):
             visit.heartbeat = frame
             if self.phase is Phase.LISTEN:
                 visit.phase_ends = now
@@ -184,10 +184,10 @@ class Autosense:
         self.found = Found(spoken, self.speed, why)
 
 
-def _is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
+def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
     """Check the length, and the fields that have few legal values: type, autopilot, state, MAVLink version."""
-    if frame.msgid != 0 or frame.raw[1] != _HEARTBEAT_SIZE:
+    payload = frame.payload
+    if frame.msgid != 0 or len(payload) != _HEARTBEAT_SIZE:
         return False
-    payload = frame.raw[6:15] if frame.version == 1 else frame.raw[10:19]
     vehicle_type, autopilot, _, state, version = payload[4:]
     return version == 3 and vehicle_type <= 45 and autopilot <= 20 and state <= 8 and frame.sysid != 0

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from bridge.autosense import PROBE, Autosense, Found, Spoken
+from bridge.autosense import PROBE, Autosense, Found, Spoken, is_plausible_heartbeat
 from bridge.flight_controller import FlightController, Kind, identify_msp
 from bridge.journal import Journal
 from bridge.msp_link import MspLink
@@ -18,7 +18,8 @@ MSP_SILENCE_S = 2.0
 MAVLINK_SILENCE_S = 2.5
 #: In MAVLink mode MSP is asked for now and then: a Harakiri answers it again once it is disarmed.
 _MSP_PROBE_INTERVAL_S = 2.0
-_SAFETY_ARMED = 0x80
+#: A heartbeat's base_mode: where it is, and its bit for "armed".
+_BASE_MODE, _SAFETY_ARMED = 6, 0x80
 _POLL_COMMANDS = frozenset(poll.command for poll in POLLS)
 
 
@@ -239,8 +240,7 @@ class FcSession:
     def _mavlink_data(self, data: bytes, now: float) -> None:
         for frame in self._mavlink.feed(data):
             self._heard_at = now
-            if frame.msgid == 0:
-                base_mode = frame.raw[12 if frame.version == 1 else 16]
-                self.vehicle.armed = bool(base_mode & _SAFETY_ARMED)
+            if is_plausible_heartbeat(frame):
+                self.vehicle.armed = bool(frame.payload[_BASE_MODE] & _SAFETY_ARMED)
         if self._msp_probe.feed(data):
             self._begin_search(now, "it answers MSP again")

@@ -29,6 +29,12 @@ class MavlinkFrame:
     msgid: int
     raw: bytes
 
+    @property
+    def payload(self) -> bytes:
+        """The message's bytes; MAVLink 2 leaves trailing zeros out."""
+        start = _HEADER_V1 if self.version == 1 else _HEADER_V2
+        return self.raw[start : start + self.raw[1]]
+
 
 class MavlinkSplitter:
     """Finds frames in a byte stream. Never raises: what is not a frame is counted and skipped.

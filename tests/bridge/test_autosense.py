@@ -18,6 +18,7 @@ from world import World
 from bridge.autosense import SPEEDS
 from bridge.fc_session import State
 from bridge.flight_controller import Kind
+from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
 
@@ -300,6 +301,18 @@ def test_a_lone_heartbeat_a_second_is_mavlink(version: int) -> None:
     world.run(20)
     assert world.kind is Kind.MAVLINK
     assert world.events("fc.lost") == []
+
+
+def test_a_heartbeat_without_content_is_no_heartbeat() -> None:
+    """MAVLink 2 leaves zeros out: an empty heartbeat is one byte long."""
+    world = World(peer=MavlinkOnly())
+    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)
+    for fields in ((0, 0, 0, 0, 0, 0), (2, 3, 0x80, 0, 3, 0), (2, 3, 0x80 | 81, 0, 4, 3)):
+        for version in (1, 2):
+            message = messages.MAVLink_heartbeat_message(*fields)
+            world.hear(bytes(message.pack(mavlink, force_mavlink1=version == 1)))
+    assert thinks_armed(world) is True
 
 
 @pytest.mark.parametrize("peer", [QuietLine, Loopback, CommandLine])
