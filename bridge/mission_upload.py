@@ -23,6 +23,9 @@ MISSION_TYPE_ALL = 255
 _FIRST_PATIENCE_S = 0.25
 _MAX_PATIENCE_S = 1.5
 _GIVE_UP_S = 5.0
+#: What comes twice within so short a time was doubled by the network. Answering each copy would double every message
+#: that follows, and MAVSDK gives up after five repeats; a ground station that missed our request repeats itself later.
+_REPEAT_AFTER_S = 0.1
 #: How long a refusal or a final ack is repeated to items that still come: Mission Planner sends its last item for 5 s.
 _MEMORY_S = 10.0
 
@@ -163,7 +166,8 @@ class MissionUploads:
                 self.count(station, transfer.count, mission_type, now)
                 return
         assert transfer.check is not None
-        if item.seq not in transfer.items:
+        is_repeat = item.seq in transfer.items
+        if not is_repeat:
             self._measure(transfer, item.seq, now)
             transfer.items[item.seq] = item
             transfer.progress_at = now
@@ -174,7 +178,8 @@ class MissionUploads:
                     return
                 transfer.checked += 1
         if transfer.checked < transfer.count:
-            self._request(transfer, now)
+            if not is_repeat or now >= transfer.requested_at + _REPEAT_AFTER_S:
+                self._request(transfer, now)
             return
         items = tuple(transfer.items[seq] for seq in range(transfer.count))
         self._deliver(transfer, transfer.check.finish(), items, now)
@@ -265,13 +270,20 @@ class MissionUploads:
         )
 
     def _measure(self, transfer: _Transfer, seq: int, now: float) -> None:
-        """Adapt the patience to the round trip; an answer to a repeated request tells nothing."""
-        if seq != transfer.checked or transfer.repeated:
+        """Adapt the patience to the round trip.
+
+        An answer to a repeated request tells no time, only that patience need not grow: it is halved. MAVSDK gives up
+        when a link that loses packets makes us wait longer and longer.
+        """
+        if seq != transfer.checked:
             return
-        measured = now - transfer.requested_at
-        old = measured if transfer.round_trip_s is None else transfer.round_trip_s
-        transfer.round_trip_s = old * 7 / 8 + measured / 8
-        transfer.patience_s = min(max(2 * transfer.round_trip_s, _FIRST_PATIENCE_S), _MAX_PATIENCE_S)
+        if not transfer.repeated:
+            measured = now - transfer.requested_at
+            old = measured if transfer.round_trip_s is None else transfer.round_trip_s
+            transfer.round_trip_s = old * 7 / 8 + measured / 8
+            transfer.patience_s = 0.0
+        least = max(2 * (transfer.round_trip_s or 0.0), _FIRST_PATIENCE_S)
+        transfer.patience_s = min(max(transfer.patience_s / 2, least), _MAX_PATIENCE_S)
 
     def _late_item(self, station: Station, seq: int, now: float) -> None:
         answered = self._recent(station, now)
