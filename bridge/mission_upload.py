@@ -272,18 +272,19 @@ class MissionUploads:
     def _measure(self, transfer: _Transfer, seq: int, now: float) -> None:
         """Adapt the patience to the round trip.
 
-        An answer to a repeated request tells no time, only that patience need not grow: it is halved. MAVSDK gives up
-        when a link that loses packets makes us wait longer and longer.
+        An answer to a repeated request measures nothing. But if it came no sooner after the repeat than answers take,
+        something was lost, and patience shrinks again: MAVSDK gives up if we wait longer after each loss.
         """
         if seq != transfer.checked:
             return
+        elapsed_s = now - transfer.requested_at
+        known_s = transfer.round_trip_s
         if not transfer.repeated:
-            measured = now - transfer.requested_at
-            old = measured if transfer.round_trip_s is None else transfer.round_trip_s
-            transfer.round_trip_s = old * 7 / 8 + measured / 8
-            transfer.patience_s = 0.0
-        least = max(2 * (transfer.round_trip_s or 0.0), _FIRST_PATIENCE_S)
-        transfer.patience_s = min(max(transfer.patience_s / 2, least), _MAX_PATIENCE_S)
+            old = elapsed_s if known_s is None else known_s
+            transfer.round_trip_s = old * 7 / 8 + elapsed_s / 8
+            transfer.patience_s = min(max(2 * transfer.round_trip_s, _FIRST_PATIENCE_S), _MAX_PATIENCE_S)
+        elif known_s is not None and elapsed_s >= known_s / 2:
+            transfer.patience_s = max(transfer.patience_s / 2, 2 * known_s, _FIRST_PATIENCE_S)
 
     def _late_item(self, station: Station, seq: int, now: float) -> None:
         answered = self._recent(station, now)

@@ -453,6 +453,7 @@ def test_a_repeat_is_answered_by_one_request_and_never_stored_again() -> None:
     items = waypoints(8)
     receiving(world, station, items, 5)
     for seq in (0, 4, 4, 2):
+        world.run(0.12)
         station.take()
         # It says something else now: the first one counts.
         station.send(item_message(seq, replace(items[seq], alt_m=99.0)))
@@ -462,6 +463,23 @@ def test_a_repeat_is_answered_by_one_request_and_never_stored_again() -> None:
         station.send(item_message(seq, items[seq]))
     world.run(1)
     assert world.stored == records_of(items)
+
+
+def test_a_copy_that_the_network_made_is_not_answered_with_a_copy() -> None:
+    world, station = holding()
+    items = waypoints(40)
+    station.air = Air(repeat=0.1, delay_s=0.03, spread_s=0.02)
+
+    def answer(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST":
+            station.send(item_message(message.seq, items[message.seq]))
+
+    station.on_message.append(answer)
+    station.send(count_message(len(items)))
+    world.run(10)
+    assert world.stored == records_of(items)
+    # The air's own copies, and no more of them.
+    assert len(requested(station)) <= 1.4 * len(items)
 
 
 def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_goes_on() -> None:
