@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.processes import BenchmarkError
-from protocols.mavlink.codec import MavlinkEncoder
+from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.mission_messages import item_message
@@ -35,7 +35,7 @@ class Station:
 
     def __init__(self, port: int, link_s: float = 0.0) -> None:
         self._link_s = link_s
-        self._encoder = MavlinkEncoder(_SYSID, _COMPID)
+        self._writer = FrameWriter(_SYSID, _COMPID)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect(("127.0.0.1", port))
         self._socket.settimeout(_PATIENCE_S)
@@ -47,9 +47,9 @@ class Station:
     def upload(self, items: Sequence[MissionItem]) -> Upload:
         """Write a mission; BenchmarkError if it is not taken as it is."""
         count = messages.MAVLink_mission_count_message(*_VEHICLE, len(items))
-        frames = [self._encoder.encode(item_message(item, *_VEHICLE, as_int=True), 2) for item in items]
+        frames = [self._writer.frame(pack(item_message(item, *_VEHICLE, as_int=True)), 2) for item in items]
         steps: list[float] = []
-        began_at = sent_at = self._send(self._encoder.encode(count, 2))
+        began_at = sent_at = self._send(self._writer.frame(pack(count), 2))
         for seq, frame in enumerate(frames):
             request, came_at = self._receive(messages.MAVLINK_MSG_ID_MISSION_REQUEST)
             if (asked := int.from_bytes(request.raw[10:12], "little")) != seq:

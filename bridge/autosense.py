@@ -51,11 +51,12 @@ class Spoken(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The verdict, and the evidence in words. `speed` is None where the line has none."""
+    """The verdict, and the evidence in words. `speed` is None where the line has none; `heard`: a MAVLink frame."""
 
     spoken: Spoken
     speed: int | None
     why: str
+    heard: MavlinkFrame | None = None
 
 
 def visit_order(known: int | None, speeds: Sequence[int | None]) -> Iterator[int | None]:
@@ -181,7 +182,7 @@ class Autosense:
 
     def _conclude(self, spoken: Spoken, why: str) -> None:
         self.phase = Phase.FOUND
-        self.found = Found(spoken, self.speed, why)
+        self.found = Found(spoken, self.speed, why, self._visit.heartbeat)
 
 
 def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:

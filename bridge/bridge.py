@@ -2,19 +2,24 @@
 
 The service feeds bytes, time and the store's answers in, and afterwards takes what is to be sent, stored and said.
 A byte's way from the UART:
-    fc_received -> FcSession -> MspLink -> VehicleState -> vehicle_messages -> take_datagrams
+    fc_received -> FcSession -> MspLink -> VehicleState -> OwnVehicle -> Ground -> take_datagrams
 A mission item's way to the flight controller, and back for the proof:
-    gcs_received -> MissionUploads -> MissionCheck -> MissionDesk.deliver -> HarakiriMissions.push -> MspLink
+    gcs_received -> Ground -> Inbox -> MissionUploads -> MissionCheck
+        -> MissionDesk.deliver -> HarakiriMissions.push -> MspLink
+An autopilot that speaks MAVLink for itself is not represented but passed through, both ways:
+    FcSession <-> PassThrough <-> Ground
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
-from bridge import vehicle_messages
 from bridge.commands import Commands
-from bridge.fc_session import FcSession
-from bridge.flight_controller import FlightController
+from bridge.fc_session import Autopilot, FcSession
+from bridge.flight_controller import FlightController, Kind
+from bridge.ground import Ground, Tap
 from bridge.harakiri import HarakiriMissions
+from bridge.harakiri_relay import HarakiriRelay
 from bridge.inbox import Inbox
 from bridge.journal import Journal
 from bridge.mission_check import check_list
@@ -23,18 +28,16 @@ from bridge.mission_dialect import MissionDialect, StoreReport
 from bridge.mission_download import MissionDownloads
 from bridge.mission_log import ArrivedMission
 from bridge.mission_upload import MissionUploads
+from bridge.own_vehicle import OwnVehicle
 from bridge.parameters import Parameters
+from bridge.pass_through import PassThrough
 from bridge.procedure import Procedure, StoreEffect
 from bridge.runner import Runner
 from bridge.station import Peer, Severity, Station
-from bridge.stations import Stations
-from protocols.mavlink.codec import MavlinkDecoder, MavlinkEncoder
-from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionItem
-
-_HEARTBEAT_INTERVAL_S = 1.0
-_TEXT_SIZE = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,35 +48,35 @@ class BridgeConfig:
     sysid: int = 1
     compid: int = 1
     takeoff_max_m: int = 15
+    autopilot: Autopilot = Autopilot.AUTO
 
 
 class Bridge:
-    """Implements `Post` for its own parts."""
+    """Puts the parts together and hands each what is its business."""
 
-    def __init__(self, config: BridgeConfig, journal: Journal, now: float) -> None:
+    def __init__(self, config: BridgeConfig, journal: Journal, now: float, tap: Tap = lambda _frame: None) -> None:
         self._config = config
         self._journal = journal
-        self._started_at = now
-        self._stations = Stations()
-        self._default_peers: dict[Peer, bool] = {}
-        self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._decoder = MavlinkDecoder()
-        self._encoder = MavlinkEncoder(config.sysid, config.compid)
-        self._datagrams: list[tuple[Peer, bytes]] = []
         self._store_effects: list[StoreEffect] = []
-        self._heartbeat_due = now
         self._now = now
         self._was_armed = False
-        self._announced_home: tuple[int, int] | None = None
+        self._pass_through: PassThrough | None = None
+        self._relay: HarakiriRelay | None = None
 
+        self.ground = Ground(config.sysid, config.compid, journal, lambda: self._vehicle.newcomer(), tap)
         self.runner = Runner(self._store_effects.append)
-        self.session = FcSession(config.speeds, self.runner, journal, self._controller_changed)
+        self.session = FcSession(
+            config.speeds, self.runner, journal, self._controller_changed, self._mavlink_received, config.autopilot
+        )
         self.desk = MissionDesk()
-        self._uploads = MissionUploads(self.desk, self.runner, self, journal, self._home)
-        self._downloads = MissionDownloads(self.desk, self.runner, self, self._is_armed, self._home)
-        parameters = Parameters(self.desk, self.runner, self, config.sysid)
-        commands = Commands(self, self._on_demand(), self._banner)
-        self._inbox = Inbox(self, self._uploads, self._downloads, parameters, commands)
+        self._vehicle = OwnVehicle(self.session, self.desk, self.ground, now)
+        home = self._vehicle.home
+        self._uploads = MissionUploads(self.desk, self.runner, self.ground, journal, home)
+        self._downloads = MissionDownloads(self.desk, self.runner, self.ground, self._is_armed, home)
+        parameters = Parameters(self.desk, self.runner, self.ground, config.sysid)
+        commands = Commands(self.ground, self._vehicle.on_demand(), self._banner)
+        self._inbox = Inbox(self.ground, self._uploads, self._downloads, parameters, commands)
 
     # The flight controller's side.
 
@@ -111,66 +114,24 @@ class Bridge:
 
     # The ground stations' side.
 
-    def add_default_peer(self, peer: Peer, *, until_answered: bool) -> None:
-        """Send to `peer` before it was heard; `until_answered`: only while nobody is heard on its link (broadcast)."""
-        self._default_peers[peer] = until_answered
-
-    def remove_default_peer(self, peer: Peer) -> None:
-        """Stop that."""
-        self._default_peers.pop(peer, None)
-
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Take bytes from a ground station. A datagram holds whole frames only."""
         self._now = now
-        splitter = self._splitters.get(peer)
-        if splitter is None:
-            splitter = MavlinkSplitter()
-            if not datagram:
-                self._splitters[peer] = splitter
-        frames = splitter.feed(data)
-        if datagram:
-            frames += splitter.reset()
-        for frame in frames:
-            if frame.sysid == self._config.sysid:
-                continue
-            if not self._stations.heard(peer, frame.version, now):
-                if not self._stations.add(peer, frame.version, now):
-                    return
-                self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
-                # Who comes later must hear of home, too.
-                self._announced_home = None
-            if not self._inbox.understands(frame.msgid):
-                continue
-            message = self._decoder.decode(frame)
-            if message is not None and self._is_for_us(message):
-                self._inbox.take(Station(peer, frame.sysid, frame.compid), message, now)
+        for frame in self.ground.received(peer, data, now, datagram=datagram):
+            if self._pass_through is not None:
+                if self._pass_through.from_station(peer, frame):
+                    self.session.send_mavlink(frame.raw)
+            elif self._inbox.understands(frame.msgid):
+                message = self._decoder.decode(frame)
+                if message is not None and self._is_for_us(message):
+                    self._inbox.take(Station(peer, frame.sysid, frame.compid), message, now)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""
         self._now = now
         self._uploads.peer_gone(peer, now)
-        self._stations.gone(peer)
-        self._splitters.pop(peer, None)
-
-    def peers(self) -> list[Peer]:
-        """Return the ground stations that are there."""
-        return self._stations.peers()
-
-    def take_datagrams(self) -> list[tuple[Peer, bytes]]:
-        """Return what is to be sent to ground stations, in order, one frame each."""
-        datagrams, self._datagrams = self._datagrams, []
-        return datagrams
-
-    def to(self, station: Station, message: Message) -> None:
-        """Send a message to one ground station."""
-        version = self._stations.version(station.peer)
-        self._datagrams.append((station.peer, self._encoder.encode(message, version)))
-
-    def say(self, severity: Severity, text: str) -> None:
-        """Show a text on every ground station, in pieces that fit STATUSTEXT."""
-        self._journal("debug", "gcs.text", text=text)
-        for piece in split_text(text):
-            self._broadcast(messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace")))
+        self.ground.gone(peer)
+        self._left(peer)
 
     # The store.
 
@@ -208,14 +169,14 @@ class Bridge:
             report: StoreReport | Refusal = yield from self.desk.preflight()
             if isinstance(report, Refusal):
                 return report
-            verdict = check_list(items, report.profile, self._home())
+            verdict = check_list(items, report.profile, self._vehicle.home())
             arrived.append(ArrivedMission(source, tuple(items), verdict))
             return (yield from self.desk.deliver(arrived[0], on_progress))
 
         def done(result: Delivery | Refusal, _at: float) -> None:
             self.desk.release(owner)
             if arrived and isinstance(result, Delivery):
-                self.say(Severity.NOTICE, f"{source}: {result.text}")
+                self.ground.say(Severity.NOTICE, f"{source}: {result.text}")
             on_done(result, arrived[0] if arrived else None)
 
         self.runner.start(procedure(), done, now)
@@ -233,9 +194,10 @@ class Bridge:
         self.session.tick(now)
         self.runner.tick(now)
         self._uploads.tick(now)
-        if now >= self._heartbeat_due:
-            self._heartbeat_due = max(self._heartbeat_due + _HEARTBEAT_INTERVAL_S, now)
-            self._every_second(now)
+        for peer in self.ground.expire(now):
+            self._left(peer)
+        if self._pass_through is None:
+            self._vehicle.tick(now)
 
     def next_deadline(self) -> float:
         """Return when `tick` has something to do."""
@@ -243,67 +205,13 @@ class Bridge:
             self.session.next_deadline(),
             self.runner.next_deadline(),
             self._uploads.next_deadline(),
-            self._heartbeat_due,
+            self._vehicle.next_deadline() if self._pass_through is None else None,
         )
-        return min(deadline for deadline in deadlines if deadline is not None)
+        return min((deadline for deadline in deadlines if deadline is not None), default=inf)
 
-    def _every_second(self, now: float) -> None:
-        for peer in self._stations.expire(now):
-            self._splitters.pop(peer, None)
-            self._journal("info", "gcs.silent", peer=str(peer))
-        vehicle = self.session.vehicle
-        heartbeat = vehicle_messages.heartbeat(vehicle, linked=self.session.controller is not None)
-        self._broadcast(heartbeat)
-        self._introduce(heartbeat)
-        boot_ms = self._boot_ms()
-        for message in (
-            vehicle_messages.sys_status(vehicle),
-            vehicle_messages.battery_status(vehicle),
-            vehicle_messages.attitude(vehicle, boot_ms),
-            vehicle_messages.gps_raw_int(vehicle, boot_ms),
-            vehicle_messages.global_position_int(vehicle, boot_ms),
-            self._mission_current(),
-            self._changed_home(),
-        ):
-            if message is not None:
-                self._broadcast(message)
-
-    def _changed_home(self) -> Message | None:
-        """HOME_POSITION whenever it is another one; who asks gets it at any time."""
-        home = self._home()
-        if home == self._announced_home:
-            return None
-        self._announced_home = home
-        return vehicle_messages.home_position(home)
-
-    def _introduce(self, heartbeat: Message) -> None:
-        """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.
-
-        A ground station of MAVLink 1 only would not see the vehicle otherwise; Mission Planner speaks MAVLink 1
-        until it has seen MAVLink 2.
-        """
-        for peer in self._everyone():
-            other = 1 if self._stations.is_unknown(peer) else 2
-            if self._stations.version(peer) != other:
-                self._datagrams.append((peer, self._encoder.encode(heartbeat, other)))
-
-    def _broadcast(self, message: Message) -> None:
-        frames: dict[int, bytes] = {}
-        for peer in self._everyone():
-            version = self._stations.version(peer)
-            if version not in frames:
-                frames[version] = self._encoder.encode(message, version)
-            self._datagrams.append((peer, frames[version]))
-
-    def _everyone(self) -> list[Peer]:
-        heard = self._stations.peers()
-        answered = {peer.link for peer in heard}
-        unheard = (
-            peer
-            for peer, until_answered in self._default_peers.items()
-            if peer not in heard and not (until_answered and peer.link in answered)
-        )
-        return [*heard, *unheard]
+    def _left(self, peer: Peer) -> None:
+        if self._pass_through is not None:
+            self._pass_through.forget(peer)
 
     def _is_for_us(self, message: Message) -> bool:
         system = getattr(message, "target_system", 0)
@@ -317,46 +225,29 @@ class Bridge:
         self.desk.controller_changed(controller, dialect)
         self._downloads.forget_all()
         if controller is None:
+            self._relay = None
             self._uploads.link_lost(now)
-            self.say(Severity.WARNING, "Flight controller lost")
-        else:
-            self.say(Severity.INFO, f"Found {controller.name}")
+            if self._pass_through is None:
+                # Of an autopilot that spoke for itself its silence tells enough.
+                self.ground.say(Severity.WARNING, "Flight controller lost")
+            return
+        self._relay = HarakiriRelay(self.ground) if controller.kind is Kind.HARAKIRI_MAVLINK else None
+        self._pass_through = PassThrough(self.ground) if controller.kind is Kind.MAVLINK else None
+        if self._pass_through is None:
+            self.ground.say(Severity.INFO, f"Found {controller.name}")
         if dialect is not None:
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
             self.runner.start(self.desk.read_back(), lambda _held, _at: None, now)
 
-    def _home(self) -> tuple[int, int] | None:
-        return self.session.vehicle.home_or_position()
+    def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
+        if self._pass_through is not None:
+            self._pass_through.from_autopilot(frames)
+        elif self._relay is not None:
+            self._relay.take(frames)
 
     def _is_armed(self) -> bool | None:
         return self.session.vehicle.armed
 
-    def _boot_ms(self) -> int:
-        return int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
-
     def _banner(self) -> str:
         controller = self.session.controller
         return f"naze-bridge: {controller.name if controller else 'no flight controller'}"
-
-    def _mission_current(self) -> Message:
-        held = self.desk.held
-        return vehicle_messages.mission_current(0 if held is None else held.identity.count)
-
-    def _on_demand(self) -> dict[int, Callable[[], Message | None]]:
-        return {
-            messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION: vehicle_messages.autopilot_version,
-            messages.MAVLINK_MSG_ID_HOME_POSITION: lambda: vehicle_messages.home_position(self._home()),
-            messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
-            messages.MAVLINK_MSG_ID_SYS_STATUS: lambda: vehicle_messages.sys_status(self.session.vehicle),
-        }
-
-
-def split_text(text: str) -> list[str]:
-    """Split at spaces into pieces of at most 50 characters."""
-    pieces: list[str] = []
-    while len(text) > _TEXT_SIZE:
-        cut = text.rfind(" ", 1, _TEXT_SIZE + 1)
-        cut = cut if cut > 0 else _TEXT_SIZE
-        pieces.append(text[:cut])
-        text = text[cut:].lstrip()
-    return [*pieces, text]

@@ -10,7 +10,7 @@ from bridge.msp_link import MspLink
 from bridge.procedure import Send
 from bridge.runner import Runner
 from bridge.vehicle_state import POLLS, Poll, VehicleState
-from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame, MspParser
 
 #: A flight controller that answers nothing for so long is gone: unplugged, reset, or switched to another protocol.
@@ -20,7 +20,17 @@ MAVLINK_SILENCE_S = 2.5
 _MSP_PROBE_INTERVAL_S = 2.0
 #: A heartbeat's base_mode: where it is, and its bit for "armed".
 _BASE_MODE, _SAFETY_ARMED = 6, 0x80
+#: MAVLink version, sysid and compid of a Harakiri (baseflight_mavlink.c).
+_HARAKIRI_SENDER = (1, 1, 200)
 _POLL_COMMANDS = frozenset(poll.command for poll in POLLS)
+
+
+class Autopilot(Enum):
+    """Whose MAVLink it is that is heard on the port: see `is_harakiri`."""
+
+    AUTO = "auto"
+    HARAKIRI = "harakiri"
+    OTHER = "other"
 
 
 class State(Enum):
@@ -52,16 +62,21 @@ class FcSession:
         runner: Runner,
         journal: Journal,
         on_change: Callable[[FlightController | None, float], None],
+        on_mavlink: Callable[[list[MavlinkFrame]], None],
+        autopilot: Autopilot,
     ) -> None:
         self._speeds = speeds
         self._runner = runner
         self._journal = journal
         self._on_change = on_change
+        self._on_mavlink = on_mavlink
+        self._autopilot = autopilot
         self.state = State.NO_PORT
         self.controller: FlightController | None = None
         self.vehicle = VehicleState()
         self.speed: int | None = speeds[0]
         self._known_speed: int | None = None
+        self._met_harakiri = False
         self._search: Autosense | None = None
         self.link: MspLink | None = None
         self._polls_due: dict[int, float] = {}
@@ -124,7 +139,7 @@ class FcSession:
         if self.state is State.MAVLINK:
             if now >= self._heard_at + MAVLINK_SILENCE_S:
                 self._begin_search(now, f"no MAVLink for {MAVLINK_SILENCE_S} s")
-            elif now >= self._probe_due:
+            elif self._may_be_msp() and now >= self._probe_due:
                 self._probe_due = now + _MSP_PROBE_INTERVAL_S
                 self._output.append(PROBE)
 
@@ -141,7 +156,9 @@ class FcSession:
             if poll is not None:
                 deadlines.append(self._polls_due[poll.command])
         if self.state is State.MAVLINK:
-            deadlines += [self._heard_at + MAVLINK_SILENCE_S, self._probe_due]
+            deadlines.append(self._heard_at + MAVLINK_SILENCE_S)
+            if self._may_be_msp():
+                deadlines.append(self._probe_due)
         return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
     def _enter(self, state: State) -> None:
@@ -189,7 +206,8 @@ class FcSession:
             self._probe_due = now + _MSP_PROBE_INTERVAL_S
             self._mavlink = MavlinkSplitter()
             self._msp_probe = MspParser()
-            self._welcome(FlightController(Kind.MAVLINK, Kind.MAVLINK.value), found, now)
+            kind = Kind.HARAKIRI_MAVLINK if self._is_harakiri(found.heard) else Kind.MAVLINK
+            self._welcome(FlightController(kind, kind.value), found, now)
 
     def _identified(self, controller: FlightController | None, found: Found, now: float) -> None:
         if self.state is not State.IDENTIFYING or self.link is None:
@@ -206,6 +224,8 @@ class FcSession:
 
     def _welcome(self, controller: FlightController, found: Found, now: float) -> None:
         self.controller = controller
+        if found.spoken is Spoken.MSP:
+            self._met_harakiri = controller.kind in (Kind.HARAKIRI, Kind.HARAKIRI_MISSIONS)
         self._journal(
             "info",
             "fc.found",
@@ -237,10 +257,33 @@ class FcSession:
             self._polls_due[poll.command] = now + poll.interval_s
             self.link.send(Send(poll.frame, poll.command, poll.reply_payload + FRAME_OVERHEAD), now)
 
+    def _is_harakiri(self, heard: MavlinkFrame | None) -> bool:
+        """Tell a Harakiri from other autopilots: it was met on this port before, or it sends as only it does.
+
+        MAVLink 1 from system 1, component 200: baseflight's children do that; others are component 1.
+        """
+        if self._autopilot is not Autopilot.AUTO:
+            return self._autopilot is Autopilot.HARAKIRI
+        sender = None if heard is None else (heard.version, heard.sysid, heard.compid)
+        return self._met_harakiri or sender == _HARAKIRI_SENDER
+
+    def _may_be_msp(self) -> bool:
+        """Only a Harakiri is asked: to other autopilots goes nothing but what ground stations send."""
+        return self.controller is not None and self.controller.kind is Kind.HARAKIRI_MAVLINK
+
     def _mavlink_data(self, data: bytes, now: float) -> None:
-        for frame in self._mavlink.feed(data):
+        frames = self._mavlink.feed(data)
+        if frames:
             self._heard_at = now
-            if is_plausible_heartbeat(frame):
+        for frame in frames:
+            if frame.msgid == 0 and is_plausible_heartbeat(frame):
                 self.vehicle.armed = bool(frame.payload[_BASE_MODE] & _SAFETY_ARMED)
-        if self._msp_probe.feed(data):
+        if frames:
+            self._on_mavlink(frames)
+        if self._may_be_msp() and self._msp_probe.feed(data):
             self._begin_search(now, "it answers MSP again")
+
+    def send_mavlink(self, frame: bytes) -> None:
+        """Pass a ground station's frame on to an autopilot that speaks MAVLink for itself."""
+        if self.state is State.MAVLINK:
+            self._output.append(frame)

@@ -23,7 +23,8 @@ class Kind(Enum):
     HARAKIRI_MISSIONS = "Harakiri with the mission extension"
     HARAKIRI = "Harakiri without the mission extension"
     OTHER_MSP = "another MSP flight controller"
-    MAVLINK = "a MAVLink flight controller"
+    HARAKIRI_MAVLINK = "Harakiri in MAVLink mode"
+    MAVLINK = "another MAVLink autopilot"
 
 
 @dataclass(frozen=True, slots=True)

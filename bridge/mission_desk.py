@@ -48,7 +48,7 @@ class HeldMission:
 _REASONS: dict[Kind, Refusal] = {
     Kind.HARAKIRI: Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
     Kind.OTHER_MSP: Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions"),
-    Kind.MAVLINK: Refusal(MissionResult.DENIED, "Flight controller is in MAVLink mode"),
+    Kind.HARAKIRI_MAVLINK: Refusal(MissionResult.DENIED, "Flight controller is in MAVLink mode"),
 }
 _NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")

@@ -111,7 +111,7 @@ class MissionJobs:
             "armed": vehicle.armed,
             "battery_v": vehicle.analog.battery_dv / 10 if vehicle.analog else None,
             "satellites": vehicle.gps.satellites if vehicle.gps else None,
-            "ground_stations": [str(peer) for peer in bridge.peers()],
+            "ground_stations": [str(peer) for peer in bridge.ground.peers()],
             "mission_records": None if held is None else held.identity.count,
             "mission_checksum": None if held is None else f"{held.identity.checksum:08x}",
             "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),

@@ -64,7 +64,7 @@ class Daemon:
         self._port.set_speed(bridge.speed)
         for data in bridge.take_fc_output():
             self._port.write(data)
-        for peer, frame in bridge.take_datagrams():
+        for peer, frame in bridge.ground.take_datagrams():
             self._links[peer.link].send(peer, frame)
         for effect in bridge.take_store_effects():
             self._carry_out(effect)
@@ -89,11 +89,11 @@ class Daemon:
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """Speak to `peer` unasked."""
-        self.bridge.add_default_peer(peer, until_answered=until_answered)
+        self.bridge.ground.add_default_peer(peer, until_answered=until_answered)
 
     def remove_default_peer(self, peer: Peer) -> None:
         """Stop that."""
-        self.bridge.remove_default_peer(peer)
+        self.bridge.ground.remove_default_peer(peer)
 
     # The flight controller's port, the clock and the store.
 

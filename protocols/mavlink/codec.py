@@ -1,13 +1,14 @@
 """Messages from frames and frames from messages, for the messages that the bridge itself reads or writes."""
 
 import struct
+from dataclasses import dataclass
 
 from fastcrc.crc16 import mcrf4xx
 
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
-from protocols.mavlink.frame import MAGIC_V1, MavlinkFrame
+from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame
 
-_HEADER_V1 = 6
+_HEADER_V2 = 10
 _CRC_SIZE = 2
 #: MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them all the
 #: same. The sizes of those payloads that we send and that have extensions in MAVLink 2.
@@ -43,24 +44,48 @@ class MavlinkDecoder:
             return None
 
 
-class MavlinkEncoder:
-    """Packs messages as one sender: sysid, compid and a running sequence number."""
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """A message as bytes, before it is known to whom it goes. MAVLink 2 leaves trailing zeros out."""
+
+    msgid: int
+    payload_v1: bytes
+    payload_v2: bytes
+
+
+_PACKER = messages.MAVLink(None)
+
+
+def pack(message: Message) -> Packed:
+    """Pack a message's fields, once for all who get it."""
+    msgid: int = message.get_msgId()
+    whole_size: int = message.unpacker.size
+    payload = bytes(message.pack(_PACKER)[_HEADER_V2:-_CRC_SIZE])
+    payload_v1 = payload.ljust(whole_size, b"\0")[: _V1_PAYLOAD_SIZES.get(msgid, whole_size)]
+    return Packed(msgid, payload_v1, payload)
+
+
+class FrameWriter:
+    """Makes the frames of one sender to one receiver.
+
+    Each receiver has a sequence number of its own: ground stations show gaps in it as a bad link.
+    """
 
     def __init__(self, sysid: int, compid: int) -> None:
-        self._mavlink = messages.MAVLink(None, srcSystem=sysid, srcComponent=compid)
+        self._sysid = sysid
+        self._compid = compid
+        self._seq = 0
 
-    def encode(self, message: Message, version: int) -> bytes:
-        """Pack a message as a frame of MAVLink 1 or 2."""
-        frame: bytes = bytes(message.pack(self._mavlink, force_mavlink1=version == 1))
-        self._mavlink.seq = (self._mavlink.seq + 1) % 256
-        return _without_extensions(frame, message.get_msgId()) if version == 1 else frame
-
-
-def _without_extensions(frame: bytes, msgid: int) -> bytes:
-    """Cut a MAVLink 1 frame to the fields that MAVLink 1 knows."""
-    size = _V1_PAYLOAD_SIZES.get(msgid)
-    if size is None:
-        return frame
-    checked = bytes((size,)) + frame[2 : _HEADER_V1 + size]
-    crc = mcrf4xx(checked + bytes((CRC_EXTRA[msgid],)))
-    return bytes((MAGIC_V1,)) + checked + crc.to_bytes(_CRC_SIZE, "little")
+    def frame(self, packed: Packed, version: int) -> bytes:
+        """Return a whole frame of MAVLink 1 or 2."""
+        seq, self._seq = self._seq, (self._seq + 1) & 0xFF
+        msgid = packed.msgid
+        if version == 1:
+            magic, payload = MAGIC_V1, packed.payload_v1
+            body = bytes((len(payload), seq, self._sysid, self._compid, msgid)) + payload
+        else:
+            magic, payload = MAGIC_V2, packed.payload_v2
+            header = (len(payload), 0, 0, seq, self._sysid, self._compid, msgid & 0xFF, msgid >> 8 & 0xFF, msgid >> 16)
+            body = bytes(header) + payload
+        crc = mcrf4xx(body + bytes((CRC_EXTRA[msgid],)))
+        return bytes((magic,)) + body + crc.to_bytes(_CRC_SIZE, "little")

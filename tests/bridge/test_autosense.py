@@ -185,11 +185,11 @@ def test_armed_it_may_turn_to_mavlink_and_back(protocol: TelemetryProtocol, baud
     world.wait_ready()
     for _ in range(2):
         world.faults.armed = True
-        assert world.wait_until(lambda w: w.kind is Kind.MAVLINK, 20) <= 8
+        assert world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 20) <= 8
         world.run(1.2)
         assert thinks_armed(world) is True
         world.run(6)
-        assert world.kind is Kind.MAVLINK
+        assert world.kind is Kind.HARAKIRI_MAVLINK
         world.faults.armed = False
         assert world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 20) <= 8
         world.run(0.5)
@@ -205,7 +205,7 @@ def test_armed_from_the_start(protocol: TelemetryProtocol) -> None:
     world = World(SimOptions(tele_prot=protocol), Faults(armed=True))
     world.run(0.5)
     assert world.naze.armed
-    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 3)
     assert "no answer to" in str(world.events("fc.found")[0].facts["why"])
     world.faults.armed = False
     world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 8)

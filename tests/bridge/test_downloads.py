@@ -283,7 +283,7 @@ def test_without_a_link_and_without_a_store_the_reason_is_told() -> None:
 def test_in_mavlink_mode_the_reason_is_told() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.faults.armed = True
-    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 8)
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 8)
     (ack,) = ask(station, request_message(0))
     assert ack.type == A.DENIED
     assert any("MAVLink mode" in text for text in station.texts())

@@ -7,7 +7,7 @@ from conversations import Upload, waypoints
 from fastcrc.crc16 import mcrf4xx
 from world import GroundStation, World
 
-from bridge.bridge import split_text
+from bridge.ground import split_text
 from bridge.station import Peer
 from bridge.stations import EXPIRY_S, MAX_PEERS
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
@@ -110,7 +110,7 @@ def test_who_is_silent_for_a_minute_is_not_spoken_to_any_more() -> None:
     station.take()
     world.run(5)
     assert station.heard == []
-    assert world.bridge.peers() == []
+    assert world.bridge.ground.peers() == []
     station.send(gcs_heartbeat())
     world.run(2)
     assert station.said("HEARTBEAT")
@@ -129,7 +129,7 @@ def test_who_keeps_speaking_stays() -> None:
 def test_a_default_peer_is_spoken_to_unasked_and_for_ever_in_both_versions() -> None:
     world = start()
     station = GroundStation(world, "fixed")
-    world.bridge.add_default_peer(station.peer, until_answered=False)
+    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
     world.run(5)
     assert versions(station) == {1, 2}
     assert len(station.said("ATTITUDE")) >= 4
@@ -138,7 +138,7 @@ def test_a_default_peer_is_spoken_to_unasked_and_for_ever_in_both_versions() -> 
     station.take()
     world.run(5)
     assert len(station.said("ATTITUDE")) >= 4
-    world.bridge.remove_default_peer(station.peer)
+    world.bridge.ground.remove_default_peer(station.peer)
     station.take()
     world.run(3)
     assert station.heard == []
@@ -147,7 +147,7 @@ def test_a_default_peer_is_spoken_to_unasked_and_for_ever_in_both_versions() -> 
 def test_a_broadcast_address_is_spoken_to_until_somebody_answers() -> None:
     world = start()
     everyone = GroundStation(world, "broadcast")
-    world.bridge.add_default_peer(everyone.peer, until_answered=True)
+    world.bridge.ground.add_default_peer(everyone.peer, until_answered=True)
     world.run(3)
     assert everyone.said("HEARTBEAT")
     station = GroundStation(world, "answers")
@@ -167,7 +167,7 @@ def test_strangers_by_the_hundred_take_no_memory_and_leave_room() -> None:
     frame = GroundStation(world, "pack", sysid=9).pack(gcs_heartbeat())
     for number in range(500):
         world.bridge.gcs_received(Peer("udp", ("10.0.0.1", number)), frame, world.now, datagram=True)
-    assert len(world.bridge.peers()) <= MAX_PEERS
+    assert len(world.bridge.ground.peers()) <= MAX_PEERS
     world.run(6)
     # They fell silent: a new one finds room.
     station.send(gcs_heartbeat())
@@ -192,8 +192,8 @@ def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
     world.run(0.01)
     assert len(station.said("COMMAND_ACK")) == 2
     world.bridge.gcs_gone(station.peer, world.now)
-    assert world.bridge.peers() == []
-    assert world.bridge._splitters == {}
+    assert world.bridge.ground.peers() == []
+    assert world.bridge.ground._splitters == {}
 
 
 def test_a_datagram_with_a_cut_frame_does_not_spoil_the_next() -> None:
@@ -212,10 +212,10 @@ def test_our_own_frames_that_come_back_are_nobody() -> None:
     station.send(gcs_heartbeat())
     world.run(2)
     echo = list(station.frames_heard)
-    before = len(world.bridge.peers())
+    before = len(world.bridge.ground.peers())
     for frame in echo:
         world.bridge.gcs_received(Peer("udp", "echo"), frame, world.now, datagram=True)
-    assert len(world.bridge.peers()) == before
+    assert len(world.bridge.ground.peers()) == before
 
 
 def test_texts_fit_their_message_and_lose_nothing() -> None:

@@ -259,7 +259,7 @@ class World:
     def _flush(self) -> None:
         for data in self.bridge.take_fc_output():
             self._write(data)
-        for peer, frame in self.bridge.take_datagrams():
+        for peer, frame in self.bridge.ground.take_datagrams():
             station = self.stations.get(peer)
             if station is not None:
                 station.carry(frame)

@@ -3,7 +3,7 @@
 import pytest
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
-from protocols.mavlink.codec import MavlinkDecoder, MavlinkEncoder
+from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 
@@ -33,7 +33,7 @@ SENT = [
 
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
 def test_what_we_send_is_what_mavlink_1_knows(message: Message) -> None:
-    frame = MavlinkEncoder(1, 1).encode(message, 1)
+    frame = FrameWriter(1, 1).frame(pack(message), 1)
     assert frame[1] == mavlink_1.mavlink_map[message.get_msgId()].unpacker.size
     received = mavlink_1.MAVLink(None).decode(bytearray(frame))
     for name in received.get_fieldnames():
@@ -43,7 +43,7 @@ def test_what_we_send_is_what_mavlink_1_knows(message: Message) -> None:
 @pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
 def test_we_read_what_we_send(message: Message, version: int) -> None:
-    (frame,) = MavlinkSplitter().feed(MavlinkEncoder(1, 1).encode(message, version))
+    (frame,) = MavlinkSplitter().feed(FrameWriter(1, 1).frame(pack(message), version))
     received = MavlinkDecoder().decode(frame)
     assert received is not None
     assert received.get_type() == message.get_type()

@@ -6,7 +6,7 @@ from itertools import pairwise
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from protocols.mavlink.codec import MavlinkDecoder, MavlinkEncoder
+from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
@@ -15,7 +15,7 @@ MEGABYTE = 1 << 20
 
 def make_frames() -> list[bytes]:
     """Frames of both versions, short and long, truncated zeros included."""
-    encoder = MavlinkEncoder(1, 190)
+    writer = FrameWriter(1, 190)
     some = [
         messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3),
         messages.MAVLink_mission_request_message(255, 190, 7, 0),
@@ -25,7 +25,7 @@ def make_frames() -> list[bytes]:
         ),
         messages.MAVLink_param_request_list_message(0, 0),
     ]
-    return [encoder.encode(message, version) for message in some for version in (1, 2)]
+    return [writer.frame(pack(message), version) for message in some for version in (1, 2)]
 
 
 FRAMES = make_frames()

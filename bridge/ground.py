@@ -1,0 +1,175 @@
+"""The ground stations' side: who is there, what they sent, and what is on its way to them. Sans-IO."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from bridge.journal import Journal
+from bridge.station import Peer, Severity, Station
+from bridge.stations import Stations
+from protocols.mavlink.codec import FrameWriter, Packed, pack
+from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+
+_TEXT_SIZE = 50
+_EXPIRY_INTERVAL_S = 1.0
+
+#: Is shown each frame that is sent to ground stations or taken from them, once.
+Tap = Callable[[bytes], None]
+
+
+class Ground:
+    """All ground stations together. Implements `Post`. `on_newcomer`: somebody was heard for the first time."""
+
+    def __init__(self, sysid: int, compid: int, journal: Journal, on_newcomer: Callable[[], None], tap: Tap) -> None:
+        self._sysid = sysid
+        self._compid = compid
+        self._journal = journal
+        self._on_newcomer = on_newcomer
+        self._tap = tap
+        self._stations = Stations()
+        self._default_peers: dict[Peer, bool] = {}
+        self._splitters: dict[Peer, MavlinkSplitter] = {}
+        self._writers: dict[Peer, FrameWriter] = {}
+        self._datagrams: list[tuple[Peer, bytes]] = []
+        self._expiry_due = 0.0
+
+    # Who is there.
+
+    def add_default_peer(self, peer: Peer, *, until_answered: bool) -> None:
+        """Send to `peer` before it was heard; `until_answered`: only while nobody is heard on its link (broadcast)."""
+        self._default_peers[peer] = until_answered
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        """Stop that."""
+        self._default_peers.pop(peer, None)
+        self._writers.pop(peer, None)
+
+    def peers(self) -> list[Peer]:
+        """Return the ground stations that were heard."""
+        return self._stations.peers()
+
+    def everyone(self) -> list[Peer]:
+        """Return all who are to be sent what is for everyone."""
+        heard = self._stations.peers()
+        answered = {peer.link for peer in heard}
+        unheard = (
+            peer
+            for peer, until_answered in self._default_peers.items()
+            if peer not in heard and not (until_answered and peer.link in answered)
+        )
+        return [*heard, *unheard]
+
+    def gone(self, peer: Peer) -> None:
+        """A ground station's connection is closed."""
+        self._stations.gone(peer)
+        self._forget(peer)
+
+    def expire(self, now: float) -> list[Peer]:
+        """Forget the silent, and return them. May be called at any time: it looks once a second."""
+        if now < self._expiry_due:
+            return []
+        self._expiry_due = now + _EXPIRY_INTERVAL_S
+        silent = self._stations.expire(now)
+        for peer in silent:
+            self._forget(peer)
+            self._journal("info", "gcs.silent", peer=str(peer))
+        return silent
+
+    def _forget(self, peer: Peer) -> None:
+        self._splitters.pop(peer, None)
+        self._writers.pop(peer, None)
+
+    # What they send.
+
+    def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> list[MavlinkFrame]:
+        """Take bytes from a peer, return the whole frames in them. A datagram holds whole frames only."""
+        splitter = self._splitters.get(peer)
+        if splitter is None:
+            splitter = MavlinkSplitter()
+            if not datagram:
+                self._splitters[peer] = splitter
+        frames = splitter.feed(data)
+        if datagram:
+            frames += splitter.reset()
+        return [frame for frame in frames if self._is_welcome(peer, frame, now)]
+
+    def _is_welcome(self, peer: Peer, frame: MavlinkFrame, now: float) -> bool:
+        if frame.sysid == self._sysid:
+            # What we sent, come back: a broadcast, or a router that sends everything everywhere.
+            return False
+        if not self._stations.heard(peer, frame.version, now):
+            if not self._stations.add(peer, frame.version, now):
+                return False
+            self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
+            self._on_newcomer()
+        self._tap(frame.raw)
+        return True
+
+    # What they are sent.
+
+    def take_datagrams(self) -> list[tuple[Peer, bytes]]:
+        """Return what is to be sent, in order: whole frames."""
+        datagrams, self._datagrams = self._datagrams, []
+        return datagrams
+
+    def to(self, station: Station, message: Message) -> None:
+        """Send a message to one ground station."""
+        peer = station.peer
+        self._tap(self._write(peer, message, self._stations.version(peer)))
+
+    def broadcast(self, message: Message) -> None:
+        """Send a message to everyone."""
+        self.multicast(pack(message), self.everyone())
+
+    def multicast(self, packed: Packed, peers: Iterable[Peer]) -> None:
+        """Send a packed message to some."""
+        frame = None
+        for peer in peers:
+            frame = self._writer(peer).frame(packed, self._stations.version(peer))
+            self._datagrams.append((peer, frame))
+        if frame is not None:
+            self._tap(frame)
+
+    def introduce(self, heartbeat: Message) -> None:
+        """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.
+
+        A ground station of MAVLink 1 only would not see the vehicle otherwise; Mission Planner speaks MAVLink 1
+        until it has seen MAVLink 2.
+        """
+        for peer in self.everyone():
+            other = 1 if self._stations.is_unknown(peer) else 2
+            if self._stations.version(peer) != other:
+                self._write(peer, heartbeat, other)
+
+    def say(self, severity: Severity, text: str) -> None:
+        """Show a text on every ground station, in pieces that fit STATUSTEXT."""
+        self._journal("debug", "gcs.text", text=text)
+        for piece in split_text(text):
+            self.broadcast(messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace")))
+
+    def forward(self, frames: Sequence[bytes], peers: Iterable[Peer]) -> None:
+        """Send frames on as they came: `frames` are datagrams of one whole frame or more."""
+        for peer in peers:
+            for frame in frames:
+                self._datagrams.append((peer, frame))
+
+    def _write(self, peer: Peer, message: Message, version: int) -> bytes:
+        frame = self._writer(peer).frame(pack(message), version)
+        self._datagrams.append((peer, frame))
+        return frame
+
+    def _writer(self, peer: Peer) -> FrameWriter:
+        writer = self._writers.get(peer)
+        if writer is None:
+            writer = self._writers[peer] = FrameWriter(self._sysid, self._compid)
+        return writer
+
+
+def split_text(text: str) -> list[str]:
+    """Split at spaces into pieces of at most 50 characters."""
+    pieces: list[str] = []
+    while len(text) > _TEXT_SIZE:
+        cut = text.rfind(" ", 1, _TEXT_SIZE + 1)
+        cut = cut if cut > 0 else _TEXT_SIZE
+        pieces.append(text[:cut])
+        text = text[cut:].lstrip()
+    return [*pieces, text]

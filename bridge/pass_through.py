@@ -1,0 +1,88 @@
+"""Frames between an autopilot that speaks MAVLink for itself and its ground stations: routed, never changed. Sans-IO.
+
+Routing as MAVLink describes it (https://mavlink.io/en/guide/routing.html): a frame without a target goes to everyone
+but its sender; one with a target only to where that system (and component) was heard. What is for somebody who was
+not heard yet goes to the autopilot.
+"""
+
+from collections.abc import Sequence
+
+from bridge.ground import Ground
+from bridge.station import Peer
+from protocols.mavlink.dialect import messages
+from protocols.mavlink.frame import MavlinkFrame
+from protocols.mavlink.target import target_of
+
+#: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
+MAX_DATAGRAM_SIZE = 280
+#: Carries a signing key in the clear: it is nobody's but the two ends of a cable.
+_NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
+
+
+class PassThrough:
+    """The routes of one autopilot's time on the port."""
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._aboard: set[tuple[int, int]] = set()
+        self._heard: dict[tuple[int, int], set[Peer]] = {}
+
+    def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
+        """Send the autopilot's frames on."""
+        for_all: list[bytes] = []
+        for frame in frames:
+            self._aboard.add((frame.sysid, frame.compid))
+            system, component = target_of(frame)
+            if frame.msgid == _NEVER_FORWARDED:
+                continue
+            if system == 0:
+                for_all.append(frame.raw)
+                continue
+            # In order: what came before goes first.
+            self._send(for_all)
+            for_all = []
+            self._ground.forward([frame.raw], self._peers_of(system, component))
+        self._send(for_all)
+
+    def from_station(self, peer: Peer, frame: MavlinkFrame) -> bool:
+        """Send a ground station's frame on to others; tell whether it is for the autopilot, too."""
+        self._heard.setdefault((frame.sysid, frame.compid), set()).add(peer)
+        if frame.msgid == _NEVER_FORWARDED:
+            return False
+        system, component = target_of(frame)
+        if system == 0:
+            self._ground.forward([frame.raw], [other for other in self._ground.everyone() if other != peer])
+            return True
+        others = [other for other in self._peers_of(system, component) if other != peer]
+        self._ground.forward([frame.raw], others)
+        return self._is_aboard(system) or not others
+
+    def forget(self, peer: Peer) -> None:
+        """A ground station is gone."""
+        for peers in self._heard.values():
+            peers.discard(peer)
+
+    def _is_aboard(self, system: int) -> bool:
+        return any(system == sysid for sysid, _ in self._aboard)
+
+    def _peers_of(self, system: int, component: int) -> list[Peer]:
+        found: set[Peer] = set()
+        for (sysid, compid), peers in self._heard.items():
+            if sysid == system and component in (0, compid):
+                found |= peers
+        return [peer for peer in self._ground.peers() if peer in found]
+
+    def _send(self, frames: list[bytes]) -> None:
+        if frames:
+            self._ground.forward(in_datagrams(frames), self._ground.everyone())
+
+
+def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
+    """Join frames that came together into datagrams of at most 280 bytes: a datagram has its price, bytes have none."""
+    datagrams: list[bytes] = []
+    for frame in frames:
+        if datagrams and len(datagrams[-1]) + len(frame) <= MAX_DATAGRAM_SIZE:
+            datagrams[-1] += frame
+        else:
+            datagrams.append(frame)
+    return datagrams
