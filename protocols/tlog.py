@@ -1,0 +1,77 @@
+"""Telemetry logs (.tlog) as Mission Planner, MAVProxy and pymavlink write and replay them.
+
+A record is 8 bytes, big-endian: microseconds since the Unix epoch, then the frame as it was on the wire.
+Two things are never in a log of ours: a signature, which Mission Planner could only check with the key of then, and
+SETUP_SIGNING, which carries the key.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fastcrc.crc16 import mcrf4xx
+
+from protocols.mavlink.dialect import CRC_EXTRA, messages
+from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame, MavlinkSplitter
+
+_STAMP_SIZE = 8
+#: pymavlink takes the two lowest bits for the number of a link.
+_LINK_BITS = 0b11
+_CRC_SIZE = 2
+_SIGNATURE_SIZE = 13
+_SIGNED = 0x01
+_HEADERS = {MAGIC_V1: 6, MAGIC_V2: 10}
+
+
+@dataclass(frozen=True, slots=True)
+class TlogRecord:
+    """A frame, and when it was sent or received, in microseconds since the Unix epoch."""
+
+    at_us: int
+    frame: MavlinkFrame
+
+
+def tlog_record(frame: bytes, at_us: int) -> bytes:
+    """Return the record of a whole, checked frame of the dialect; nothing for one that must not be in a log."""
+    if frame[0] == MAGIC_V1:
+        # SETUP_SIGNING has a number that MAVLink 1 cannot name.
+        return _stamp(at_us) + frame
+    msgid = int.from_bytes(frame[7:10], "little")
+    if msgid == messages.MAVLINK_MSG_ID_SETUP_SIGNING:
+        return b""
+    return _stamp(at_us) + (_without_signature(frame, msgid) if frame[2] & _SIGNED else frame)
+
+
+def read_tlog(data: bytes) -> Iterator[TlogRecord]:
+    """Yield the records of a log. What is no whole record (a torn last one, a damaged block) is skipped."""
+    at = 0
+    while at < len(data) - _STAMP_SIZE:
+        start = at + _STAMP_SIZE
+        frame = _frame_at(data, start)
+        if frame is None:
+            at += 1
+            continue
+        yield TlogRecord(int.from_bytes(data[at:start], "big"), frame)
+        at = start + len(frame.raw)
+
+
+def _stamp(at_us: int) -> bytes:
+    return (at_us & ~_LINK_BITS).to_bytes(_STAMP_SIZE, "big")
+
+
+def _frame_at(data: bytes, start: int) -> MavlinkFrame | None:
+    header = _HEADERS.get(data[start])
+    if header is None or len(data) < start + header:
+        return None
+    size = header + data[start + 1] + _CRC_SIZE
+    if data[start] == MAGIC_V2 and data[start + 2] & _SIGNED:
+        size += _SIGNATURE_SIZE
+    raw = data[start : start + size]
+    found = MavlinkSplitter().feed(raw)
+    return found[0] if found and found[0].raw == raw else None
+
+
+def _without_signature(frame: bytes, msgid: int) -> bytes:
+    """Clear the flag, cut the signature, and compute the CRC anew: it covers the flags."""
+    checked = frame[1:2] + bytes((frame[2] & ~_SIGNED,)) + frame[3 : -_SIGNATURE_SIZE - _CRC_SIZE]
+    crc = mcrf4xx(checked + bytes((CRC_EXTRA[msgid],)))
+    return frame[:1] + checked + crc.to_bytes(_CRC_SIZE, "little")
