@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 
 from bridge.msp_link import RESYNC
+from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, MspParser, request
@@ -31,6 +32,8 @@ _PROBE_INTERVAL_S = 0.15
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
 _HEARTBEAT_SIZE = 9
+#: Harakiri sends three and more every 125 ms. By chance one of four ids and a mark in the right place: 1 in 1024 each.
+_FRSKY_EVIDENCE = 6
 
 
 class Phase(Enum):
@@ -47,6 +50,7 @@ class Spoken(Enum):
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
+    FRSKY = "FrSky"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +63,11 @@ class Found:
     heard: MavlinkFrame | None = None
 
 
-def visit_order(known: int | None, speeds: Sequence[int | None]) -> Iterator[int | None]:
+def visit_order(
+    known: int | None, speeds: Sequence[int | None], first: Sequence[int | None] = ()
+) -> Iterator[int | None]:
     """Yield speeds for ever; the last good one takes every other turn: a rebooting board comes back to it."""
+    yield from first
     others = [speed for speed in speeds if speed != known] or [known]
     while True:
         for speed in others:
@@ -81,6 +88,7 @@ class _Visit:
     answer: MspFrame | None = None
     heartbeat: MavlinkFrame | None = None
     last_mavlink: MavlinkFrame | None = None
+    frsky: FrskyWatch = field(default_factory=FrskyWatch)
 
 
 class Autosense:
@@ -89,8 +97,10 @@ class Autosense:
     `speed` is what the port must be set to; `take_output` what must be written to it.
     """
 
-    def __init__(self, speeds: Sequence[int | None], known: int | None, now: float) -> None:
-        self._order = visit_order(known, speeds)
+    def __init__(
+        self, speeds: Sequence[int | None], known: int | None, now: float, first: Sequence[int | None] = ()
+    ) -> None:
+        self._order = visit_order(known, speeds, first)
         self.speed = next(self._order)
         self.phase = Phase.LISTEN
         self.found: Found | None = None
@@ -112,6 +122,8 @@ class Autosense:
             self._msp_frame(msp_frame, now)
         for mavlink_frame in self._visit.mavlink.feed(data):
             self._mavlink_frame(mavlink_frame, now)
+        if self.speed == FRSKY_SPEED:
+            self._visit.frsky.feed(data)
 
     def tick(self, now: float) -> None:
         """Move on when a phase or a visit is over."""
@@ -122,6 +134,8 @@ class Autosense:
             if visit.heartbeat is not None:
                 sender = f"system {visit.heartbeat.sysid} component {visit.heartbeat.compid}"
                 self._conclude(Spoken.MAVLINK, f"heard {sender}, no answer to {visit.probes} MSP probes")
+            elif visit.frsky.values_in_a_row >= _FRSKY_EVIDENCE:
+                self._conclude(Spoken.FRSKY, f"{visit.frsky.values_in_a_row} FrSky values in a row")
             else:
                 self.speed = next(self._order)
                 self.phase = Phase.LISTEN

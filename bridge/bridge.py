@@ -31,6 +31,7 @@ from bridge.mission_upload import MissionUploads
 from bridge.own_vehicle import OwnVehicle
 from bridge.parameters import Parameters
 from bridge.pass_through import PassThrough
+from bridge.presence import Presence
 from bridge.procedure import Procedure, StoreEffect
 from bridge.runner import Runner
 from bridge.station import Peer, Severity, Station
@@ -63,6 +64,7 @@ class Bridge:
         self._was_armed = False
         self._pass_through: PassThrough | None = None
         self._relay: HarakiriRelay | None = None
+        self._presence = Presence()
 
         self.ground = Ground(config.sysid, config.compid, journal, lambda: self._vehicle.newcomer(), tap)
         self.runner = Runner(self._store_effects.append)
@@ -196,6 +198,7 @@ class Bridge:
         self._uploads.tick(now)
         for peer in self.ground.expire(now):
             self._left(peer)
+        self._say(self._presence.tick(now))
         if self._pass_through is None:
             self._vehicle.tick(now)
 
@@ -205,9 +208,15 @@ class Bridge:
             self.session.next_deadline(),
             self.runner.next_deadline(),
             self._uploads.next_deadline(),
+            self._presence.next_deadline(),
             self._vehicle.next_deadline() if self._pass_through is None else None,
         )
         return min((deadline for deadline in deadlines if deadline is not None), default=inf)
+
+    def _say(self, news: tuple[Severity, str] | None) -> None:
+        # An autopilot that speaks for itself is not spoken for.
+        if news is not None and self._pass_through is None:
+            self.ground.say(*news)
 
     def _left(self, peer: Peer) -> None:
         if self._pass_through is not None:
@@ -227,14 +236,11 @@ class Bridge:
         if controller is None:
             self._relay = None
             self._uploads.link_lost(now)
-            if self._pass_through is None:
-                # Of an autopilot that spoke for itself its silence tells enough.
-                self.ground.say(Severity.WARNING, "Flight controller lost")
+            self._presence.lost(now)
             return
         self._relay = HarakiriRelay(self.ground) if controller.kind is Kind.HARAKIRI_MAVLINK else None
         self._pass_through = PassThrough(self.ground) if controller.kind is Kind.MAVLINK else None
-        if self._pass_through is None:
-            self.ground.say(Severity.INFO, f"Found {controller.name}")
+        self._say(self._presence.found(controller))
         if dialect is not None:
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
             self.runner.start(self.desk.read_back(), lambda _held, _at: None, now)

@@ -3,23 +3,26 @@
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from bridge.autosense import PROBE, Autosense, Found, Spoken, is_plausible_heartbeat
+from bridge.autosense import Autosense, Found, Spoken
 from bridge.flight_controller import FlightController, Kind, identify_msp
+from bridge.frsky_line import FrskyLine
 from bridge.journal import Journal
+from bridge.mavlink_line import MavlinkLine
 from bridge.msp_link import MspLink
 from bridge.procedure import Send
 from bridge.runner import Runner
 from bridge.vehicle_state import POLLS, Poll, VehicleState
+from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.msp.frame import FRAME_OVERHEAD, MspFrame, MspParser
+from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
 
 #: A flight controller that answers nothing for so long is gone: unplugged, reset, or switched to another protocol.
 MSP_SILENCE_S = 2.0
-MAVLINK_SILENCE_S = 2.5
-#: In MAVLink mode MSP is asked for now and then: a Harakiri answers it again once it is disarmed.
-_MSP_PROBE_INTERVAL_S = 2.0
-#: A heartbeat's base_mode: where it is, and its bit for "armed".
-_BASE_MODE, _SAFETY_ARMED = 6, 0x80
+#: The same, if there is something else on the line that is not MSP: it was armed, and sends telemetry now.
+_GARBLED_SILENCE_S = 0.5
+_GARBLE_SIZE = 16
+#: The speeds of Harakiri's telemetry while armed (tele_prot 3 and 1).
+_ARMED_SPEEDS = (57600, FRSKY_SPEED)
 #: MAVLink version, sysid and compid of a Harakiri (baseflight_mavlink.c).
 _HARAKIRI_SENDER = (1, 1, 200)
 _POLL_COMMANDS = frozenset(poll.command for poll in POLLS)
@@ -41,15 +44,17 @@ class State(Enum):
     IDENTIFYING = "identifying"
     MSP = "MSP"
     MAVLINK = "MAVLink"
+    FRSKY = "FrSky"
 
 
 #: What each state may turn into; anything else is a bug.
 _TRANSITIONS: dict[State, frozenset[State]] = {
     State.NO_PORT: frozenset({State.SEARCHING}),
-    State.SEARCHING: frozenset({State.IDENTIFYING, State.MAVLINK, State.NO_PORT}),
+    State.SEARCHING: frozenset({State.IDENTIFYING, State.MAVLINK, State.FRSKY, State.NO_PORT}),
     State.IDENTIFYING: frozenset({State.MSP, State.SEARCHING, State.NO_PORT}),
-    State.MSP: frozenset({State.SEARCHING, State.NO_PORT}),
+    State.MSP: frozenset({State.SEARCHING, State.MAVLINK, State.NO_PORT}),
     State.MAVLINK: frozenset({State.SEARCHING, State.NO_PORT}),
+    State.FRSKY: frozenset({State.SEARCHING, State.NO_PORT}),
 }
 
 
@@ -80,10 +85,9 @@ class FcSession:
         self._search: Autosense | None = None
         self.link: MspLink | None = None
         self._polls_due: dict[int, float] = {}
-        self._mavlink = MavlinkSplitter()
-        self._msp_probe = MspParser()
-        self._heard_at = 0.0
-        self._probe_due = 0.0
+        self._mavlink: MavlinkLine | None = None
+        self._frsky: FrskyLine | None = None
+        self._foreign = _Foreign()
         self._output: list[bytes] = []
 
     @property
@@ -119,10 +123,14 @@ class FcSession:
             self._search.receive(data, now)
             self._follow_search(now)
         elif self.link is not None:
-            for frame in self.link.receive(data, now):
+            frames = self.link.receive(data, now)
+            for frame in frames:
                 self._msp_frame(frame, now)
-        elif self.state is State.MAVLINK:
-            self._mavlink_data(data, now)
+            self._foreign.note(data, self.link, is_msp=bool(frames))
+        elif self._mavlink is not None:
+            self._mavlink_data(self._mavlink, data, now)
+        elif self._frsky is not None:
+            self._frsky.receive(data, now)
 
     def tick(self, now: float) -> None:
         """Do what is due."""
@@ -134,14 +142,17 @@ class FcSession:
                 self._msp_frame(frame, now)
         if self.link is not None and self.state is State.MSP:
             self._poll(now)
-            if now >= self.link.last_heard_at + MSP_SILENCE_S:
-                self._begin_search(now, f"no answer for {MSP_SILENCE_S} s")
-        if self.state is State.MAVLINK:
-            if now >= self._heard_at + MAVLINK_SILENCE_S:
-                self._begin_search(now, f"no MAVLink for {MAVLINK_SILENCE_S} s")
-            elif self._may_be_msp() and now >= self._probe_due:
-                self._probe_due = now + _MSP_PROBE_INTERVAL_S
-                self._output.append(PROBE)
+            self._notice_silence(self.link, now)
+        if self._mavlink is not None:
+            probe = self._mavlink.tick(now)
+            if probe:
+                self._output.append(probe)
+            if self._mavlink.ended:
+                self._begin_search(now, self._mavlink.ended)
+        if self._frsky is not None:
+            self._frsky.tick(now)
+            if self._frsky.ended:
+                self._begin_search(now, self._frsky.ended)
 
     def next_deadline(self) -> float | None:
         """Return when `tick` has something to do."""
@@ -151,32 +162,53 @@ class FcSession:
         if self.link is not None:
             deadlines.append(self.link.next_deadline())
         if self.state is State.MSP and self.link is not None:
-            deadlines.append(self.link.last_heard_at + MSP_SILENCE_S)
+            deadlines.append(self.link.last_heard_at + self._patience_s)
             poll = self._next_poll()
             if poll is not None:
                 deadlines.append(self._polls_due[poll.command])
-        if self.state is State.MAVLINK:
-            deadlines.append(self._heard_at + MAVLINK_SILENCE_S)
-            if self._may_be_msp():
-                deadlines.append(self._probe_due)
+        if self._mavlink is not None:
+            deadlines.append(self._mavlink.next_deadline())
+        if self._frsky is not None:
+            deadlines.append(self._frsky.next_deadline())
         return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
     def _enter(self, state: State) -> None:
         assert state in _TRANSITIONS[self.state], (self.state, state)
         self.state = state
 
-    def _begin_search(self, now: float, why: str) -> None:
+    @property
+    def _patience_s(self) -> float:
+        return _GARBLED_SILENCE_S if self._foreign.size >= _GARBLE_SIZE else MSP_SILENCE_S
+
+    def _notice_silence(self, link: MspLink, now: float) -> None:
+        """Leave MSP when it is not answered any more: for MAVLink if that is what came instead, else to search."""
+        if now < link.last_heard_at + self._patience_s:
+            return
+        heard = self._foreign.mavlink
+        if heard is not None:
+            self._drop(now)
+            self._take_up_mavlink(Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard), now)
+        elif self._foreign.size >= _GARBLE_SIZE:
+            first = [speed for speed in _ARMED_SPEEDS if speed in self._speeds and speed != self.speed]
+            self._begin_search(now, "what comes is no MSP any more", first)
+        else:
+            self._begin_search(now, f"no answer for {MSP_SILENCE_S} s")
+
+    def _begin_search(self, now: float, why: str, first: Sequence[int] = ()) -> None:
         self._enter(State.SEARCHING)
         was_known = self.controller is not None
         self._drop(now)
         if was_known:
             self._journal("warning", "fc.lost", why=why, speed_baud=self.speed)
-        self._search = Autosense(self._speeds, self._known_speed, now)
+        self._search = Autosense(self._speeds, self._known_speed, now, first)
         self.speed = self._search.speed
 
     def _drop(self, now: float) -> None:
         """Forget the present flight controller."""
         self.link = None
+        self._mavlink = None
+        self._frsky = None
+        self._foreign = _Foreign()
         self.vehicle = VehicleState()
         self._runner.link_down(now)
         if self.controller is not None:
@@ -192,7 +224,7 @@ class FcSession:
         self._output += self._search.take_output()
         self._search = None
         self._journal("debug", "fc.sensed", protocol=found.spoken.value, speed_baud=found.speed, why=found.why)
-        if found.spoken is Spoken.MSP or self._known_speed is None:
+        if found.spoken is Spoken.MSP or (self._known_speed is None and found.spoken is Spoken.MAVLINK):
             # A Harakiri that arms may go to another speed for MAVLink; disarmed, it comes back to this one.
             self._known_speed = found.speed
         if found.spoken is Spoken.MSP:
@@ -200,14 +232,21 @@ class FcSession:
             self.link = MspLink(found.speed, now)
             self._runner.link_up(self.link)
             self._runner.start(identify_msp(), lambda who, at: self._identified(who, found, at), now)
+        elif found.spoken is Spoken.MAVLINK:
+            self._take_up_mavlink(found, now)
         else:
-            self._enter(State.MAVLINK)
-            self._heard_at = now
-            self._probe_due = now + _MSP_PROBE_INTERVAL_S
-            self._mavlink = MavlinkSplitter()
-            self._msp_probe = MspParser()
-            kind = Kind.HARAKIRI_MAVLINK if self._is_harakiri(found.heard) else Kind.MAVLINK
-            self._welcome(FlightController(kind, kind.value), found, now)
+            self._enter(State.FRSKY)
+            self._frsky = FrskyLine(now)
+            # Only an armed Harakiri sends it.
+            self.vehicle.armed = True
+            self._welcome(FlightController(Kind.FRSKY, Kind.FRSKY.value), found, now)
+
+    def _take_up_mavlink(self, found: Found, now: float) -> None:
+        self._enter(State.MAVLINK)
+        is_harakiri = self._is_harakiri(found.heard)
+        self._mavlink = MavlinkLine(is_harakiri=is_harakiri, now=now)
+        kind = Kind.HARAKIRI_MAVLINK if is_harakiri else Kind.MAVLINK
+        self._welcome(FlightController(kind, kind.value), found, now)
 
     def _identified(self, controller: FlightController | None, found: Found, now: float) -> None:
         if self.state is not State.IDENTIFYING or self.link is None:
@@ -267,23 +306,37 @@ class FcSession:
         sender = None if heard is None else (heard.version, heard.sysid, heard.compid)
         return self._met_harakiri or sender == _HARAKIRI_SENDER
 
-    def _may_be_msp(self) -> bool:
-        """Only a Harakiri is asked: to other autopilots goes nothing but what ground stations send."""
-        return self.controller is not None and self.controller.kind is Kind.HARAKIRI_MAVLINK
-
-    def _mavlink_data(self, data: bytes, now: float) -> None:
-        frames = self._mavlink.feed(data)
-        if frames:
-            self._heard_at = now
-        for frame in frames:
-            if frame.msgid == 0 and is_plausible_heartbeat(frame):
-                self.vehicle.armed = bool(frame.payload[_BASE_MODE] & _SAFETY_ARMED)
+    def _mavlink_data(self, line: MavlinkLine, data: bytes, now: float) -> None:
+        frames = line.receive(data, now)
+        self.vehicle.armed = line.armed
         if frames:
             self._on_mavlink(frames)
-        if self._may_be_msp() and self._msp_probe.feed(data):
-            self._begin_search(now, "it answers MSP again")
+        if line.ended:
+            self._begin_search(now, line.ended)
 
     def send_mavlink(self, frame: bytes) -> None:
         """Pass a ground station's frame on to an autopilot that speaks MAVLink for itself."""
         if self.state is State.MAVLINK:
             self._output.append(frame)
+
+
+class _Foreign:
+    """What comes on an MSP line that is no MSP, since the last answer."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self.mavlink: MavlinkFrame | None = None
+        self._skipped_before = 0
+        self._splitter = MavlinkSplitter()
+
+    def note(self, data: bytes, link: MspLink, *, is_msp: bool) -> None:
+        """Look at what was just received."""
+        skipped, self._skipped_before = link.skipped_bytes - self._skipped_before, link.skipped_bytes
+        if is_msp:
+            if self.size:
+                self.size, self.mavlink, self._splitter = 0, None, MavlinkSplitter()
+            return
+        self.size += skipped
+        if skipped:
+            for frame in self._splitter.feed(data):
+                self.mavlink = frame

@@ -25,6 +25,7 @@ class Kind(Enum):
     OTHER_MSP = "another MSP flight controller"
     HARAKIRI_MAVLINK = "Harakiri in MAVLink mode"
     MAVLINK = "another MAVLink autopilot"
+    FRSKY = "Harakiri in FrSky mode"
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,13 +45,14 @@ class HeldMission:
     items: tuple[MissionItem, ...]
 
 
+ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")
 _REASONS: dict[Kind, Refusal] = {
     Kind.HARAKIRI: Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
     Kind.OTHER_MSP: Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions"),
     Kind.HARAKIRI_MAVLINK: Refusal(MissionResult.DENIED, "Flight controller is in MAVLink mode"),
+    Kind.FRSKY: ARMED,
 }
 _NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
-ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
 _OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 

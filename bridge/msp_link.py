@@ -83,6 +83,11 @@ class MspLink:
         return self._round_trip_s
 
     @property
+    def skipped_bytes(self) -> int:
+        """Bytes that belonged to no frame."""
+        return self._parser.skipped_bytes
+
+    @property
     def bad_checksums(self) -> int:
         """Frames that came in damaged."""
         return self._parser.bad_checksums

@@ -1,0 +1,30 @@
+"""A port on which an armed Harakiri sends FrSky telemetry (tele_prot 1): nothing to read, only to be waited out."""
+
+from protocols.frsky import FrskyWatch
+
+#: Harakiri sends eight times a second.
+_SILENCE_S = 1.0
+
+
+class FrskyLine:
+    """Feed bytes and time until `ended` says why it is over."""
+
+    def __init__(self, now: float) -> None:
+        self._watch = FrskyWatch()
+        self._heard_at = now
+        self.ended: str | None = None
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes from the port."""
+        self._watch.feed(data)
+        if self._watch.values_in_a_row:
+            self._heard_at = now
+
+    def tick(self, now: float) -> None:
+        """Notice silence."""
+        if now >= self.next_deadline():
+            self.ended = f"no FrSky telemetry for {_SILENCE_S} s"
+
+    def next_deadline(self) -> float:
+        """Return when `tick` has something to do."""
+        return self._heard_at + _SILENCE_S

@@ -1,0 +1,63 @@
+"""A port on which MAVLink is spoken: what comes in, and when it is over. Sans-IO."""
+
+from bridge.autosense import PROBE, is_plausible_heartbeat
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.msp.frame import MspParser
+
+#: Other autopilots are given the time of two lost heartbeats.
+_SILENCE_S = 2.5
+#: An armed Harakiri sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
+_HARAKIRI_ARMED_SILENCE_S = 0.8
+#: Harakiri is asked for MSP now and then: it answers again once it is disarmed.
+_PROBE_INTERVAL_S = 1.0
+#: A heartbeat's base_mode: where it is, and its bit for "armed".
+_BASE_MODE, _SAFETY_ARMED = 6, 0x80
+
+
+class MavlinkLine:
+    """Feed bytes and time until `ended` says why it is over."""
+
+    def __init__(self, *, is_harakiri: bool, now: float) -> None:
+        self._is_harakiri = is_harakiri
+        self._splitter = MavlinkSplitter()
+        self._msp = MspParser()
+        self._heard_at = now
+        self._probe_due = now + _PROBE_INTERVAL_S
+        self.armed: bool | None = None
+        self.ended: str | None = None
+
+    def receive(self, data: bytes, now: float) -> list[MavlinkFrame]:
+        """Take bytes from the port; return the whole frames."""
+        frames = self._splitter.feed(data)
+        if frames:
+            self._heard_at = now
+        for frame in frames:
+            if frame.msgid == 0 and is_plausible_heartbeat(frame):
+                armed = bool(frame.payload[_BASE_MODE] & _SAFETY_ARMED)
+                if self.armed and not armed:
+                    self._probe_due = now
+                self.armed = armed
+        if self._is_harakiri and self._msp.feed(data):
+            self.ended = "it answers MSP again"
+        return frames
+
+    def tick(self, now: float) -> bytes:
+        """Return what is to be sent. To other autopilots goes nothing but what ground stations send."""
+        if now >= self._silent_at:
+            self.ended = f"no MAVLink for {self._patience_s} s"
+        elif self._is_harakiri and now >= self._probe_due:
+            self._probe_due = now + _PROBE_INTERVAL_S
+            return PROBE
+        return b""
+
+    def next_deadline(self) -> float:
+        """Return when `tick` has something to do."""
+        return min(self._silent_at, self._probe_due) if self._is_harakiri else self._silent_at
+
+    @property
+    def _patience_s(self) -> float:
+        return _HARAKIRI_ARMED_SILENCE_S if self._is_harakiri and self.armed else _SILENCE_S
+
+    @property
+    def _silent_at(self) -> float:
+        return self._heard_at + self._patience_s

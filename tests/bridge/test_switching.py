@@ -1,0 +1,93 @@
+"""Arming changes protocol and speed (tele_prot 0..3), disarming changes them back; ground stations see one vehicle."""
+
+from itertools import pairwise
+
+import pytest
+from conversations import Upload, records_of, waypoints
+from world import GroundStation, World
+
+from bridge.flight_controller import Kind
+from protocols.mission_item import MissionResult
+from service.simulator.naze import SimulatedNaze
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+READABLE = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600]
+
+
+class DeafWhileArmed(SimulatedNaze):
+    """FrSky with the receiver's wire cut while armed: nothing is answered."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        if not self.armed:
+            super().receive(data, now)
+
+
+def heartbeat_gaps(station: GroundStation) -> list[float]:
+    times = [at for at, message in station.heard if message.get_type() == "HEARTBEAT"]
+    return [later - sooner for sooner, later in pairwise(times)]
+
+
+def wait_for_telemetry(world: World, station: GroundStation, *, armed: bool) -> float:
+    """Wait for a heartbeat that tells `armed`, with attitude after it; return how long the attitude was missing."""
+    began = world.now
+    longest, last = 0.0, began
+    station.heard.clear()
+    while world.now < began + 8:
+        world.run(0.1)
+        times = [at for at, message in station.heard if message.get_type() == "ATTITUDE"]
+        longest = max([longest, *(later - sooner for sooner, later in pairwise([last, *times]))])
+        beats = [message for message in station.said("HEARTBEAT") if bool(message.base_mode & 128) is armed]
+        if beats and times:
+            break
+    else:
+        raise AssertionError("no telemetry")
+    return longest
+
+
+@pytest.mark.parametrize("baud", [115200, 57600, 38400])
+@pytest.mark.parametrize("protocol", READABLE)
+def test_one_vehicle_throughout(protocol: TelemetryProtocol, baud: int) -> None:
+    world = World(SimOptions(baud=baud, tele_prot=protocol))
+    station = GroundStation(world)
+    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.wait_ready()
+    assert Upload(station, waypoints(12)).run() is MissionResult.ACCEPTED
+    whole: list[tuple[float, object]] = []
+    for _ in range(3):
+        for armed in (True, False):
+            world.faults.armed = armed
+            assert wait_for_telemetry(world, station, armed=armed) <= 3.0
+            whole += station.heard
+            if armed:
+                assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
+            world.run(5)
+    assert world.stored == records_of(waypoints(12))
+    assert max(heartbeat_gaps(station)) <= 1.5
+    senders = {(message.get_srcSystem(), message.get_srcComponent()) for message in station.said()}
+    assert senders == {(1, 1)}
+    assert not [text for text in station.texts() if "lost" in text or "Found" in text]
+    world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize(("board", "wanted"), [(SimulatedNaze, Kind.HARAKIRI_MISSIONS), (DeafWhileArmed, Kind.FRSKY)])
+def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Kind) -> None:
+    faults = Faults()
+    world = World(faults=faults, peer=board(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults))
+    station = GroundStation(world)
+    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.wait_ready()
+    for _ in range(2):
+        station.heard.clear()
+        faults.armed = True
+        world.wait_until(lambda w: w.bridge.speed == 9600 and w.kind is wanted, 5)
+        world.run(60)
+        assert world.kind is wanted
+        assert station.said("HEARTBEAT")[-1].base_mode & 128
+        warnings = [text for text in station.texts() if "FrSky" in text]
+        assert len(warnings) == (board is DeafWhileArmed)
+        assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
+        faults.armed = False
+        world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS and w.bridge.speed == 115200, 5)
+        world.run(3)
+        assert max(heartbeat_gaps(station)) <= 1.5
+    world.assert_line_was_clean()
