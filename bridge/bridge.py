@@ -208,6 +208,7 @@ class Bridge:
             self.session.next_deadline(),
             self.runner.next_deadline(),
             self._uploads.next_deadline(),
+            self.ground.next_deadline(),
             self._presence.next_deadline(),
             self._vehicle.next_deadline() if self._pass_through is None else None,
         )

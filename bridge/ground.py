@@ -10,7 +10,6 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
 _TEXT_SIZE = 50
-_EXPIRY_INTERVAL_S = 1.0
 
 #: Is shown each frame that is sent to ground stations or taken from them, once.
 Tap = Callable[[bytes], None]
@@ -30,7 +29,6 @@ class Ground:
         self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._writers: dict[Peer, FrameWriter] = {}
         self._datagrams: list[tuple[Peer, bytes]] = []
-        self._expiry_due = 0.0
 
     # Who is there.
 
@@ -64,15 +62,16 @@ class Ground:
         self._forget(peer)
 
     def expire(self, now: float) -> list[Peer]:
-        """Forget the silent, and return them. May be called at any time: it looks once a second."""
-        if now < self._expiry_due:
-            return []
-        self._expiry_due = now + _EXPIRY_INTERVAL_S
+        """Forget the silent, and return them."""
         silent = self._stations.expire(now)
         for peer in silent:
             self._forget(peer)
             self._journal("info", "gcs.silent", peer=str(peer))
         return silent
+
+    def next_deadline(self) -> float | None:
+        """Return when `expire` may have something to do."""
+        return self._stations.next_deadline()
 
     def _forget(self, peer: Peer) -> None:
         self._splitters.pop(peer, None)

@@ -23,6 +23,7 @@ class Stations:
 
     def __init__(self) -> None:
         self._known: dict[Peer, _Known] = {}
+        self._expiry_due: float | None = None
 
     def heard(self, peer: Peer, version: int, now: float) -> bool:
         """Note a frame from `peer`; False if the peer is not known."""
@@ -41,6 +42,8 @@ class Stations:
                 return False
             del self._known[silent]
         self._known[peer] = _Known(version, now)
+        if self._expiry_due is None:
+            self._expiry_due = now + EXPIRY_S
         return True
 
     def is_unknown(self, peer: Peer) -> bool:
@@ -58,10 +61,17 @@ class Stations:
 
     def expire(self, now: float) -> list[Peer]:
         """Forget peers that fell silent, and return them."""
-        silent = [peer for peer, known in self._known.items() if now - known.heard_at > EXPIRY_S]
+        if self._expiry_due is None or now < self._expiry_due:
+            return []
+        silent = [peer for peer, known in self._known.items() if now >= known.heard_at + EXPIRY_S]
         for peer in silent:
             del self._known[peer]
+        self._expiry_due = min((known.heard_at + EXPIRY_S for known in self._known.values()), default=None)
         return silent
+
+    def next_deadline(self) -> float | None:
+        """Return when the first may have expired: rather too early than looking at all of them each time."""
+        return self._expiry_due
 
     def peers(self) -> list[Peer]:
         """Return all peers that are there."""

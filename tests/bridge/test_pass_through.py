@@ -1,0 +1,210 @@
+"""An autopilot that speaks MAVLink for itself: frames pass both ways as they came, each to whom it is for."""
+
+import random
+from collections.abc import Iterable
+from hashlib import sha256
+
+import pytest
+from fake_controllers import QuietLine
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from world import GroundStation, World
+
+from bridge.flight_controller import Kind
+from protocols.mavlink.frame import MavlinkSplitter
+
+KEY = sha256(b"a passphrase").digest()
+
+
+class Autopilot(QuietLine):
+    """Sends what a test gives it, and a heartbeat a second. `received`: what came over the wire."""
+
+    def __init__(self, sysid: int = 1, compid: int = 1, version: int = 2) -> None:
+        super().__init__()
+        self.mavlink = mavlink.MAVLink(None, srcSystem=sysid, srcComponent=compid)
+        self.version = version
+        self.received = bytearray()
+        self.sent: list[bytes] = []
+        self._due = 0.3
+
+    def pack(self, message: mavlink.MAVLink_message) -> bytes:
+        frame = bytes(message.pack(self.mavlink, force_mavlink1=self.version == 1))
+        self.mavlink.seq = (self.mavlink.seq + 1) % 256
+        return frame
+
+    def say(self, message: mavlink.MAVLink_message) -> bytes:
+        frame = self.pack(message)
+        self.sent.append(frame)
+        self.outgoing += frame
+        return frame
+
+    def receive(self, data: bytes, now: float) -> None:
+        self.received += data
+
+    def advance(self, now: float) -> bytes:
+        while self._due <= now:
+            self._due += 1.0
+            self.say(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3))
+        return super().advance(now)
+
+    def next_wakeup(self, now: float) -> float:
+        return min(super().next_wakeup(now), self._due)
+
+
+def passing(autopilot: Autopilot | None = None, stations: int = 2) -> tuple[World, Autopilot, list[GroundStation]]:
+    """An autopilot that was found, and ground stations that were heard."""
+    autopilot = autopilot or Autopilot()
+    world = World(peer=autopilot)
+    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    heard = [GroundStation(world, f"gcs{number}", sysid=255 - number) for number in range(stations)]
+    for station in heard:
+        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.run(0.01)
+    for station in heard:
+        station.take()
+        station.frames_heard.clear()
+    autopilot.received.clear()
+    autopilot.sent.clear()
+    return world, autopilot, heard
+
+
+def telemetry(seed: int, count: int) -> Iterable[mavlink.MAVLink_message]:
+    chance = random.Random(seed)
+    for _ in range(count):
+        angles = [chance.uniform(-3, 3) for _ in range(6)]
+        yield mavlink.MAVLink_attitude_message(chance.randrange(1 << 32), *angles)
+        yield mavlink.MAVLink_statustext_message(6, bytes(chance.choices(b"\xfe\xfdMAV$M<\r#R", k=40)))
+
+
+@pytest.mark.parametrize(("version", "signed"), [(1, False), (2, False), (2, True)])
+def test_everyone_gets_everything_as_it_was_sent(version: int, signed: bool) -> None:
+    autopilot = Autopilot(version=version)
+    if signed:
+        autopilot.mavlink.signing.secret_key = KEY
+        autopilot.mavlink.signing.sign_outgoing = True
+    world, autopilot, stations = passing(autopilot)
+    for message in telemetry(1, 200):
+        autopilot.say(message)
+        world.run(0.004)
+    world.run(2)
+    for station in stations:
+        assert station.frames_heard == autopilot.sent
+
+
+def test_nothing_of_our_own_is_said_where_the_autopilot_speaks() -> None:
+    world, autopilot, (station, _) = passing()
+    world.run(20)
+    assert station.frames_heard == autopilot.sent
+    assert bytes(autopilot.received) == b""
+
+
+def test_what_ground_stations_send_arrives_as_it_was_sent() -> None:
+    world, autopilot, (one, other) = passing()
+    sent = b""
+    for message in (
+        mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
+        mavlink.MAVLink_mission_count_message(1, 1, 5, 0),
+        mavlink.MAVLink_mission_count_message(1, 0, 5, 0),
+        mavlink.MAVLink_param_request_list_message(0, 0),
+        mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
+        mavlink.MAVLink_command_long_message(77, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
+    ):
+        frame = one.pack(message)
+        world.spoken_by(one, frame)
+        sent += frame
+    world.run(0.1)
+    assert bytes(autopilot.received) == sent
+    # The others hear what is for everyone, and nobody hears himself.
+    assert [message.get_type() for message in other.said()] == ["PARAM_REQUEST_LIST", "HEARTBEAT"]
+    assert one.said() == []
+
+
+def test_what_is_for_one_ground_station_goes_only_there() -> None:
+    world, autopilot, (one, other) = passing()
+    autopilot.say(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
+    autopilot.say(mavlink.MAVLink_mission_ack_message(254, 0, 0, 0))
+    autopilot.say(mavlink.MAVLink_mission_ack_message(254, 1, 0, 0))
+    autopilot.say(mavlink.MAVLink_mission_ack_message(9, 0, 0, 0))
+    world.run(0.1)
+    assert [message.target_component for message in one.said("MISSION_ACK")] == [190]
+    assert [message.target_component for message in other.said("MISSION_ACK")] == [0]
+
+
+def test_ground_stations_reach_each_other() -> None:
+    world, autopilot, (one, other) = passing()
+    one.send(mavlink.MAVLink_command_long_message(254, 190, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+    world.run(0.1)
+    assert [message.get_type() for message in other.said("COMMAND_LONG")] == ["COMMAND_LONG"]
+    assert bytes(autopilot.received) == b""
+
+
+def test_who_fell_silent_gets_nothing_any_more() -> None:
+    world, _autopilot, (one, other) = passing()
+
+    def speak() -> None:
+        one.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        world.after(1.0, speak)
+
+    speak()
+    world.run(70)
+    other.frames_heard.clear()
+    world.run(5)
+    assert other.frames_heard == []
+    assert one.frames_heard
+
+
+def test_signing_keys_are_never_forwarded() -> None:
+    world, autopilot, (one, other) = passing()
+    one.send(mavlink.MAVLink_setup_signing_message(1, 1, list(KEY), 5))
+    one.send(mavlink.MAVLink_setup_signing_message(0, 0, list(KEY), 5))
+    autopilot.say(mavlink.MAVLink_setup_signing_message(0, 0, list(KEY), 5))
+    world.run(0.1)
+    assert bytes(autopilot.received) == b""
+    assert one.said("SETUP_SIGNING") == other.said("SETUP_SIGNING") == []
+
+
+def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
+    world, autopilot, (station, _) = passing()
+    chance = random.Random(3)
+    intact = []
+    for message in telemetry(2, 400):
+        frame = autopilot.pack(message)
+        if chance.random() < 0.2:
+            damaged = bytearray(frame)
+            kind = chance.randrange(3)
+            if kind == 0:
+                damaged[chance.randrange(1, len(damaged))] ^= 1 << chance.randrange(8)
+            elif kind == 1:
+                del damaged[chance.randrange(len(damaged))]
+            else:
+                damaged[:0] = b"\xfd\xff\x00\x00"
+            autopilot.outgoing += bytes(damaged)
+            if kind == 2:
+                intact.append(frame)
+        else:
+            autopilot.outgoing += frame
+            intact.append(frame)
+        world.run(0.01)
+    world.run(0.3)
+    passed = [frame for frame in station.frames_heard if frame[7:10] != b"\0\0\0"]
+    assert set(passed) <= set(intact)
+    assert len(intact) - len(passed) <= 2
+
+
+def test_an_autopilot_that_is_gone_is_not_played() -> None:
+    """Its silence is the truth: a heartbeat of ours would be a vehicle that is not there."""
+    world, _autopilot, (station, _) = passing()
+    world.unplug()
+    station.take()
+    world.run(10)
+    assert station.said() == []
+    world.plug()
+    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    world.run(3)
+    assert station.said("HEARTBEAT")
+
+
+def test_frames_are_split_as_mavlink_says() -> None:
+    """What the tests above compare is whole frames on both sides."""
+    _, autopilot, _ = passing()
+    frames = [autopilot.pack(message) for message in telemetry(5, 10)]
+    assert [frame.raw for frame in MavlinkSplitter().feed(b"".join(frames))] == frames
