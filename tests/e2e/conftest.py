@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from benches import Bench, Starter
 from plan import plain_plan
+from programs import until
 
 
 @pytest.fixture
@@ -34,7 +35,11 @@ def lasting_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
 
 @pytest.fixture
 def shared(lasting_bench: Bench) -> Iterator[Bench]:
-    """The bench of all tests of a module that leave no trace but missions; the clients are one test's own."""
+    """The bench of all tests of a module that leave no trace but missions; the clients are one test's own.
+
+    Each test finds an empty board, and no transfer that the one before left behind: the daemon waits 5 s for its items.
+    """
+    until(lasting_bench.daemon.clears, "the end of a transfer that an earlier test began")
     with ExitStack() as stack:
         yield replace(lasting_bench, stack=stack)
 

@@ -178,9 +178,16 @@ class Daemon(Program):
 
     def push(self, plan: Sequence[PlanRow]) -> None:
         """Bring a list to the board, as `naze-bridge push` does."""
-        items = [asdict(row.as_sent(seq, use_int=True)) for seq, row in enumerate(plan)]
-        answer = self.ask({"do": "push", "source": "test", "items": items})
+        answer = self._pushes(plan)
         assert answer["ack"] == "MAV_MISSION_ACCEPTED", answer
+
+    def clears(self) -> bool:
+        """Clear the board; tell whether the daemon did so, which it does not while a transfer is running."""
+        return bool(self._pushes([])["ack"] == "MAV_MISSION_ACCEPTED")
+
+    def _pushes(self, plan: Sequence[PlanRow]) -> dict[str, Any]:
+        items = [asdict(row.as_sent(seq, use_int=True)) for seq, row in enumerate(plan)]
+        return self.ask({"do": "push", "source": "test", "items": items})
 
     def kill_and_restart(self) -> None:
         """Die as by a power cut, and start again as by systemd."""
