@@ -50,8 +50,13 @@ def read_tlog(data: bytes) -> Iterator[TlogRecord]:
         if frame is None:
             at += 1
             continue
-        yield TlogRecord(int.from_bytes(data[at:start], "big"), frame)
+        yield TlogRecord(first_stamp_us(data[at:start]), frame)
         at = start + len(frame.raw)
+
+
+def first_stamp_us(records: bytes) -> int:
+    """Return the time of the first record, in microseconds since the Unix epoch."""
+    return int.from_bytes(records[:_STAMP_SIZE], "big")
 
 
 def _stamp(at_us: int) -> bytes:

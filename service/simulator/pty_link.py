@@ -1,4 +1,4 @@
-"""A simulated Naze on a pseudo-terminal that looks like a serial port, speed included."""
+"""A simulated board on a pseudo-terminal that looks like a serial port, speed included."""
 
 import asyncio
 import os
@@ -7,7 +7,7 @@ import termios
 import tty
 from pathlib import Path
 
-from service.simulator.naze import SimulatedNaze
+from service.simulator.far_end import FarEnd
 from service.simulator.pump import Pump
 
 _BAUD_BY_CODE = {getattr(termios, name): int(name[1:]) for name in dir(termios) if re.fullmatch(r"B\d+", name)}
@@ -21,8 +21,8 @@ class PtyLink:
     A client that has set another speed than the board's gets and gives what a wire would make of it.
     """
 
-    def __init__(self, naze: SimulatedNaze, path: Path, loop: asyncio.AbstractEventLoop) -> None:
-        self._naze = naze
+    def __init__(self, board: FarEnd, path: Path, loop: asyncio.AbstractEventLoop) -> None:
+        self._board = board
         self._path = path
         self._loop = loop
         self._pump: Pump | None = None
@@ -36,7 +36,7 @@ class PtyLink:
             self._path.unlink()
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
-        self._set_speed(self._naze.baud)
+        self._set_speed(self._board.baud)
         os.set_blocking(self._near, False)
         try:
             self._path.symlink_to(os.ttyname(self._far))
@@ -44,7 +44,7 @@ class PtyLink:
             self._close()
             raise
         # Our own copy of the far end stays open: the terminal keeps its settings between two clients.
-        self._pump = Pump(self._naze, self._near, self._loop, far_baud=self._far_baud)
+        self._pump = Pump(self._board, self._near, self._loop, far_baud=self._far_baud)
         self._pump.start()
 
     def unplug(self) -> None:

@@ -1,12 +1,12 @@
-"""Moves bytes between a simulated Naze and a file descriptor, at the right times of an asyncio loop."""
+"""Moves bytes between a simulated board and a file descriptor, at the right times of an asyncio loop."""
 
 import asyncio
 import contextlib
 import os
 from collections.abc import Callable
 
+from service.simulator.far_end import FarEnd
 from service.simulator.line import garble
-from service.simulator.naze import SimulatedNaze
 
 _READ_SIZE = 4096
 # A fault that was switched meanwhile is noticed after this long at the latest.
@@ -22,14 +22,14 @@ class Pump:
 
     def __init__(
         self,
-        naze: SimulatedNaze,
+        board: FarEnd,
         fd: int,
         loop: asyncio.AbstractEventLoop,
         *,
         far_baud: Callable[[], int] | None = None,
         on_hangup: Callable[[], None] | None = None,
     ) -> None:
-        self._naze = naze
+        self._board = board
         self._fd = fd
         self._loop = loop
         self._far_baud = far_baud
@@ -53,15 +53,15 @@ class Pump:
         if self._timer:
             self._timer.cancel()
         now = self._loop.time()
-        self._send(self._naze.advance(now))
-        wakeup = min(self._naze.next_wakeup(now), now + _LONGEST_SLEEP)
+        self._send(self._board.advance(now))
+        wakeup = min(self._board.next_wakeup(now), now + _LONGEST_SLEEP)
         self._timer = self._loop.call_at(wakeup, self.poke)
 
     def _send(self, data: bytes) -> None:
         if not data:
             return
         if self._far_baud:
-            data = garble(data, self._naze.baud, self._far_baud())
+            data = garble(data, self._board.baud, self._far_baud())
         # Nobody reads: as on a real wire, what is not taken is gone.
         with contextlib.suppress(BlockingIOError, BrokenPipeError, ConnectionResetError):
             os.write(self._fd, data)
@@ -79,6 +79,6 @@ class Pump:
                 self._on_hangup()
             return
         if self._far_baud:
-            data = garble(data, self._far_baud(), self._naze.baud)
-        self._naze.receive(data, self._loop.time())
+            data = garble(data, self._far_baud(), self._board.baud)
+        self._board.receive(data, self._loop.time())
         self.poke()

@@ -1,0 +1,114 @@
+"""UART captures (.uart): what was read from and written to a flight controller's port, when, and at which speed.
+
+One JSON object a line, each line for itself, so a capture may be appended to, cut with head and tail, and torn:
+
+    {"naze-bridge-uart":1,"started":"2026-11-21T06:33:06Z","port":"/dev/serial0"}   the daemon began to record
+    {"t":0.010204,"baud":115200,"open":""}              the port was opened
+    {"t":0.113541,"baud":115200,"write":"244d3c006464"} bytes were given to the port, in hex
+    {"t":0.117002,"baud":115200,"read":"244d3e0764..."} bytes were read from it
+    {"t":9.402113,"baud":115200,"close":"unplugged"}    the port was closed or lost, and why
+
+`t`: seconds since the daemon began. `baud`: the port's speed; null where it has none (TCP).
+"""
+
+import json
+from dataclasses import dataclass, replace
+from enum import Enum
+from math import isfinite
+
+_MARK = "naze-bridge-uart"
+_VERSION = 1
+#: What passes between the last line of one recording and the first of the next in the same file.
+_PAUSE_S = 1.0
+
+
+class UartDeed(Enum):
+    """What happened at the port."""
+
+    OPEN = "open"
+    READ = "read"
+    WRITE = "write"
+    CLOSE = "close"
+
+
+@dataclass(frozen=True, slots=True)
+class UartEvent:
+    """One line. `speed` in baud, None where the line has none; `text`: why it was closed."""
+
+    at: float
+    speed: int | None
+    deed: UartDeed
+    data: bytes = b""
+    text: str = ""
+
+
+def capture_header(started: str, port: str) -> bytes:
+    """Return the line with which a recording begins. `started`: time in UTC, `port`: its name for people."""
+    return _line({_MARK: _VERSION, "started": started, "port": port})
+
+
+def capture_line(event: UartEvent) -> bytes:
+    """Return an event's line."""
+    is_data = event.deed in (UartDeed.READ, UartDeed.WRITE)
+    content = event.data.hex() if is_data else event.text
+    return _line({"t": round(event.at, 6), "baud": event.speed, event.deed.value: content})
+
+
+def is_capture(beginning: bytes) -> bool:
+    """Tell whether a file that begins so is a capture that may be appended to."""
+    return beginning.startswith(f'{{"{_MARK}":'.encode())
+
+
+def read_capture(data: bytes) -> list[UartEvent]:
+    """Return the events of all recordings in a file, in order, the first at 0. What is no line of ours is skipped.
+
+    Between two recordings a pause takes the place of the time that nobody knows; a port that was not closed when
+    the first one ended (the daemon was killed) is closed there.
+    """
+    events: list[UartEvent] = []
+    began_at, first_at = 0.0, None
+    for line in data.split(b"\n"):
+        if is_capture(line):
+            if events:
+                _end(events)
+                began_at = events[-1].at + _PAUSE_S
+            first_at = None
+        elif (event := _parse(line)) is not None:
+            if first_at is None:
+                first_at = event.at
+            # Time never runs back, whatever is in the file.
+            earliest = events[-1].at if events else 0.0
+            events.append(replace(event, at=max(began_at + event.at - first_at, earliest)))
+    return events
+
+
+def _end(events: list[UartEvent]) -> None:
+    last = events[-1]
+    if last.deed is not UartDeed.CLOSE:
+        events.append(UartEvent(last.at, last.speed, UartDeed.CLOSE, text="the recording ended"))
+
+
+def _parse(line: bytes) -> UartEvent | None:
+    try:
+        found = json.loads(line)
+    except ValueError:
+        return None
+    if not isinstance(found, dict):
+        return None
+    at, speed = found.get("t"), found.get("baud")
+    deed = next((deed for deed in UartDeed if deed.value in found), None)
+    if not isinstance(at, int | float) or not isinstance(speed, int | None) or deed is None:
+        return None
+    content = found[deed.value]
+    if not isinstance(content, str) or not isfinite(at):
+        return None
+    if deed in (UartDeed.OPEN, UartDeed.CLOSE):
+        return UartEvent(at, speed, deed, text=content)
+    try:
+        return UartEvent(at, speed, deed, bytes.fromhex(content))
+    except ValueError:
+        return None
+
+
+def _line(content: dict[str, object]) -> bytes:
+    return json.dumps(content, separators=(",", ":")).encode() + b"\n"

@@ -1,0 +1,68 @@
+"""Bytes from the event loop to a slow disk, on a thread: who has something to write never waits for it."""
+
+import threading
+from collections.abc import Callable
+
+import structlog
+
+#: So much is lost if the process is killed.
+_FLUSH_S = 1.0
+#: At the end: a disk that hangs must not keep the daemon from ending.
+_PATIENCE_S = 5.0
+#: An SD card that stalls for so many bytes loses the rest: minutes of telemetry, 90 s of a full UART at 115200.
+_MAX_WAITING = 1 << 20
+
+_log = structlog.get_logger()
+
+
+class DiskWriter:
+    """Calls `write` once a second, on its thread, with what `put` was given since.
+
+    `lock` is held where bytes are added or taken. `on_take` is called with it held, when bytes were taken: what is put
+    from then on will be in the next `write`. `on_end` is called after the last `write`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        write: Callable[[bytes], None],
+        on_end: Callable[[], None],
+        on_take: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._name = name
+        self._write = write
+        self._on_end = on_end
+        self._on_take = on_take
+        self._waiting = bytearray()
+        self._ending = threading.Event()
+        self.lock = threading.Lock()
+        #: Bytes that found no room.
+        self.dropped = 0
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def put(self, data: bytes) -> None:
+        """Have bytes written, or drop them if too many wait. Hold `lock`."""
+        if len(self._waiting) + len(data) <= _MAX_WAITING:
+            self._waiting += data
+            return
+        if not self.dropped:
+            _log.warning("disk.too_slow", writing=self._name, why="the disk does not keep up; some is left out")
+        self.dropped += len(data)
+
+    def close(self) -> None:
+        """Have the rest written, and end."""
+        self._ending.set()
+        self._thread.join(_PATIENCE_S)
+
+    def _run(self) -> None:
+        while not self._ending.wait(_FLUSH_S):
+            self._flush()
+        self._flush()
+        self._on_end()
+
+    def _flush(self) -> None:
+        with self.lock:
+            data, self._waiting = self._waiting, bytearray()
+            self._on_take()
+        self._write(bytes(data))

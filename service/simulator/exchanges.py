@@ -1,0 +1,141 @@
+"""Takes a UART capture apart: which answer belongs to which request, and what the flight controller sent unasked."""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+
+from protocols.msp.frame import Direction, MspFrame, MspParser
+from protocols.uart_capture import UartDeed, UartEvent
+
+#: An answer that comes later is none: even a flight controller that writes its flash is faster.
+_LONGEST_WAIT_S = 5.0
+
+#: Command and payload of a request.
+Question = tuple[int, bytes]
+#: When bytes were read, and the bytes.
+Piece = tuple[float, bytes]
+
+
+@dataclass(slots=True, eq=False)
+class Exchange:
+    """A request, and its answer in the pieces in which it was read; none if no answer came."""
+
+    question: Question
+    asked_at: float
+    answer: Sequence[Piece] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Conversation:
+    """A capture taken apart. `exchanges` in the order of the requests; `unasked` is all else that was read."""
+
+    exchanges: Sequence[Exchange]
+    unasked: Sequence[Piece]
+
+
+def take_apart(events: Sequence[UartEvent]) -> Conversation:
+    """Match answers with requests as they were matched then: by command, in their order, after the request."""
+    exchanges: list[Exchange] = []
+    unasked: list[Piece] = []
+    waiting: list[Exchange] = []
+    answers = _answers(events, unasked)
+    answered_by, frame, pieces = next(answers, _NO_MORE)
+    requests = MspParser()
+    for number, event in enumerate(events):
+        if event.deed is UartDeed.OPEN:
+            requests = MspParser()
+            waiting.clear()
+        elif event.deed is UartDeed.WRITE:
+            asked = [
+                Exchange((found.command, found.payload), event.at)
+                for found in requests.feed(event.data)
+                if found.direction is Direction.REQUEST
+            ]
+            exchanges += asked
+            # What is asked again was given up before.
+            questions = {exchange.question for exchange in asked}
+            waiting = [earlier for earlier in waiting if earlier.question not in questions] + asked
+        while answered_by == number:
+            asker = _asker(waiting, frame, event.at)
+            if asker is None:
+                unasked += pieces
+            else:
+                asker.answer = pieces
+                # Requests are answered in their order.
+                del waiting[: waiting.index(asker) + 1]
+            answered_by, frame, pieces = next(answers, _NO_MORE)
+    return Conversation(exchanges, sorted(unasked, key=lambda piece: piece[0]))
+
+
+_Answer = tuple[int, MspFrame, Sequence[Piece]]
+_NO_MORE: _Answer = (-1, MspFrame(Direction.ERROR, 0), ())
+
+
+def _asker(waiting: Sequence[Exchange], frame: MspFrame, at: float) -> Exchange | None:
+    alike = (exchange for exchange in waiting if exchange.question[0] == frame.command)
+    return next((exchange for exchange in alike if at <= exchange.asked_at + _LONGEST_WAIT_S), None)
+
+
+def _answers(events: Sequence[UartEvent], rest: list[Piece]) -> Iterator[_Answer]:
+    """Yield MSP answers with the number of the event that completed each; put all else that was read into `rest`."""
+    for stretch in _stretches(events):
+        done = 0
+        for begin, end, frame in stretch.frames():
+            rest += stretch.pieces(done, begin)
+            done = end
+            if frame.direction is Direction.REQUEST:
+                # Our own, from a line that is looped back.
+                rest += stretch.pieces(begin, end)
+            else:
+                yield stretch.number_at(end - 1), frame, stretch.pieces(begin, end)
+        rest += stretch.pieces(done, stretch.size)
+
+
+def _stretches(events: Sequence[UartEvent]) -> Iterator["_Stretch"]:
+    """Yield what was read without a change of speed, and without the port being closed in between."""
+    reads: list[tuple[int, UartEvent]] = []
+    for number, event in enumerate(events):
+        is_read = event.deed is UartDeed.READ
+        if reads and (event.speed != reads[-1][1].speed or event.deed in (UartDeed.OPEN, UartDeed.CLOSE)):
+            yield _Stretch(reads)
+            reads = []
+        if is_read and event.data:
+            reads.append((number, event))
+    if reads:
+        yield _Stretch(reads)
+
+
+class _Stretch:
+    """Bytes that came one behind the other, and which event brought which."""
+
+    def __init__(self, reads: Sequence[tuple[int, UartEvent]]) -> None:
+        self._reads = reads
+        self._ends = list(accumulate(len(event.data) for _, event in reads))
+        self.size = self._ends[-1]
+
+    def frames(self) -> Iterator[tuple[int, int, MspFrame]]:
+        """Yield each frame with its beginning and its end."""
+        data = b"".join(event.data for _, event in self._reads)
+        end = 0
+        for frame in MspParser().feed(data):
+            encoded = frame.encode()
+            begin = data.index(encoded, end)
+            end = begin + len(encoded)
+            yield begin, end, frame
+
+    def number_at(self, at: int) -> int:
+        """Return the number of the event that brought a byte."""
+        return self._reads[bisect_right(self._ends, at)][0]
+
+    def pieces(self, begin: int, end: int) -> Sequence[Piece]:
+        """Return a part, in the pieces in which it was read."""
+        found: list[Piece] = []
+        index = bisect_right(self._ends, begin)
+        while begin < end:
+            event, stop = self._reads[index][1], self._ends[index]
+            start = stop - len(event.data)
+            found.append((event.at, event.data[begin - start : end - start]))
+            begin = stop
+            index += 1
+        return found

@@ -1,0 +1,151 @@
+"""The folder of telemetry logs: one file at a time, bounded in size, total and age.
+
+No clock is read here: which time it is says the caller, or the records themselves.
+"""
+
+import os
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import structlog
+
+from protocols.tlog import first_stamp_us
+
+#: As Mission Planner names them; ours are in UTC.
+_NAME_FORMAT = "%Y-%m-%d %H-%M-%S.tlog"
+_NAME_PATTERN = re.compile(r"\d{4}-\d\d-\d\d \d\d-\d\d-\d\d\.tlog")
+#: A full or read-only disk seldom mends itself.
+_RETRY_S = 60.0
+#: What was written is on the disk after so long even if the power is cut; more often costs an SD card's life.
+_SYNC_S = 5.0
+#: So much of the disk is left to others: a mission must still find room.
+LEFT_FREE = 32 << 20
+
+_log = structlog.get_logger()
+
+
+@dataclass(frozen=True, slots=True)
+class TlogLimits:
+    """Bytes of one file (a second's records may come on top) and of all together, and days that a file is kept."""
+
+    file_size: int = 16 << 20
+    total_size: int = 256 << 20
+    days: int = 30
+
+
+def free_space(folder: Path) -> int:
+    """Return how many bytes still fit on the folder's disk."""
+    found = os.statvfs(folder)
+    return found.f_bavail * found.f_frsize
+
+
+class TlogFolder:
+    """Appends to a file that it opens when there is something to write.
+
+    Whatever the disk does is not the flight's problem: nothing raises. A failure is told once, and tried again later.
+    """
+
+    def __init__(
+        self, folder: Path, limits: TlogLimits, measure_free_space: Callable[[Path], int] = free_space
+    ) -> None:
+        self._folder = folder
+        self._limits = limits
+        self._measure_free_space = measure_free_space
+        self._file: _OpenFile | None = None
+        self._synced_at = 0.0
+        self._retry_at = 0.0
+        self._has_complained = False
+
+    @property
+    def is_full(self) -> bool:
+        """Tell whether the open file has reached its size."""
+        return self._file is not None and self._file.size >= self._limits.file_size
+
+    def write(self, records: bytes, now: float) -> None:
+        """Append whole records to the open file, or to a new one. `now`: seconds of a monotonic clock."""
+        if not records or now < self._retry_at:
+            return
+        try:
+            if self._file is None:
+                self._file = self._create(datetime.fromtimestamp(first_stamp_us(records) / 1e6, UTC))
+            if self._measure_free_space(self._folder) < LEFT_FREE + len(records):
+                raise _LittleSpaceError(f"less than {LEFT_FREE >> 20} MB of the disk are free")
+            is_first = not self._file.size
+            self._file.append(records)
+            if is_first:
+                _log.info("tlog.recording", file=str(self._file.path))
+                self._has_complained = False
+            if now >= self._synced_at + _SYNC_S:
+                self._file.sync()
+                self._synced_at = now
+        except OSError as error:
+            self._give_up(error, now)
+
+    def close(self) -> None:
+        """End the open file; the next `write` begins another one."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def _create(self, began: datetime) -> "_OpenFile":
+        """Make a file named for `began`, or for the first second after it that has none: clocks may be set back."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._make_room(began)
+        while (path := self._folder / began.strftime(_NAME_FORMAT)).exists():
+            began += timedelta(seconds=1)
+        return _OpenFile(path)
+
+    def _make_room(self, now: datetime) -> None:
+        """Remove the oldest until another file fits. What is not named as ours are is left alone."""
+        too_old = (now - timedelta(days=self._limits.days)).strftime(_NAME_FORMAT)
+        files = sorted(path for path in self._folder.iterdir() if _NAME_PATTERN.fullmatch(path.name))
+        sizes = {path: path.stat().st_size for path in files}
+        total = sum(sizes.values())
+        for path in files:
+            if path.name >= too_old and total + self._limits.file_size <= self._limits.total_size:
+                return
+            path.unlink()
+            total -= sizes[path]
+            _log.debug("tlog.removed", file=str(path))
+
+    def _give_up(self, error: OSError, now: float) -> None:
+        self.close()
+        self._retry_at = now + _RETRY_S
+        level = _log.debug if self._has_complained else _log.warning
+        level("tlog.stopped", folder=str(self._folder), why=error.strerror or str(error), tried_again_every_s=_RETRY_S)
+        self._has_complained = True
+
+
+class _LittleSpaceError(OSError):
+    """The disk is not full yet, but nearly."""
+
+
+class _OpenFile:
+    """A file that is appended to without a buffer: what was written outlives this process."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.size = 0
+        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+
+    def append(self, data: bytes) -> None:
+        view = memoryview(data)
+        while view:
+            written = os.write(self._descriptor, view)
+            self.size += written
+            view = view[written:]
+
+    def sync(self) -> None:
+        os.fdatasync(self._descriptor)
+
+    def close(self) -> None:
+        """Close it, and leave no empty one behind."""
+        with suppress(OSError):
+            self.sync()
+        os.close(self._descriptor)
+        if not self.size:
+            self.path.unlink(missing_ok=True)

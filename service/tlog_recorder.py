@@ -1,0 +1,49 @@
+"""Writes what ground stations hear and say into telemetry logs."""
+
+import time
+from pathlib import Path
+
+from protocols.tlog import tlog_record
+from service.disk_writer import DiskWriter
+from service.tlog_folder import TlogFolder, TlogLimits
+
+#: The clock was set: a Pi has none of its own, and hears of the time when there is a network.
+_CLOCK_STEP_US = 10_000_000
+
+
+class TlogRecorder:
+    """Offers `tap`. Within a file time runs on evenly; after a step of the clock a new file begins."""
+
+    def __init__(self, folder: Path, limits: TlogLimits) -> None:
+        self._folder = TlogFolder(folder, limits)
+        self._epoch_us = _epoch_us()
+        self._file_is_over = False
+        self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
+
+    def tap(self, frame: bytes) -> None:
+        """Record a whole frame that was sent or received just now."""
+        now_us = time.monotonic_ns() // 1000
+        with self._writer.lock:
+            self._writer.put(tlog_record(frame, self._epoch_us + now_us))
+
+    def close(self) -> None:
+        """Write what is left."""
+        self._writer.close()
+
+    def _taken(self) -> None:
+        """Decide whether what comes from now on goes into a new file; only between two files time may jump."""
+        epoch_us = _epoch_us()
+        stepped = abs(epoch_us - self._epoch_us) > _CLOCK_STEP_US
+        self._file_is_over = stepped or self._folder.is_full
+        if self._file_is_over:
+            self._epoch_us = epoch_us
+
+    def _write(self, records: bytes) -> None:
+        self._folder.write(records, time.monotonic())
+        if self._file_is_over:
+            self._folder.close()
+
+
+def _epoch_us() -> int:
+    """Return when the monotonic clock was 0, in microseconds since the Unix epoch."""
+    return (time.time_ns() - time.monotonic_ns()) // 1000

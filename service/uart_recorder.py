@@ -1,0 +1,125 @@
+"""Records what passes at the flight controller's port (`run --record-uart FILE`), so that it can be played again."""
+
+import os
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import structlog
+
+from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, is_capture
+from service.connection import FcAddress
+from service.disk_writer import DiskWriter
+from service.fc_port import FcPort
+
+#: Of the file: hours of telemetry, or three quarters of an hour of a full line at 115200 baud.
+_MAX_SIZE = 64 << 20
+
+_log = structlog.get_logger()
+
+
+class UartFileError(Exception):
+    """The file cannot be recorded into; the text is one sentence for the user."""
+
+
+class UartRecorder:
+    """Appends to a capture file until that has its size. Nothing but the port's traffic gets into it."""
+
+    def __init__(self, path: Path, port: str, max_size: int = _MAX_SIZE) -> None:
+        self._path = path
+        self._max_size = max_size
+        self._descriptor, self._size = _open(path)
+        self._began_at = time.monotonic()
+        self._is_over = False
+        self._writer = DiskWriter("UART capture", self._write, lambda: os.close(self._descriptor))
+        started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        self._put(capture_header(started, port))
+
+    def note(self, deed: UartDeed, speed: int | None, data: bytes = b"", text: str = "") -> None:
+        """Record what happened just now."""
+        if not self._is_over:
+            self._put(capture_line(UartEvent(time.monotonic() - self._began_at, speed, deed, data, text)))
+
+    def close(self) -> None:
+        """Write what is left."""
+        self._writer.close()
+
+    def _put(self, line: bytes) -> None:
+        if self._size + len(line) > self._max_size:
+            self._end(f"it has {self._size >> 20} MB, which is enough")
+            return
+        self._size += len(line)
+        with self._writer.lock:
+            self._writer.put(line)
+
+    def _write(self, lines: bytes) -> None:
+        if not lines:
+            return
+        view = memoryview(lines)
+        try:
+            while view:
+                view = view[os.write(self._descriptor, view) :]
+            os.fdatasync(self._descriptor)
+        except OSError as error:
+            self._end(error.strerror or str(error))
+
+    def _end(self, why: str) -> None:
+        if self._is_over:
+            return
+        self._is_over = True
+        _log.warning("uart.recording_ended", file=str(self._path), why=why)
+
+
+class RecordedPort(FcPort):
+    """The flight controller's port, each deed of which is recorded."""
+
+    def __init__(
+        self,
+        address: FcAddress,
+        on_open: Callable[[], None],
+        on_data: Callable[[bytes], None],
+        on_close: Callable[[str], None],
+        recorder: UartRecorder,
+    ) -> None:
+        def opened() -> None:
+            recorder.note(UartDeed.OPEN, self._recorded_speed)
+            on_open()
+
+        def received(data: bytes) -> None:
+            recorder.note(UartDeed.READ, self._recorded_speed, data)
+            on_data(data)
+
+        def closed(why: str) -> None:
+            recorder.note(UartDeed.CLOSE, self._recorded_speed, text=why)
+            on_close(why)
+
+        super().__init__(address, opened, received, closed)
+        self._recorder = recorder
+        self._recorded_speed: int | None = None
+
+    def set_speed(self, baud: int | None) -> None:
+        """Run the port at another speed, baud."""
+        self._recorded_speed = baud
+        super().set_speed(baud)
+
+    def write(self, data: bytes) -> None:
+        """Write, and record that."""
+        self._recorder.note(UartDeed.WRITE, self._recorded_speed, data)
+        super().write(data)
+
+
+def _open(path: Path) -> tuple[int, int]:
+    """Open a new or an earlier capture to append to; return its descriptor and its size."""
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise UartFileError(f"cannot record into {path}: {error.strerror}") from error
+    size = os.fstat(descriptor).st_size
+    if size and not is_capture(os.pread(descriptor, 64, 0)):
+        os.close(descriptor)
+        raise UartFileError(f"{path} is no UART capture: name a new file for --record-uart")
+    if size and os.pread(descriptor, 1, size - 1) != b"\n":
+        # The daemon was killed in the middle of a line, which must not swallow the next one.
+        os.write(descriptor, b"\n")
+    return descriptor, size
