@@ -2,11 +2,11 @@
 
 One JSON object a line, each line for itself, so a capture may be appended to, cut with head and tail, and torn:
 
-    {"naze-bridge-uart":1,"started":"2026-11-21T06:33:06Z","port":"/dev/serial0"}   the daemon began to record
-    {"t":0.010204,"baud":115200,"open":""}              the port was opened
-    {"t":0.113541,"baud":115200,"write":"244d3c006464"} bytes were given to the port, in hex
-    {"t":0.117002,"baud":115200,"read":"244d3e0764..."} bytes were read from it
-    {"t":9.402113,"baud":115200,"close":"unplugged"}    the port was closed or lost, and why
+    {"naze-bridge-uart":1,"started":"2026-11-21T06:33:06Z"}  the daemon began to record
+    {"t":0.010204,"baud":115200,"open":""}                   the port was opened
+    {"t":0.113541,"baud":115200,"write":"244d3c006464"}      bytes were given to the port, in hex
+    {"t":0.117002,"baud":115200,"read":"244d3e0764..."}      bytes were read from it
+    {"t":9.402113,"baud":115200,"close":"unplugged"}         the port was closed or lost, and why
 
 `t`: seconds since the daemon began. `baud`: the port's speed; null where it has none (TCP).
 """
@@ -42,9 +42,9 @@ class UartEvent:
     text: str = ""
 
 
-def capture_header(started: str, port: str) -> bytes:
-    """Return the line with which a recording begins. `started`: time in UTC, `port`: its name for people."""
-    return _line({_MARK: _VERSION, "started": started, "port": port})
+def capture_header(started: str) -> bytes:
+    """Return the line with which a recording begins. `started`: time in UTC, for people."""
+    return _line({_MARK: _VERSION, "started": started})
 
 
 def capture_line(event: UartEvent) -> bytes:

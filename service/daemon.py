@@ -13,8 +13,8 @@ from bridge.journal import Level
 from bridge.procedure import StoreEffect
 from bridge.station import Peer
 from service.connection import FcAddress, SerialFc
-from service.fc_port import FcPort
 from service.gcs_links import GcsLink, open_link
+from service.recording import Recording
 from service.settings import Settings
 from service.store_worker import StoreWorker
 
@@ -27,13 +27,15 @@ class Daemon:
     def __init__(self, settings: Settings) -> None:
         self._loop = asyncio.get_running_loop()
         self.settings = settings
+        self._recording = Recording(settings)
         self.bridge = Bridge(
             BridgeConfig(_speeds(settings.fc), sysid=settings.sysid, takeoff_max_m=settings.takeoff_max_m),
             _journal,
             self._loop.time(),
+            self._recording.tap,
         )
         self.store = StoreWorker(settings.state_dir)
-        self._port = FcPort(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
+        self._port = self._recording.port(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
         self._links: dict[str, GcsLink] = {}
         self._timer: asyncio.TimerHandle | None = None
 
@@ -57,6 +59,7 @@ class Daemon:
             for link in self._links.values():
                 link.close()
             self.store.close()
+            self._recording.close()
 
     def flush(self) -> None:
         """Carry out what the bridge wants after it was told something."""

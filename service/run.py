@@ -12,6 +12,7 @@ from service.daemon import Daemon, run_until_signal
 from service.gcs_links import LinkError
 from service.log_setup import set_up_logging
 from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
+from service.uart_recorder import UartFileError
 from storage.state_lock import StateLock
 from storage.store_error import StoreError
 
@@ -21,17 +22,25 @@ from storage.store_error import StoreError
 @click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; several at once. Default: {DEFAULT_GCS}")
 @click.option("--config", type=click.Path(path_type=Path), help="TOML file with the same settings.")
 @click.option("--state-dir", type=click.Path(path_type=Path), help="Folder for stored missions.")
+@click.option("--record-uart", type=click.Path(path_type=Path), help="File to record the port's traffic into.")
 @click.option("--verbose", is_flag=True, help="Show debug events too.")
-def run(fc: str | None, gcs: tuple[str, ...], config: Path | None, state_dir: Path | None, verbose: bool) -> None:
+def run(
+    fc: str | None,
+    gcs: tuple[str, ...],
+    config: Path | None,
+    state_dir: Path | None,
+    record_uart: Path | None,
+    verbose: bool,
+) -> None:
     """Run the bridge between a flight controller and ground stations."""
     set_up_logging(verbose=verbose)
     try:
-        settings = load_settings(config, fc, gcs, state_dir)
+        settings = load_settings(config, fc, gcs, state_dir, record_uart)
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error
     try:
         _serve(settings)
-    except (LinkError, StoreError) as error:
+    except (LinkError, StoreError, UartFileError) as error:
         click.echo(f"naze-bridge: {error}", err=True)
         sys.exit(1)
 

@@ -19,23 +19,39 @@ class SettingsError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
+class TlogLimits:
+    """Bytes of one telemetry log (a second's records come on top) and of all together; days for which one is kept."""
+
+    file_size: int = 16 << 20
+    total_size: int = 256 << 20
+    days: int = 30
+
+
+@dataclass(frozen=True, slots=True)
 class Settings:
-    """What a daemon is started with. Without `state_dir` missions are not stored."""
+    """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded."""
 
     fc: FcAddress
     gcs: Sequence[GcsAddress] = ()
     state_dir: Path | None = None
     sysid: int = DEFAULT_SYSID
     takeoff_max_m: int = DEFAULT_TAKEOFF_MAX_M
+    tlog: TlogLimits | None = None
+    record_uart: Path | None = None
 
 
 #: Keys of the configuration file: name -> (type, what it is).
-_KEYS = {
+_KEYS: dict[str, tuple[type, str]] = {
     "fc": (str, "flight controller connection"),
     "gcs": (list, "list of ground station connections"),
     "state_dir": (str, "folder for stored missions"),
     "sysid": (int, "MAVLink system id, 1..255"),
     "takeoff_max_m": (int, "greatest take-off height in metres, 2..255"),
+    "record_tlog": (bool, "whether telemetry is recorded"),
+    "tlog_file_mb": (int, "size of one telemetry log, 1..1024"),
+    "tlog_total_mb": (int, "size of all telemetry logs, at least twice tlog_file_mb"),
+    "tlog_days": (int, "how many days a telemetry log is kept, 1..3650"),
+    "record_uart": (str, "file to record the UART into"),
 }
 
 
@@ -48,7 +64,13 @@ def default_state_dir() -> Path:
     return Path(base) / "naze-bridge"
 
 
-def load_settings(config: Path | None, fc: str | None, gcs: Sequence[str], state_dir: Path | None) -> Settings:
+def load_settings(
+    config: Path | None,
+    fc: str | None,
+    gcs: Sequence[str],
+    state_dir: Path | None,
+    record_uart: Path | None = None,
+) -> Settings:
     """Put the settings of `run` together; SettingsError or AddressError if one cannot be used."""
     values = {} if config is None else _read_config(config)
     chosen_fc = fc or values.get("fc")
@@ -63,7 +85,21 @@ def load_settings(config: Path | None, fc: str | None, gcs: Sequence[str], state
         state_dir=Path(str(folder)),
         sysid=_in_range(values, "sysid", 1, 255, DEFAULT_SYSID),
         takeoff_max_m=_in_range(values, "takeoff_max_m", 2, 255, DEFAULT_TAKEOFF_MAX_M),
+        tlog=_tlog_limits(values) if values.get("record_tlog", True) else None,
+        record_uart=record_uart or _path(values.get("record_uart")),
     )
+
+
+def _tlog_limits(values: dict[str, object]) -> TlogLimits:
+    default = TlogLimits()
+    file_mb = _in_range(values, "tlog_file_mb", 1, 1024, default.file_size >> 20)
+    total_mb = _in_range(values, "tlog_total_mb", 2 * file_mb, 1 << 20, max(default.total_size >> 20, 2 * file_mb))
+    days = _in_range(values, "tlog_days", 1, 3650, default.days)
+    return TlogLimits(file_mb << 20, total_mb << 20, days)
+
+
+def _path(text: object) -> Path | None:
+    return None if text is None else Path(str(text))
 
 
 def _read_config(path: Path) -> dict[str, object]:
@@ -79,7 +115,7 @@ def _read_config(path: Path) -> dict[str, object]:
             hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_KEYS)}"
             raise SettingsError(f"{path}: {key!r} is no setting; {hint}")
         kind, meaning = _KEYS[key]
-        if not isinstance(value, kind) or isinstance(value, bool):
+        if type(value) is not kind:
             raise SettingsError(f"{path}: {key} must be a {kind.__name__} ({meaning})")
     return values
 

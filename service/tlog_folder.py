@@ -7,13 +7,13 @@ import os
 import re
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import structlog
 
 from protocols.tlog import first_stamp_us
+from service.settings import TlogLimits
 
 #: As Mission Planner names them; ours are in UTC.
 _NAME_FORMAT = "%Y-%m-%d %H-%M-%S.tlog"
@@ -26,15 +26,6 @@ _SYNC_S = 5.0
 LEFT_FREE = 32 << 20
 
 _log = structlog.get_logger()
-
-
-@dataclass(frozen=True, slots=True)
-class TlogLimits:
-    """Bytes of one file (a second's records may come on top) and of all together, and days that a file is kept."""
-
-    file_size: int = 16 << 20
-    total_size: int = 256 << 20
-    days: int = 30
 
 
 def free_space(folder: Path) -> int:

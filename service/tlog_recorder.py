@@ -5,7 +5,8 @@ from pathlib import Path
 
 from protocols.tlog import tlog_record
 from service.disk_writer import DiskWriter
-from service.tlog_folder import TlogFolder, TlogLimits
+from service.settings import TlogLimits
+from service.tlog_folder import TlogFolder
 
 #: The clock was set: a Pi has none of its own, and hears of the time when there is a network.
 _CLOCK_STEP_US = 10_000_000

@@ -26,7 +26,7 @@ class UartFileError(Exception):
 class UartRecorder:
     """Appends to a capture file until that has its size. Nothing but the port's traffic gets into it."""
 
-    def __init__(self, path: Path, port: str, max_size: int = _MAX_SIZE) -> None:
+    def __init__(self, path: Path, max_size: int = _MAX_SIZE) -> None:
         self._path = path
         self._max_size = max_size
         self._descriptor, self._size = _open(path)
@@ -34,7 +34,7 @@ class UartRecorder:
         self._is_over = False
         self._writer = DiskWriter("UART capture", self._write, lambda: os.close(self._descriptor))
         started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-        self._put(capture_header(started, port))
+        self._put(capture_header(started))
 
     def note(self, deed: UartDeed, speed: int | None, data: bytes = b"", text: str = "") -> None:
         """Record what happened just now."""

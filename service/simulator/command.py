@@ -15,6 +15,7 @@ from service.simulator.mission_slots import flash_size
 from service.simulator.missions import BootMissions
 from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from service.simulator.playback_command import play_capture
 from service.simulator.pty_link import PtyLink
 
 _BAUD = click.Choice(["1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200"])
@@ -105,6 +106,12 @@ async def _run(
 )
 @click.option("--state", type=_PATH, help="File that keeps the flash's contents.")
 @click.option("--control", type=_PATH, help="Unix socket that takes lines from tests.")
+@click.option(
+    "--play",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Play this UART capture (run --record-uart) instead.",
+)
+@click.option("--speed", type=click.FloatRange(0.01, 100), default=1.0, help="How many times as fast to play it.")
 def sim(
     link: Path,
     baud: str,
@@ -123,8 +130,13 @@ def sim(
     core: Path | None,
     state: Path | None,
     control: Path | None,
+    play: Path | None,
+    speed: float,
 ) -> None:
     """Simulate a Naze with Harakiri, on a pseudo-terminal, until Ctrl-C."""
+    if play is not None:
+        play_capture(play, link, speed)
+        return
     options = SimOptions(
         seed=seed,
         baud=int(baud),

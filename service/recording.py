@@ -1,0 +1,47 @@
+"""What a daemon records of itself: telemetry logs always, the UART if it is asked to."""
+
+from collections.abc import Callable
+
+from bridge.ground import Tap
+from service.connection import FcAddress
+from service.fc_port import FcPort
+from service.settings import Settings
+from service.tlog_recorder import TlogRecorder
+from service.uart_recorder import RecordedPort, UartRecorder
+
+#: Within the state directory.
+TLOG_FOLDER = "logs"
+
+
+class Recording:
+    """Holds what `settings` ask for. UartFileError if the UART cannot be recorded. `tap` takes each MAVLink frame."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._uart = None if settings.record_uart is None else UartRecorder(settings.record_uart)
+        self._tlog: TlogRecorder | None = None
+        if settings.tlog is not None and settings.state_dir is not None:
+            self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
+        self.tap: Tap = _nothing if self._tlog is None else self._tlog.tap
+
+    def port(
+        self,
+        address: FcAddress,
+        on_open: Callable[[], None],
+        on_data: Callable[[bytes], None],
+        on_close: Callable[[str], None],
+    ) -> FcPort:
+        """Return the flight controller's port, recorded if that is wanted."""
+        if self._uart is None:
+            return FcPort(address, on_open, on_data, on_close)
+        return RecordedPort(address, on_open, on_data, on_close, self._uart)
+
+    def close(self) -> None:
+        """Write what is left."""
+        if self._uart is not None:
+            self._uart.close()
+        if self._tlog is not None:
+            self._tlog.close()
+
+
+def _nothing(_frame: bytes) -> None:
+    """Record nothing."""

@@ -1,0 +1,52 @@
+"""`naze-bridge sim --play`: the flight controller of a UART capture, behind a link that looks like a serial port."""
+
+import asyncio
+import signal
+from pathlib import Path
+
+import click
+
+from protocols.uart_capture import read_capture
+from service.simulator.playback import CapturePlayer
+from service.simulator.pty_link import PtyLink
+
+#: These say what and where to play; the others are about a simulated board.
+_OPTIONS_OF_PLAYING = ("play", "link", "speed")
+
+
+def play_capture(path: Path, link: Path, tempo: float) -> None:
+    """Play until Ctrl-C. The port comes and goes as it did in the recording."""
+    context = click.get_current_context()
+    for name in context.params:
+        given = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+        if given and name not in _OPTIONS_OF_PLAYING:
+            raise click.UsageError(f"--{name.replace('_', '-')} is for a simulated board; leave it away with --play")
+    try:
+        events = read_capture(path.read_bytes())
+    except OSError as error:
+        raise click.ClickException(f"Cannot read {path}: {error.strerror}.") from error
+    if not events:
+        raise click.ClickException(f"{path} holds no UART capture; naze-bridge run --record-uart FILE makes one.")
+    asyncio.run(_play(CapturePlayer(events, tempo), path, link))
+
+
+async def _play(player: CapturePlayer, path: Path, link: Path) -> None:
+    loop = asyncio.get_running_loop()
+    stop = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    began_at = loop.time()
+    player.power_on_booted(began_at)
+    port = PtyLink(player, link, loop)
+    try:
+        port.plug()
+        for closed, opened in player.outages:
+            loop.call_at(began_at + closed, port.unplug)
+            loop.call_at(began_at + opened, port.plug)
+        loop.call_at(began_at + player.duration_s, click.echo, "That was all; it goes on with its last answers.")
+        click.echo(f"Playing {path} at {link} for {player.duration_s:.0f} s. Ctrl-C ends it.")
+        await stop.wait()
+    except OSError as error:
+        raise click.ClickException(f"Cannot make {error.filename2 or link}: {error.strerror}.") from error
+    finally:
+        port.unplug()
