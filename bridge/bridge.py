@@ -87,6 +87,11 @@ class Bridge:
         """Return what the port must be set to, baud."""
         return self.session.speed
 
+    @property
+    def is_passing_through(self) -> bool:
+        """Tell whether an autopilot speaks MAVLink for itself, so that nobody here waits for the next byte."""
+        return self._pass_through is not None
+
     def fc_opened(self, now: float) -> None:
         """Take note that the port is open."""
         self._now = now

@@ -23,30 +23,38 @@ class Ground:
         self._compid = compid
         self._journal = journal
         self._on_newcomer = on_newcomer
-        self._tap = tap
+        self.tap = tap
         self._stations = Stations()
         self._default_peers: dict[Peer, bool] = {}
         self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._writers: dict[Peer, FrameWriter] = {}
         self._datagrams: list[tuple[Peer, bytes]] = []
+        self._everyone: list[Peer] | None = None  # counted anew after each change
 
     # Who is there.
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool) -> None:
         """Send to `peer` before it was heard; `until_answered`: only while nobody is heard on its link (broadcast)."""
         self._default_peers[peer] = until_answered
+        self._everyone = None
 
     def remove_default_peer(self, peer: Peer) -> None:
         """Stop that."""
         self._default_peers.pop(peer, None)
+        self._everyone = None
         self._writers.pop(peer, None)
 
     def peers(self) -> list[Peer]:
         """Return the ground stations that were heard."""
         return self._stations.peers()
 
-    def everyone(self) -> list[Peer]:
+    def everyone(self) -> Sequence[Peer]:
         """Return all who are to be sent what is for everyone."""
+        if self._everyone is None:
+            self._everyone = self._count_everyone()
+        return self._everyone
+
+    def _count_everyone(self) -> list[Peer]:
         heard = self._stations.peers()
         answered = {peer.link for peer in heard}
         unheard = (
@@ -74,6 +82,7 @@ class Ground:
         return self._stations.next_deadline()
 
     def _forget(self, peer: Peer) -> None:
+        self._everyone = None
         self._splitters.pop(peer, None)
         self._writers.pop(peer, None)
 
@@ -98,9 +107,10 @@ class Ground:
         if not self._stations.heard(peer, frame.version, now):
             if not self._stations.add(peer, frame.version, now):
                 return False
+            self._everyone = None
             self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
             self._on_newcomer()
-        self._tap(frame.raw)
+        self.tap(frame.raw)
         return True
 
     # What they are sent.
@@ -113,7 +123,7 @@ class Ground:
     def to(self, station: Station, message: Message) -> None:
         """Send a message to one ground station."""
         peer = station.peer
-        self._tap(self._write(peer, message, self._stations.version(peer)))
+        self.tap(self._write(peer, message, self._stations.version(peer)))
 
     def broadcast(self, message: Message) -> None:
         """Send a message to everyone."""
@@ -126,7 +136,7 @@ class Ground:
             frame = self._writer(peer).frame(packed, self._stations.version(peer))
             self._datagrams.append((peer, frame))
         if frame is not None:
-            self._tap(frame)
+            self.tap(frame)
 
     def introduce(self, heartbeat: Message) -> None:
         """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.

@@ -24,17 +24,19 @@ class PassThrough:
 
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
-        self._aboard: set[tuple[int, int]] = set()
+        self._aboard: set[int] = set()
         self._heard: dict[tuple[int, int], set[Peer]] = {}
 
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
         """Send the autopilot's frames on."""
         for_all: list[bytes] = []
+        tap = self._ground.tap
         for frame in frames:
-            self._aboard.add((frame.sysid, frame.compid))
-            system, component = target_of(frame)
+            self._aboard.add(frame.sysid)
             if frame.msgid == _NEVER_FORWARDED:
                 continue
+            tap(frame.raw)
+            system, component = target_of(frame)
             if system == 0:
                 for_all.append(frame.raw)
                 continue
@@ -55,15 +57,12 @@ class PassThrough:
             return True
         others = [other for other in self._peers_of(system, component) if other != peer]
         self._ground.forward([frame.raw], others)
-        return self._is_aboard(system) or not others
+        return system in self._aboard or not others
 
     def forget(self, peer: Peer) -> None:
         """A ground station is gone."""
         for peers in self._heard.values():
             peers.discard(peer)
-
-    def _is_aboard(self, system: int) -> bool:
-        return any(system == sysid for sysid, _ in self._aboard)
 
     def _peers_of(self, system: int, component: int) -> list[Peer]:
         found: set[Peer] = set()

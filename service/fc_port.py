@@ -13,8 +13,12 @@ from service.fc_device import Device, PortError, device_opener
 
 _READ_SIZE = 4096
 _RETRY_S = 0.25
-#: More unsent bytes than this mean that the other end has stopped reading.
+#: What the port does not take in time is dropped beyond this: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
+#: Above so many wake-ups a second their price is worth a delay of this long. A timer is rounded up to whole ms.
+_GATHER_ABOVE_HZ = 1000
+_GATHER_S = 0.0019
+_RATE_WINDOW_S = 0.1
 
 _log = structlog.get_logger()
 
@@ -42,6 +46,13 @@ class FcPort:
         self._unsent = bytearray()
         self._closed = asyncio.Event()
         self._last_complaint = ""
+        self.dropped_bytes = 0
+        #: Reading may be put off by a few ms at high rates, because nobody waits for an answer.
+        self.may_gather = False
+        self._gathering: asyncio.TimerHandle | None = None
+        self._window_ends = 0.0
+        self._reads = self._bytes = 0
+        self._gathered_rate = 0.0
 
     async def run(self) -> None:
         """Open the port and open it again for ever; cancel to end."""
@@ -76,9 +87,10 @@ class FcPort:
         if self._device is None:
             return
         if self._unsent:
+            if len(self._unsent) + len(data) > _MAX_UNSENT:
+                self.dropped_bytes += len(data)
+                return
             self._unsent += data
-            if len(self._unsent) > _MAX_UNSENT:
-                self._shut("the port takes no more bytes")
             return
         sent = self._try_write(data)
         if sent < len(data) and self._device is not None:
@@ -104,23 +116,63 @@ class FcPort:
             self._loop.remove_writer(self._device.fileno())
 
     def _readable(self) -> None:
+        data = self._read()
+        if data:
+            self._on_data(data)
+        if self.may_gather and self._device is not None:
+            self._reads += 1
+            self._bytes += len(data)
+            now = self._loop.time()
+            if now >= self._window_ends:
+                if self._reads > _GATHER_ABOVE_HZ * _RATE_WINDOW_S and now < self._window_ends + _RATE_WINDOW_S:
+                    self._loop.remove_reader(self._device.fileno())
+                    self._gathered_rate = self._bytes / 2
+                    self._gathering = self._loop.call_later(_GATHER_S, self._gather)
+                self._begin_window(now)
+
+    def _gather(self) -> None:
+        """Read what came since the last time, until it is not much any more."""
+        data = self._read()
+        if self._device is None:
+            return
+        self._gathering = self._loop.call_later(_GATHER_S, self._gather)
+        self._bytes += len(data)
+        now = self._loop.time()
+        if now >= self._window_ends:
+            if self._bytes < self._gathered_rate or not self.may_gather:
+                self._stop_gathering()
+                self._loop.add_reader(self._device.fileno(), self._readable)
+            self._begin_window(now)
+        if data:
+            self._on_data(data)
+
+    def _begin_window(self, now: float) -> None:
+        self._window_ends = now + _RATE_WINDOW_S
+        self._reads = self._bytes = 0
+
+    def _stop_gathering(self) -> None:
+        if self._gathering is not None:
+            self._gathering.cancel()
+            self._gathering = None
+
+    def _read(self) -> bytes:
         assert self._device is not None
         try:
             data = os.read(self._device.fileno(), _READ_SIZE)
         except (BlockingIOError, InterruptedError):
-            return
+            return b""
         except OSError as error:
             self._shut(error.strerror or str(error))
-            return
+            return b""
         if not data:
             self._shut("the other end hung up")
-            return
-        self._on_data(data)
+        return data
 
     def _shut(self, why: str) -> None:
         device, self._device = self._device, None
         if device is None:
             return
+        self._stop_gathering()
         self._loop.remove_reader(device.fileno())
         self._loop.remove_writer(device.fileno())
         self._unsent.clear()
