@@ -1,7 +1,6 @@
 """`naze-bridge push`, `pull`, `clear` and `status`."""
 
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from protocols.mission_file import MissionFileError, write_qgc_wpl
 from protocols.mission_item import MissionItem
 from service.asking import ask, ask_with_progress, bridge_options, fail
 from service.control import Json
-from service.mission_source import load_mission
+from service.mission_source import load_mission, save_mission
 from service.mission_table import mission_table
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
@@ -46,7 +45,10 @@ def pull(file: Path | None, state_dir: Path, fc: str | None, as_json: bool) -> N
     held = ask(state_dir, fc, {"do": "pull"})
     items = [MissionItem(**item) for item in held["items"]]
     if file is not None:
-        _write(file, write_qgc_wpl(items))
+        try:
+            save_mission(file, write_qgc_wpl(items))
+        except MissionFileError as error:
+            fail(str(error))
     if as_json:
         click.echo(json.dumps(held))
         return
@@ -90,14 +92,3 @@ def show_delivery(delivery: Json, *, as_json: bool) -> None:
         click.echo(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
     if delivery["ack"] != _ACCEPTED:
         raise SystemExit(1)
-
-
-def _write(file: Path, text: str) -> None:
-    """Replace `file` in one step: a full disk must not cost the file that was there."""
-    draft = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(file)
-    except OSError as error:
-        draft.unlink(missing_ok=True)
-        fail(f"{file} cannot be written: {error.strerror}")

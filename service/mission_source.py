@@ -1,5 +1,6 @@
 """Mission files on disk."""
 
+import os
 from pathlib import Path
 
 import click
@@ -17,9 +18,35 @@ def load_mission(path: Path) -> list[MissionItem]:
         with path.open("rb") as file:
             data = file.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:
-        reason = (getattr(error, "strerror", None) or str(error)).lower()
-        raise MissionFileError(name, "", reason, "check the path and its permissions") from None
+        raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
     if len(data) > _MAX_BYTES:
         what = f"larger than {_MAX_BYTES // 2**20} MB"
         raise MissionFileError(name, "", what, "this is no mission file, check the path")
     return read_mission_file(data, name)
+
+
+def save_mission(path: Path, text: str) -> None:
+    """Write the file in one step: a full disk must not cost the one that was there; MissionFileError if it cannot be.
+
+    A link stays a link, and only regular files are replaced: as root, renaming over a device would destroy it.
+    """
+    name = click.format_filename(path)
+    try:
+        target = path.resolve()
+        if target.exists() and not target.is_file():
+            raise MissionFileError(name, "", "this is no regular file", "name a file for the mission")
+        draft = target.with_name(f".naze-bridge-{os.getpid()}")
+        with draft.open("x", encoding="utf-8") as file:  # "x": what is there already, a link above all, is not ours
+            try:
+                file.write(text)
+                file.flush()
+                draft.replace(target)
+            except OSError:
+                draft.unlink(missing_ok=True)
+                raise
+    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a link that leads to itself
+        raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
+
+
+def _reason(error: Exception) -> str:
+    return (getattr(error, "strerror", None) or str(error)).lower()

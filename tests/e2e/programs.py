@@ -48,11 +48,13 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
         return port
 
 
-def run_naze_bridge(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a subcommand to its end."""
-    return subprocess.run(
-        [*_NAZE_BRIDGE, *arguments], cwd=_REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=False
-    )
+def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run a subcommand to its end; `options` are those of subprocess.run."""
+    usual: dict[str, Any] = {"cwd": _REPOSITORY, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    command = [*_NAZE_BRIDGE, *map(str, arguments)]
+    ended: subprocess.CompletedProcess[str]
+    ended = subprocess.run(command, timeout=PATIENCE, check=False, **usual | options)
+    return ended
 
 
 class Program:
