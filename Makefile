@@ -7,6 +7,7 @@
 #   make lint           check style, format and types
 #   make bench          measure speed and memory
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
+#   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
 #   make clean          remove everything that the above have made
 
 PYTHON ?= python3
@@ -15,7 +16,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench lock clean
+.PHONY: demo test lint bench lock message-table clean
 
 demo: $(VENV)/.demo-ready
 	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
@@ -58,6 +59,11 @@ PIN = $(UV) pip compile --quiet --upgrade --universal --python-version 3.11 --ge
 lock:
 	$(PIN) --output-file requirements.lock
 	$(PIN) --constraint requirements.lock --group test --group lint --output-file requirements-dev.lock
+
+# First to another file: the module that writes it imports the present one.
+message-table: $(VENV)/.test-ready
+	$(BIN)/python -m protocols.mavlink.make_message_table > $(VENV)/message_table.py
+	mv $(VENV)/message_table.py protocols/mavlink/
 
 clean:
 	rm -rf $(VENV) build dist .demo .hypothesis .mypy_cache .pytest_cache .ruff_cache benchmarks/results

@@ -1,4 +1,4 @@
-"""The MAVLink dialect: pymavlink's generated message classes, and the facts that framing needs from them.
+"""The MAVLink dialect that the bridge itself speaks: pymavlink's generated message classes.
 
 ardupilotmega is the dialect because ground stations take the vehicle for an ArduCopter: they ask it
 AUTOPILOT_VERSION_REQUEST, for instance.
@@ -13,8 +13,10 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-#: CRC_EXTRA by message id, for every message of the dialect.
-CRC_EXTRA: dict[int, int] = {msgid: cls.crc_extra for msgid, cls in messages.mavlink_map.items()}
+from protocols.mavlink.message_table import MESSAGE_FORMATS
+
+#: CRC_EXTRA by message id, for every message that can be passed on, not only those of the dialect.
+CRC_EXTRA: dict[int, int] = {msgid: known.crc_extra for msgid, known in MESSAGE_FORMATS.items()}
 
 #: A decoded or not yet packed message; pymavlink's classes carry no types of their own.
 Message: TypeAlias = Any

@@ -1,0 +1,69 @@
+"""`python -m protocols.mavlink.make_message_table`: print message_table.py anew, from pymavlink's dialect `all`.
+
+A frame can only be checked with its message's CRC_EXTRA, so that every message counts that any flight controller may
+send; pymavlink's own module of that dialect would cost the daemon 6 MB on top of the one that it speaks.
+
+`all` takes ardupilotmega's meaning, which includes common, where a smaller dialect (matrixpilot, paparazzi) has given
+the same id to a message of its own: frames of those cannot be told from damaged ones and are not passed on.
+"""
+
+import os
+import struct
+import sys
+
+# pymavlink reads this at import time.
+os.environ.setdefault("MAVLINK20", "1")
+
+from pymavlink.dialects.v10 import all as mavlink_1
+from pymavlink.dialects.v20 import all as mavlink_2
+
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.message_format import MessageFormat
+
+_HEAD = '''"""The format of every message that is known to MAVLink. Made by `make message-table`, not by hand."""
+
+from protocols.mavlink.message_format import MessageFormat
+
+#: By message id.
+MESSAGE_FORMATS = {
+'''
+
+
+def table() -> str:
+    """Return the source of message_table.py."""
+    rows = [_row(msgid, message) for msgid, message in sorted(mavlink_2.mavlink_map.items())]
+    return f"{_HEAD}{''.join(rows)}}}\n"
+
+
+def _row(msgid: int, message: Message) -> str:
+    values = ", ".join(map(str, _format(msgid, message)))
+    return f"    {msgid}: MessageFormat({values}),  # {message.msgname}\n"
+
+
+def _format(msgid: int, message: Message) -> MessageFormat:
+    base = mavlink_1.mavlink_map.get(msgid)
+    places = _places(message)
+    return MessageFormat(
+        message.crc_extra,
+        None if base is None else base.unpacker.size,
+        message.unpacker.size,
+        places.get("target_system"),
+        places.get("target_component"),
+    )
+
+
+def _places(message: Message) -> dict[str, int]:
+    """Return where in the payload each field begins."""
+    places: dict[str, int] = {}
+    at = 0
+    for name, kind, count in zip(
+        message.ordered_fieldnames, message.native_format[1:], message.array_lengths, strict=True
+    ):
+        places[name] = at
+        at += struct.calcsize(f"<{chr(kind)}") * max(1, count)
+    assert at == message.unpacker.size, message.msgname
+    return places
+
+
+if __name__ == "__main__":
+    sys.stdout.write(table())
