@@ -65,6 +65,7 @@ class Daemon:
         """Carry out what the bridge wants after it was told something."""
         bridge = self.bridge
         self._port.set_speed(bridge.speed)
+        self._port.may_gather = bridge.is_passing_through
         for data in bridge.take_fc_output():
             self._port.write(data)
         for peer, frame in bridge.ground.take_datagrams():
@@ -73,7 +74,8 @@ class Daemon:
             self._carry_out(effect)
         deadline = bridge.next_deadline()
         if self._timer is not None:
-            if self._timer.when() == deadline:
+            if self._timer.when() <= deadline:
+                # A deadline moves on with every byte that comes. A tick that is too early costs less than a new timer.
                 return
             self._timer.cancel()
         self._timer = self._loop.call_at(deadline, self._tick)
