@@ -16,7 +16,7 @@ from service.simulator.missions import BootMissions
 from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
 from service.simulator.playback_command import play_capture
-from service.simulator.pty_link import PtyLink
+from service.simulator.pty_link import PlugError, PtyLink
 
 _BAUD = click.Choice(["1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200"])
 _RATE = click.FloatRange(0, 1)
@@ -70,8 +70,10 @@ async def _run(
             await obedience.listen(control)
         click.echo(f"Simulated Naze at {path}, {naze.baud} baud. Ctrl-C ends it.")
         await stop.wait()
+    except PlugError as error:
+        raise click.ClickException(f"{error}.") from error
     except OSError as error:
-        raise click.ClickException(f"Cannot make {error.filename2 or control}: {error.strerror}.") from error
+        raise click.ClickException(f"Cannot make {control}: {error.strerror}.") from error
     finally:
         link.unplug()
         obedience.close()

@@ -16,7 +16,7 @@ from pathlib import Path
 from protocols.wp_record import RECORD_SIZE
 from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults
-from service.simulator.pty_link import PtyLink
+from service.simulator.pty_link import PlugError, PtyLink
 
 _FAULTS = {name: type(value) for name, value in asdict(Faults()).items()}
 
@@ -52,7 +52,10 @@ class Control:
             case ["power", "off"]:
                 self._naze.power_off(now)
             case ["plug"]:
-                self._link.plug()
+                try:
+                    self._link.plug()
+                except PlugError as error:
+                    return f"error: {error}"
             case ["unplug"]:
                 self._link.unplug()
             case [name, value] if name in _FAULTS:

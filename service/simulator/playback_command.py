@@ -8,7 +8,7 @@ import click
 
 from protocols.uart_capture import read_capture
 from service.simulator.playback import CapturePlayer
-from service.simulator.pty_link import PtyLink
+from service.simulator.pty_link import PlugError, PtyLink
 
 #: These say what and where to play; the others are about a simulated board.
 _OPTIONS_OF_PLAYING = ("play", "link", "speed")
@@ -46,7 +46,7 @@ async def _play(player: CapturePlayer, path: Path, link: Path) -> None:
         loop.call_at(began_at + player.duration_s, click.echo, "That was all; it goes on with its last answers.")
         click.echo(f"Playing {path} at {link} for {player.duration_s:.0f} s. Ctrl-C ends it.")
         await stop.wait()
-    except OSError as error:
-        raise click.ClickException(f"Cannot make {error.filename2 or link}: {error.strerror}.") from error
+    except PlugError as error:
+        raise click.ClickException(f"{error}.") from error
     finally:
         port.unplug()

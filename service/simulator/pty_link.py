@@ -13,6 +13,11 @@ from service.simulator.pump import Pump
 _BAUD_BY_CODE = {getattr(termios, name): int(name[1:]) for name in dir(termios) if re.fullmatch(r"B\d+", name)}
 _CODE_BY_BAUD = {baud: code for code, baud in _BAUD_BY_CODE.items()}
 _INPUT_SPEED, _OUTPUT_SPEED = 4, 5
+_TERMINALS = Path("/dev/pts")
+
+
+class PlugError(Exception):
+    """The link cannot be made; one sentence."""
 
 
 class PtyLink:
@@ -29,20 +34,25 @@ class PtyLink:
         self._near = self._far = -1
 
     def plug(self) -> None:
-        """Make the terminal and the link. OSError if `path` is in the way or cannot be made."""
+        """Make the terminal and the link. PlugError if something is in the way or it cannot be made.
+
+        Only a link to a terminal is replaced: a simulator that was killed left it behind.
+        """
         if self._pump:
             return
-        if self._path.is_symlink():
-            self._path.unlink()
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
         self._set_speed(self._board.baud)
         os.set_blocking(self._near, False)
         try:
+            if self._leads_to().parent == _TERMINALS:
+                self._path.unlink()
             self._path.symlink_to(os.ttyname(self._far))
-        except OSError:
+        except OSError as error:
             self._close()
-            raise
+            if isinstance(error, FileExistsError):
+                raise PlugError(f"{self._path} is in the way: name another --link, or remove it") from error
+            raise PlugError(f"{self._path} cannot be made: {error.strerror}") from error
         # Our own copy of the far end stays open: the terminal keeps its settings between two clients.
         self._pump = Pump(self._board, self._near, self._loop, far_baud=self._far_baud)
         self._pump.start()
@@ -52,13 +62,18 @@ class PtyLink:
         if self._pump:
             self._pump.stop()
             self._pump = None
-            self._path.unlink(missing_ok=True)
+            # Another simulator may have taken the path over.
+            if self._leads_to() == Path(os.ttyname(self._far)):
+                self._path.unlink()
             self._close()
 
     def poke(self) -> None:
         """Make a fault that was just switched count at once."""
         if self._pump:
             self._pump.poke()
+
+    def _leads_to(self) -> Path:
+        return self._path.readlink() if self._path.is_symlink() else self._path
 
     def _close(self) -> None:
         os.close(self._near)

@@ -199,17 +199,36 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--link", "{}/none/naze"], "Error: Cannot make {}/none/naze: No such file or directory.\n"),
-        (["--link", "{}/file"], "Error: Cannot make {}/file: File exists.\n"),
+        (["--link", "{}/none/naze"], "Error: {}/none/naze cannot be made: No such file or directory.\n"),
+        (["--link", "{}/file"], "Error: {}/file is in the way: name another --link, or remove it.\n"),
+        (["--link", "{}/link"], "Error: {}/link is in the way: name another --link, or remove it.\n"),
+        (["--link", "{}/naze", "--control", "{}/none/socket"], "Error: Cannot make {}/none/socket: No such file or"),
         (["--link", "{}/naze", "--state", "{}/none/flash"], "Error: Cannot use the state file {}/none/flash: "),
         (["--link", "{}/naze", "--state", "{}/file"], "Error: The state file {}/file has 4 bytes, but this board's"),
     ],
 )
 def test_what_is_in_the_way_is_named(tmp_path: Path, options: list[str], complaint: str) -> None:
     (tmp_path / "file").write_text("mine")
+    (tmp_path / "link").symlink_to("file")
     program = "from service.simulator.command import sim; sim()"
     arguments = [option.format(tmp_path) for option in options]
     done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith(complaint.format(tmp_path))
+    assert (tmp_path / "link").readlink() == Path("file")
     assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_link_that_a_killed_one_left_behind_is_replaced(start: Callable[..., Simulator]) -> None:
+    killed = start()
+    killed.end(signal.SIGKILL)
+    assert os.path.islink(killed.link)
+    with start().open() as port:
+        assert ask(port, IDENT) is not None
+
+
+def test_a_link_that_another_one_has_taken_over_is_left_to_it(start: Callable[..., Simulator]) -> None:
+    first, second = start(), start()
+    second_terminal = second.link.readlink()
+    assert first.end() == 0
+    assert second.link.readlink() == second_terminal
