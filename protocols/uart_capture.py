@@ -14,12 +14,14 @@ One JSON object a line, each line for itself, so a capture may be appended to, c
 import json
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import isfinite
+from typing import TypeGuard
 
 _MARK = "naze-bridge-uart"
 _VERSION = 1
 #: What passes between the last line of one recording and the first of the next in the same file.
 _PAUSE_S = 1.0
+#: Ten years: what says more is damaged.
+_LONGEST_S = 3e8
 
 
 class UartDeed(Enum):
@@ -91,23 +93,28 @@ def _end(events: list[UartEvent]) -> None:
 def _parse(line: bytes) -> UartEvent | None:
     try:
         found = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     if not isinstance(found, dict):
         return None
     at, speed = found.get("t"), found.get("baud")
     deed = next((deed for deed in UartDeed if deed.value in found), None)
-    if not isinstance(at, int | float) or not isinstance(speed, int | None) or deed is None:
-        return None
-    content = found[deed.value]
-    if not isinstance(content, str) or not isfinite(at):
+    if deed is None or not _is_time(at) or not _is_speed(speed) or not isinstance(found[deed.value], str):
         return None
     if deed in (UartDeed.OPEN, UartDeed.CLOSE):
-        return UartEvent(at, speed, deed, text=content)
+        return UartEvent(at, speed, deed, text=found[deed.value])
     try:
-        return UartEvent(at, speed, deed, bytes.fromhex(content))
+        return UartEvent(at, speed, deed, bytes.fromhex(found[deed.value]))
     except ValueError:
         return None
+
+
+def _is_time(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and 0 <= value < _LONGEST_S
+
+
+def _is_speed(value: object) -> TypeGuard[int | None]:
+    return value is None or (isinstance(value, int) and value > 0)
 
 
 def _line(content: dict[str, object]) -> bytes:

@@ -13,8 +13,8 @@ _LONGEST_WAIT_S = 5.0
 
 #: Command and payload of a request.
 Question = tuple[int, bytes]
-#: When bytes were read, and the bytes.
-Piece = tuple[float, bytes]
+#: When bytes were read, where in all that was read, and the bytes.
+Piece = tuple[float, int, bytes]
 
 
 @dataclass(slots=True, eq=False)
@@ -65,7 +65,7 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
                 # Requests are answered in their order.
                 del waiting[: waiting.index(asker) + 1]
             answered_by, frame, pieces = next(answers, _NO_MORE)
-    return Conversation(exchanges, sorted(unasked, key=lambda piece: piece[0]))
+    return Conversation(exchanges, sorted(unasked))
 
 
 _Answer = tuple[int, MspFrame, Sequence[Piece]]
@@ -95,22 +95,24 @@ def _answers(events: Sequence[UartEvent], rest: list[Piece]) -> Iterator[_Answer
 def _stretches(events: Sequence[UartEvent]) -> Iterator["_Stretch"]:
     """Yield what was read without a change of speed, and without the port being closed in between."""
     reads: list[tuple[int, UartEvent]] = []
+    offset = 0
     for number, event in enumerate(events):
-        is_read = event.deed is UartDeed.READ
         if reads and (event.speed != reads[-1][1].speed or event.deed in (UartDeed.OPEN, UartDeed.CLOSE)):
-            yield _Stretch(reads)
+            yield _Stretch(reads, offset)
+            offset += sum(len(read.data) for _, read in reads)
             reads = []
-        if is_read and event.data:
+        if event.deed is UartDeed.READ and event.data:
             reads.append((number, event))
     if reads:
-        yield _Stretch(reads)
+        yield _Stretch(reads, offset)
 
 
 class _Stretch:
-    """Bytes that came one behind the other, and which event brought which."""
+    """Bytes that came one behind the other, and which event brought which. `offset`: so many were read before."""
 
-    def __init__(self, reads: Sequence[tuple[int, UartEvent]]) -> None:
+    def __init__(self, reads: Sequence[tuple[int, UartEvent]], offset: int) -> None:
         self._reads = reads
+        self._offset = offset
         self._ends = list(accumulate(len(event.data) for _, event in reads))
         self.size = self._ends[-1]
 
@@ -135,7 +137,7 @@ class _Stretch:
         while begin < end:
             event, stop = self._reads[index][1], self._ends[index]
             start = stop - len(event.data)
-            found.append((event.at, event.data[begin - start : end - start]))
+            found.append((event.at, self._offset + begin, event.data[begin - start : end - start]))
             begin = stop
             index += 1
         return found

@@ -4,16 +4,15 @@ What it sent of its own accord comes at its time. What it answered comes when it
 may ask earlier, later, or something else than the one that was recorded. So each request gets the answer that the
 same request got at this time of the recording, as fast as then, and none if it got none. What is made up:
 
-- A request that was never asked gets MSP's error frame, as from firmware that does not know it, if the flight
+- A request that was never sent gets MSP's error frame, as from firmware that does not know it, if the flight
   controller answered at that time at all.
-- A request that was asked only later (a mission is uploaded earlier now) gets the answers that it got then, in order.
+- A request that was sent only later (a mission is uploaded earlier now) gets the answers that it got then, in order.
 - After the end the last answers are given for ever.
 """
 
 import heapq
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from math import inf
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
@@ -22,24 +21,35 @@ from service.simulator.exchanges import Exchange, take_apart
 
 #: The speed of a line that has none.
 _ANY_SPEED = 115200
+#: What is asked so much earlier or later than in the recording is the same request.
+_JITTER_S = 0.25
 #: After how long the error frame comes that nobody recorded.
 _GUESSED_DELAY_S = 0.005
 
 
-@dataclass(slots=True)
 class _Story:
-    """What happened to one question. `ahead`: the last answer that was given before its time came."""
+    """What became of one question, each time that it was asked."""
 
-    exchanges: list[Exchange] = field(default_factory=list)
-    times: list[float] = field(default_factory=list)
-    ahead: int = -1
+    def __init__(self) -> None:
+        self._exchanges: list[Exchange] = []
+        self._times: list[float] = []
+        self._ahead = -1  # the last answer that was given before its time
+
+    def add(self, exchange: Exchange) -> None:
+        """Add what became of it the next time."""
+        self._exchanges.append(exchange)
+        self._times.append(exchange.asked_at)
 
     def at(self, time: float) -> Exchange:
-        """Return what happens if it is asked now."""
-        index = bisect_right(self.times, time) - 1
-        if index < max(self.ahead, 0):
-            self.ahead = index = min(self.ahead + 1, len(self.exchanges) - 1)
-        return self.exchanges[index]
+        """Return what becomes of it if it is asked now."""
+        index = bisect_right(self._times, time) - 1
+        if index + 1 < len(self._times):
+            early = self._times[index + 1] - time
+            if early <= _JITTER_S and (index < 0 or early < time - self._times[index]):
+                index += 1
+        if index < max(self._ahead, 0):
+            self._ahead = index = min(self._ahead + 1, len(self._exchanges) - 1)
+        return self._exchanges[index]
 
 
 class CapturePlayer:
@@ -50,9 +60,9 @@ class CapturePlayer:
         self._began_at: float | None = None
         self._time = 0.0
         self._parser = MspParser()
-        self._going_out: list[tuple[float, int, bytes]] = []
-        self._numbers = 0
-        self._free_at = 0.0
+        self._going_out: list[tuple[tuple[float, int], int, bytes]] = []
+        self._answers = 0
+        self._last_answer = (0.0, 0)
 
         conversation = take_apart(events)
         self._unasked = conversation.unasked
@@ -61,9 +71,7 @@ class CapturePlayer:
         self._asked_times = [exchange.asked_at for exchange in conversation.exchanges]
         self._stories: dict[tuple[int, bytes], _Story] = {}
         for exchange in conversation.exchanges:
-            story = self._stories.setdefault(exchange.question, _Story())
-            story.exchanges.append(exchange)
-            story.times.append(exchange.asked_at)
+            self._stories.setdefault(exchange.question, _Story()).add(exchange)
         self._speed_times = [event.at for event in events]
         self._speeds = [event.speed or _ANY_SPEED for event in events]
         self._ends_at = events[-1].at if events else 0.0
@@ -100,50 +108,49 @@ class CapturePlayer:
     def advance(self, now: float) -> bytes:
         """Return the bytes that have come until `now` and were not returned before."""
         time = self._set_time(now)
-        found: list[tuple[float, bytes]] = []
+        found: list[tuple[tuple[float, int], int, bytes]] = []
         while self._unasked_done < len(self._unasked) and self._unasked[self._unasked_done][0] <= time:
-            found.append(self._unasked[self._unasked_done])
+            at, offset, data = self._unasked[self._unasked_done]
+            found.append(((at, offset), 0, data))
             self._unasked_done += 1
-        while self._going_out and self._going_out[0][0] <= time:
-            at, _, piece = heapq.heappop(self._going_out)
-            found.append((at, piece))
-        return b"".join(piece for _, piece in sorted(found, key=lambda entry: entry[0]))
+        while self._going_out and self._going_out[0][0][0] <= time:
+            found.append(heapq.heappop(self._going_out))
+        return b"".join(data for _, _, data in sorted(found))
 
     def next_wakeup(self, now: float) -> float:
         """Tell when it is next worth calling `advance`; infinity if nothing will come by itself."""
-        due = self._going_out[0][0] if self._going_out else inf
+        due = self._going_out[0][0][0] if self._going_out else inf
         if self._unasked_done < len(self._unasked):
             due = min(due, self._unasked[self._unasked_done][0])
         assert self._began_at is not None
         return max(now, self._began_at + due / self._tempo)
 
     def _set_time(self, now: float) -> float:
-        """Return the time in the recording."""
+        """Return the time in the recording, to the microsecond as there."""
         assert self._began_at is not None
-        self._time = (now - self._began_at) * self._tempo
+        self._time = round((now - self._began_at) * self._tempo, 6)
         return self._time
 
     def _answer(self, frame: MspFrame, time: float) -> None:
-        if not self._was_answering(time):
-            return
         story = self._stories.get((frame.command, frame.payload))
-        if story is None:
-            self._send(MspFrame(Direction.ERROR, frame.command).encode(), time + _GUESSED_DELAY_S)
-            return
-        exchange = story.at(time)
-        for at, piece in exchange.answer:
-            self._send(piece, time + at - exchange.asked_at)
+        exchange = None if story is None else story.at(time)
+        if exchange is None:
+            if self._was_answering(time):
+                self._send(MspFrame(Direction.ERROR, frame.command).encode(), time + _GUESSED_DELAY_S, 0)
+        elif abs(exchange.asked_at - time) <= _JITTER_S or self._was_answering(time):
+            for at, offset, piece in exchange.answer:
+                self._send(piece, round(time + at - exchange.asked_at, 6), offset)
 
     def _was_answering(self, time: float) -> bool:
-        """Tell whether the last two requests before were not both in vain. The first ones may speak for themselves."""
+        """Tell whether one of the last two requests before was answered."""
         index = bisect_right(self._asked_times, time)
-        return index < 2 or any(exchange.answer for exchange in self._exchanges[index - 2 : index])
+        return any(exchange.answer for exchange in self._exchanges[max(index - 2, 0) : index])
 
-    def _send(self, data: bytes, at: float) -> None:
+    def _send(self, data: bytes, at: float, offset: int) -> None:
         """Send when it is due, but never before what was sent earlier."""
-        self._free_at = max(self._free_at, at)
-        self._numbers += 1
-        heapq.heappush(self._going_out, (self._free_at, self._numbers, data))
+        self._last_answer = max(self._last_answer, (at, offset))
+        self._answers += 1
+        heapq.heappush(self._going_out, (self._last_answer, self._answers, data))
 
     def _is_closed(self, time: float) -> bool:
         return any(closed <= time < opened for closed, opened in self._outages)

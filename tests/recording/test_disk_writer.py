@@ -1,0 +1,49 @@
+"""Bytes on their way to a disk: in order, whole, and never more than there is room for."""
+
+import threading
+
+from structlog.testing import capture_logs
+
+from service.disk_writer import DiskWriter
+
+ROOM = 1 << 20
+
+
+def put(writer: DiskWriter, data: bytes) -> None:
+    with writer.lock:
+        writer.put(data)
+
+
+def test_all_is_written_in_order_before_the_end() -> None:
+    written: list[bytes] = []
+    ended: list[bool] = []
+    writer = DiskWriter("test", written.append, lambda: ended.append(True))
+    pieces = [bytes((number,)) * number for number in range(100)]
+    for piece in pieces:
+        put(writer, piece)
+    writer.close()
+    assert b"".join(written) == b"".join(pieces)
+    assert ended == [True]
+
+
+def test_a_disk_that_hangs_holds_nobody_up_and_is_told_once() -> None:
+    hangs, goes_on = threading.Event(), threading.Event()
+    written: list[bytes] = []
+
+    def write(data: bytes) -> None:
+        written.append(data)
+        hangs.set()
+        assert goes_on.wait(30)
+
+    writer = DiskWriter("test", write, lambda: None)
+    put(writer, b"first")
+    assert hangs.wait(30)
+    with capture_logs() as events:
+        for _ in range(3 * ROOM // 1024):
+            put(writer, bytes(1024))
+    assert [event["event"] for event in events] == ["disk.too_slow"]
+    assert writer.dropped == 2 * ROOM
+    goes_on.set()
+    writer.close()
+    assert b"".join(written).endswith(bytes(ROOM))
+    assert len(b"".join(written)) < ROOM + 10

@@ -1,0 +1,116 @@
+"""The folder of telemetry logs: its bounds, and what a disk does to it."""
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from structlog.testing import capture_logs
+
+from service.settings import TlogLimits
+from service.tlog_folder import LEFT_FREE, TlogFolder
+
+NOON = datetime(2026, 11, 21, 12, 0, 0, tzinfo=UTC)
+RECORD_SIZE = 100
+PLENTY = 1 << 40
+
+
+def record(at: datetime = NOON) -> bytes:
+    """As far as the folder looks at it."""
+    return int(at.timestamp() * 1e6).to_bytes(8, "big").ljust(RECORD_SIZE, b"\xfd")
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def fill(folder: TlogFolder, began: datetime, records: int) -> None:
+    """Write a file."""
+    for _ in range(records):
+        folder.write(record(began), 0.0)
+    folder.close()
+
+
+def test_files_are_named_for_their_first_record_in_utc(tmp_path: Path) -> None:
+    folder = TlogFolder(tmp_path / "state" / "logs", TlogLimits())
+    fill(folder, NOON, 3)
+    fill(folder, NOON + timedelta(hours=1, seconds=7), 1)
+    assert names(tmp_path / "state" / "logs") == ["2026-11-21 12-00-00.tlog", "2026-11-21 13-00-07.tlog"]
+    assert (tmp_path / "state" / "logs" / "2026-11-21 12-00-00.tlog").read_bytes() == 3 * record()
+
+
+def test_a_clock_that_was_set_back_overwrites_nothing(tmp_path: Path) -> None:
+    folder = TlogFolder(tmp_path, TlogLimits())
+    for count in (1, 2, 3):
+        fill(folder, NOON, count)
+    assert names(tmp_path) == [f"2026-11-21 12-00-0{second}.tlog" for second in (0, 1, 2)]
+    assert [(tmp_path / name).stat().st_size for name in names(tmp_path)] == [100, 200, 300]
+
+
+def test_what_was_written_is_in_the_file_at_once(tmp_path: Path) -> None:
+    """There is no buffer that dies with the process."""
+    folder = TlogFolder(tmp_path, TlogLimits())
+    folder.write(record(), 0.0)
+    assert (tmp_path / "2026-11-21 12-00-00.tlog").read_bytes() == record()
+
+
+def test_the_oldest_make_room_and_all_together_keep_their_bound(tmp_path: Path) -> None:
+    limits = TlogLimits(file_size=1000, total_size=5000)
+    folder = TlogFolder(tmp_path, limits)
+    for hour in range(12):
+        began = NOON + timedelta(hours=hour)
+        while not folder.is_full:
+            folder.write(record(began), 0.0)
+            assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= limits.total_size
+        folder.close()
+    assert names(tmp_path) == [f"2026-11-21 {hour}-00-00.tlog" for hour in range(19, 24)]
+
+
+def test_what_is_too_old_goes(tmp_path: Path) -> None:
+    folder = TlogFolder(tmp_path, TlogLimits(days=30))
+    for days in (31, 30, 1):
+        fill(folder, NOON - timedelta(days=days), 1)
+    fill(folder, NOON + timedelta(seconds=1), 1)
+    assert names(tmp_path) == ["2026-11-20 12-00-00.tlog", "2026-11-21 12-00-01.tlog"]
+
+
+def test_other_files_are_left_alone(tmp_path: Path) -> None:
+    others = ["2020-01-01 00-00-00.tlog.bak", "2020-01-01 00-00-00.rlog", "flight.tlog", "notes.txt"]
+    for name in others:
+        (tmp_path / name).write_bytes(bytes(10_000))
+    fill(TlogFolder(tmp_path, TlogLimits(file_size=1000, total_size=2000)), NOON, 1)
+    assert names(tmp_path) == sorted([*others, "2026-11-21 12-00-00.tlog"])
+
+
+def test_a_folder_that_cannot_be_is_told_once_and_tried_again(tmp_path: Path) -> None:
+    (tmp_path / "logs").write_text("in the way")
+    folder = TlogFolder(tmp_path / "logs", TlogLimits())
+    with capture_logs() as events:
+        for second in range(200):
+            folder.write(record(NOON + timedelta(seconds=second)), float(second))
+    assert [event["event"] for event in events if event["log_level"] == "warning"] == ["tlog.stopped"]
+    (tmp_path / "logs").unlink()
+    with capture_logs() as events:
+        for second in range(200, 400):
+            folder.write(record(NOON + timedelta(seconds=second)), float(second))
+    assert [event["event"] for event in events] == ["tlog.recording"]
+    (name,) = names(tmp_path / "logs")
+    began = datetime.strptime(name, "%Y-%m-%d %H-%M-%S.tlog").replace(tzinfo=UTC)
+    assert began - NOON <= timedelta(seconds=260)
+    assert (tmp_path / "logs" / name).stat().st_size == RECORD_SIZE * (400 - (began - NOON) // timedelta(seconds=1))
+
+
+@pytest.mark.parametrize("is_recording", [False, True])
+def test_a_disk_that_is_nearly_full_is_left_to_others(tmp_path: Path, is_recording: bool) -> None:
+    free = [PLENTY]
+    folder = TlogFolder(tmp_path, TlogLimits(), lambda _: free[0])
+    if is_recording:
+        folder.write(record(), 0.0)
+    free[0] = LEFT_FREE
+    with capture_logs() as events:
+        for second in range(1, 200):
+            folder.write(record(NOON + timedelta(seconds=second)), float(second))
+    assert [event["event"] for event in events if event["log_level"] == "warning"] == ["tlog.stopped"]
+    assert names(tmp_path) == (["2026-11-21 12-00-00.tlog"] if is_recording else [])
+    free[0] = PLENTY
+    folder.write(record(NOON + timedelta(seconds=300)), 300.0)
+    assert names(tmp_path)[-1] == "2026-11-21 12-05-00.tlog"

@@ -1,0 +1,142 @@
+"""The capture file: what is written is read again; one that was torn, cut or appended to, as far as it goes."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from structlog.testing import capture_logs
+
+from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, read_capture
+from service.uart_recorder import UartFileError, UartRecorder
+
+HEADER = capture_header("2026-11-21T06:33:06Z")
+SPEEDS = st.sampled_from([None, 1200, 57600, 115200])
+DEEDS = st.sampled_from([UartDeed.READ, UartDeed.WRITE])
+
+
+def event(at: float, deed: UartDeed = UartDeed.READ, data: bytes = b"$M", text: str = "") -> UartEvent:
+    return UartEvent(at, 115200, deed, data if deed in (UartDeed.READ, UartDeed.WRITE) else b"", text)
+
+
+@st.composite
+def recordings(draw: st.DrawFn) -> list[UartEvent]:
+    """One run of a daemon: from the opening of the port on, times to the microsecond, the first at 0."""
+    at, speed = 0, draw(SPEEDS)
+    found = [UartEvent(0.0, speed, UartDeed.OPEN)]
+    for _ in range(draw(st.integers(0, 20))):
+        at += draw(st.integers(0, 10**7))
+        found.append(UartEvent(at / 1e6, draw(SPEEDS), draw(DEEDS), draw(st.binary(min_size=1, max_size=80))))
+    return [*found, UartEvent(at / 1e6, speed, UartDeed.CLOSE, text=draw(st.text()))]
+
+
+def written(events: list[UartEvent]) -> bytes:
+    return HEADER + b"".join(map(capture_line, events))
+
+
+@given(recordings())
+def test_what_is_written_is_read(events: list[UartEvent]) -> None:
+    assert read_capture(written(events)) == events
+
+
+@given(recordings(), st.data())
+def test_a_torn_capture_is_read_up_to_the_last_whole_line(events: list[UartEvent], data: st.DataObject) -> None:
+    whole = written(events)
+    torn = whole[: data.draw(st.integers(0, len(whole)))]
+    lines = torn.count(b"\n") - 1
+    found = read_capture(torn)
+    # A last line may be whole without its line feed.
+    assert found in (events[: max(lines, 0)], events[: lines + 1])
+
+
+@given(st.lists(st.one_of(st.binary(max_size=60), st.builds(lambda at: capture_line(event(at)), st.floats(0, 1e8)))))
+def test_any_bytes_are_read(lines: list[bytes]) -> None:
+    times = [found.at for found in read_capture(b"\n".join(lines))]
+    assert times == sorted(times)
+    assert times[:1] in ([], [0.0])
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "{}",
+        "[1]",
+        "7",
+        '{"t":1,"baud":115200}',
+        '{"t":"1","baud":115200,"read":"24"}',
+        '{"t":1,"baud":"fast","read":"24"}',
+        '{"t":1,"baud":115200,"read":"2"}',
+        '{"t":1,"baud":115200,"read":24}',
+        '{"t":1,"baud":115200,"read":null}',
+        '{"t":Infinity,"baud":115200,"read":"24"}',
+        '{"t":NaN,"baud":115200,"read":"24"}',
+        '{"t":1e999,"baud":115200,"read":"24"}',
+        '{"t":-1,"baud":115200,"read":"24"}',
+        '{"t":1' + 400 * "0" + ',"baud":115200,"read":"24"}',
+        '{"t":1,"baud":-5,"read":"24"}',
+        "[" * 100_000,
+    ],
+)
+def test_a_line_that_is_none_of_ours_is_skipped(line: str) -> None:
+    events = [event(0.0), event(1.0)]
+    lines = [capture_line(events[0]), line.encode() + b"\n", capture_line(events[1])]
+    assert read_capture(HEADER + b"".join(lines)) == events
+
+
+def test_a_part_that_was_cut_out_begins_at_0() -> None:
+    lines = written([event(float(second)) for second in range(100)]).splitlines(keepends=True)
+    assert [found.at for found in read_capture(b"".join(lines[61:71]))] == [float(second) for second in range(10)]
+
+
+def test_recordings_in_one_file_follow_each_other_after_a_pause() -> None:
+    first = [event(0.0, UartDeed.OPEN), event(2.0), event(3.0, UartDeed.CLOSE, text="the daemon stops")]
+    killed = [event(5.0, UartDeed.OPEN), event(6.0)]
+    found = read_capture(written(first) + written(killed) + written(first))
+    assert [(entry.at, entry.deed) for entry in found] == [
+        (0.0, UartDeed.OPEN), (2.0, UartDeed.READ), (3.0, UartDeed.CLOSE),
+        (4.0, UartDeed.OPEN), (5.0, UartDeed.READ), (5.0, UartDeed.CLOSE),
+        (6.0, UartDeed.OPEN), (8.0, UartDeed.READ), (9.0, UartDeed.CLOSE),
+    ]  # fmt: skip
+
+
+# -- the recorder ----------------------------------------------------------------------------------------------------
+
+
+def test_a_capture_is_appended_to_even_if_it_was_torn(tmp_path: Path) -> None:
+    path = tmp_path / "naze.uart"
+    for number in range(3):
+        recorder = UartRecorder(path)
+        recorder.note(UartDeed.READ, 115200, bytes((number,)))
+        recorder.close()
+        with path.open("ab") as file:
+            file.write(b'{"t":0.5,"ba')
+    assert [found.data for found in read_capture(path.read_bytes()) if found.deed is UartDeed.READ] == [
+        b"\0",
+        b"\1",
+        b"\2",
+    ]
+
+
+def test_a_capture_is_bounded_over_all_recordings(tmp_path: Path) -> None:
+    path = tmp_path / "naze.uart"
+    ends = 0
+    for _ in range(3):
+        with capture_logs() as events:
+            recorder = UartRecorder(path, max_size=2000)
+            for _ in range(20):
+                recorder.note(UartDeed.WRITE, 115200, bytes(10))
+            recorder.close()
+        ends += len([entry for entry in events if entry["event"] == "uart.recording_ended"])
+    assert ends == 2
+    assert 1900 < path.stat().st_size <= 2000
+    assert path.read_bytes().endswith(b"}\n")
+
+
+def test_nothing_else_is_written_into(tmp_path: Path) -> None:
+    path = tmp_path / "notes.txt"
+    path.write_text("mine")
+    with pytest.raises(UartFileError, match=r"notes\.txt is no UART capture"):
+        UartRecorder(path)
+    assert path.read_text() == "mine"
+    with pytest.raises(UartFileError, match="Is a directory"):
+        UartRecorder(tmp_path)
