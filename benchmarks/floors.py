@@ -8,10 +8,12 @@ import asyncio
 import os
 import socket
 import sys
+from math import inf
 
 import serial
 
-from bridge.vehicle_state import POLLS, Poll
+from bridge.poll_schedule import POLLS, Poll
+from bridge.telemetry_table import TELEMETRY
 
 
 def _echo(loop: asyncio.AbstractEventLoop) -> None:
@@ -31,12 +33,14 @@ def _poll(loop: asyncio.AbstractEventLoop, link: str) -> None:
     port = serial.Serial(link, 115200, timeout=0)
     loop.add_reader(port.fileno(), lambda: os.read(port.fileno(), 4096))
 
-    def ask(poll: Poll) -> None:
+    def ask(poll: Poll, interval_s: float) -> None:
         os.write(port.fileno(), poll.frame)
-        loop.call_later(poll.interval_s, ask, poll)
+        loop.call_later(interval_s, ask, poll, interval_s)
 
     for poll in POLLS:
-        ask(poll)
+        interval_s = min(poll.needed_s, *(row.interval_s for row in TELEMETRY if row.poll is poll.command))
+        if interval_s < inf:
+            ask(poll, interval_s)
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from math import inf
 
 from bridge.commands import Commands
+from bridge.fc_actions import FcActions
 from bridge.fc_session import Autopilot, FcSession
 from bridge.flight_controller import FlightController, Kind
 from bridge.ground import Ground, Tap
@@ -55,7 +56,7 @@ class BridgeConfig:
 class Bridge:
     """Puts the parts together and hands each what is its business."""
 
-    def __init__(self, config: BridgeConfig, journal: Journal, now: float, tap: Tap = lambda _frame: None) -> None:
+    def __init__(self, config: BridgeConfig, journal: Journal, now: float, tap: Tap = lambda _frames: None) -> None:
         self._config = config
         self._journal = journal
         self._decoder = MavlinkDecoder()
@@ -69,7 +70,13 @@ class Bridge:
         self.ground = Ground(config.sysid, config.compid, journal, lambda: self._vehicle.newcomer(), tap)
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(
-            config.speeds, self.runner, journal, self._controller_changed, self._mavlink_received, config.autopilot
+            config.speeds,
+            self.runner,
+            journal,
+            self._controller_changed,
+            self._mavlink_received,
+            lambda command, at: self._vehicle.answered(command, at),
+            config.autopilot,
         )
         self.desk = MissionDesk()
         self._vehicle = OwnVehicle(self.session, self.desk, self.ground, now)
@@ -77,8 +84,9 @@ class Bridge:
         self._uploads = MissionUploads(self.desk, self.runner, self.ground, journal, home)
         self._downloads = MissionDownloads(self.desk, self.runner, self.ground, self._is_armed, home)
         parameters = Parameters(self.desk, self.runner, self.ground, config.sysid)
-        commands = Commands(self.ground, self._vehicle.on_demand(), self._banner)
-        self._inbox = Inbox(self.ground, self._uploads, self._downloads, parameters, commands)
+        actions = FcActions(self.session, self.desk, self.runner)
+        commands = Commands(self.ground, self._vehicle, actions, self._banner)
+        self._inbox = Inbox(self.ground, self._uploads, self._downloads, parameters, commands, self._vehicle)
 
     # The flight controller's side.
 

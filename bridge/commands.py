@@ -3,11 +3,21 @@
 Nothing here may arm, steer or restart an aircraft; such commands are refused with a reason.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 
+from bridge.fc_actions import (
+    CALIBRATE_ACCELEROMETER,
+    CALIBRATE_COMPASS,
+    SAVE_SETTINGS,
+    Action,
+    FcActions,
+    Outcome,
+)
+from bridge.own_vehicle import OwnVehicle
 from bridge.station import Post, Severity, Station
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import messages
 
 
 class CommandResult(IntEnum):
@@ -17,11 +27,12 @@ class CommandResult(IntEnum):
     TEMPORARILY_REJECTED = 1
     DENIED = 2
     UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
 
 
-_REQUEST_MESSAGE = messages.MAV_CMD_REQUEST_MESSAGE
-_SET_MESSAGE_INTERVAL = messages.MAV_CMD_SET_MESSAGE_INTERVAL
-_DO_SEND_BANNER = 42428
+_MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1
+_MAX_MSGID = (1 << 24) - 1
 
 #: Commands that only ask for a message: command number -> message number.
 _ASKS_FOR = {
@@ -29,63 +40,149 @@ _ASKS_FOR = {
     messages.MAV_CMD_GET_HOME_POSITION: messages.MAVLINK_MSG_ID_HOME_POSITION,
 }
 
+_FLY = "It is flown with the transmitter"
+_MOTORS = "Motors and servos are not driven from here"
 #: Commands that would act on the aircraft: command number -> what the pilot is told.
 _REFUSED = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: "Arm and disarm with the transmitter sticks",
     messages.MAV_CMD_DO_SET_MODE: "Modes are set with the transmitter switches",
     messages.MAV_CMD_MISSION_START: "A mission is started with the transmitter",
     messages.MAV_CMD_DO_SET_MISSION_CURRENT: "The current waypoint cannot be set",
+    messages.MAV_CMD_DO_PAUSE_CONTINUE: "A mission is paused with the transmitter",
     messages.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "The flight controller is not rebooted from here",
     messages.MAV_CMD_NAV_TAKEOFF: "Take off with the transmitter",
     messages.MAV_CMD_NAV_LAND: "Land with the transmitter",
     messages.MAV_CMD_NAV_RETURN_TO_LAUNCH: "Return with the transmitter switches",
+    messages.MAV_CMD_DO_CHANGE_SPEED: "Speed is set with the transmitter",
+    messages.MAV_CMD_DO_SET_HOME: "Home is where the craft is armed",
+    messages.MAV_CMD_NAV_WAYPOINT: _FLY,
+    messages.MAV_CMD_NAV_LOITER_UNLIM: _FLY,
+    messages.MAV_CMD_CONDITION_YAW: _FLY,
+    messages.MAV_CMD_DO_REPOSITION: _FLY,
+    messages.MAV_CMD_DO_CHANGE_ALTITUDE: _FLY,
+    messages.MAV_CMD_OVERRIDE_GOTO: _FLY,
+    messages.MAV_CMD_GUIDED_CHANGE_SPEED: _FLY,
+    messages.MAV_CMD_GUIDED_CHANGE_ALTITUDE: _FLY,
+    messages.MAV_CMD_GUIDED_CHANGE_HEADING: _FLY,
+    messages.MAV_CMD_DO_FLIGHTTERMINATION: _MOTORS,
+    messages.MAV_CMD_DO_MOTOR_TEST: _MOTORS,
+    messages.MAV_CMD_DO_SET_SERVO: _MOTORS,
+    messages.MAV_CMD_DO_REPEAT_SERVO: _MOTORS,
+}
+_OUTCOMES = {
+    Outcome.DONE: CommandResult.ACCEPTED,
+    Outcome.FREEZES: CommandResult.ACCEPTED,
+    Outcome.ARMED: CommandResult.DENIED,
+    Outcome.NO_LINK: CommandResult.DENIED,
+    Outcome.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
+    Outcome.NO_SENSOR: CommandResult.DENIED,
+    Outcome.NO_ANSWER: CommandResult.FAILED,
+    Outcome.REFUSED: CommandResult.UNSUPPORTED,
 }
 
 
 class Commands:
-    """Acknowledges commands. `on_demand` makes the messages that can be asked for; None: not known yet."""
+    """Carries commands out and acknowledges them."""
 
-    def __init__(
-        self, post: Post, on_demand: Mapping[int, Callable[[], Message | None]], banner: Callable[[], str]
-    ) -> None:
+    def __init__(self, post: Post, vehicle: OwnVehicle, actions: FcActions, banner: Callable[[], str]) -> None:
         self._post = post
-        self._on_demand = on_demand
+        self._vehicle = vehicle
+        self._actions = actions
         self._banner = banner
 
-    def take(self, station: Station, command: int, param1: float) -> None:
-        """Do what a command asks for, and acknowledge it."""
-        result = self._do(station, command, param1)
-        self._post.to(
-            station,
-            messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid),
-        )
+    def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
+        """Do what a command asks for, and acknowledge it. `params`: param1..param7."""
+        action = _action(command, params)
+        if action is None:
+            self._acknowledge(station, command, self._do(station, command, params))
+        elif self._actions.present == action:
+            # Its user is impatient, or the network doubled it.
+            self._acknowledge(station, command, CommandResult.IN_PROGRESS)
+        else:
+            self._actions.start(action, lambda outcome: self._acted(station, command, outcome), now)
 
     def refuse_mode(self) -> None:
         """SET_MODE has no acknowledgement; the text is all there is."""
         self._post.say(Severity.ERROR, _REFUSED[messages.MAV_CMD_DO_SET_MODE])
 
-    def send_on_demand(self, station: Station, msgid: int) -> CommandResult:
-        """Send one message that was asked for."""
-        make = self._on_demand.get(msgid)
-        if make is None:
-            return CommandResult.UNSUPPORTED
-        message = make()
-        if message is None:
-            return CommandResult.TEMPORARILY_REJECTED
-        self._post.to(station, message)
-        return CommandResult.ACCEPTED
+    def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
+        self._post.to(
+            station,
+            messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid),
+        )
 
-    def _do(self, station: Station, command: int, param1: float) -> CommandResult:
-        if command == _REQUEST_MESSAGE:
-            return self.send_on_demand(station, int(param1) if 0 <= param1 < 1 << 24 else -1)
+    def _acted(self, station: Station, command: int, outcome: Outcome) -> None:
+        result = _OUTCOMES[outcome]
+        self._post.say(Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR, outcome.value)
+        self._acknowledge(station, command, result)
+
+    def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:
+        match command:
+            case messages.MAV_CMD_REQUEST_MESSAGE:
+                return self._send_once(station, _msgid(params[0]))
+            case messages.MAV_CMD_SET_MESSAGE_INTERVAL:
+                return self._set_interval(station, _msgid(params[0]), params[1])
+            case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
+                return self._tell_interval(station, _msgid(params[0]))
+            case messages.MAV_CMD_DO_SEND_BANNER:
+                self._post.say(Severity.INFO, self._banner())
+                return CommandResult.ACCEPTED
         if command in _ASKS_FOR:
-            return self.send_on_demand(station, _ASKS_FOR[command])
-        if command == _DO_SEND_BANNER:
-            self._post.say(Severity.INFO, self._banner())
-            return CommandResult.ACCEPTED
-        if command == _SET_MESSAGE_INTERVAL:
-            return CommandResult.ACCEPTED
+            return self._send_once(station, _ASKS_FOR[command])
         if command in _REFUSED:
             self._post.say(Severity.ERROR, _REFUSED[command])
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
+
+    def _send_once(self, station: Station, msgid: int) -> CommandResult:
+        match self._vehicle.send_once(station, msgid):
+            case None:
+                return CommandResult.UNSUPPORTED
+            case False:
+                return CommandResult.TEMPORARILY_REJECTED
+            case True:
+                return CommandResult.ACCEPTED
+
+    def _set_interval(self, station: Station, msgid: int, interval_us: float) -> CommandResult:
+        """Obey SET_MESSAGE_INTERVAL: -1 never, 0 as by default."""
+        if interval_us == 0:
+            interval_s = None
+        elif interval_us == -1:
+            interval_s = math.inf
+        elif math.isfinite(interval_us) and interval_us > 0:
+            interval_s = interval_us / 1e6
+        else:
+            return CommandResult.DENIED
+        is_known = self._vehicle.set_interval(station.peer, msgid, interval_s)
+        return CommandResult.ACCEPTED if is_known else CommandResult.UNSUPPORTED
+
+    def _tell_interval(self, station: Station, msgid: int) -> CommandResult:
+        """Answer with MESSAGE_INTERVAL: -1 never, 0 there is no such message."""
+        interval_s = self._vehicle.interval_s(station.peer, msgid)
+        interval_us = 0
+        if interval_s is not None:
+            interval_us = -1 if interval_s == math.inf else min(round(interval_s * 1e6), _MAX_I32)
+        if 0 <= msgid <= _MAX_U16:
+            self._post.to(station, messages.MAVLink_message_interval_message(msgid, interval_us))
+        return CommandResult.UNSUPPORTED if interval_s is None else CommandResult.ACCEPTED
+
+
+def _msgid(param: float) -> int:
+    """Return a message number, or -1: none."""
+    return int(param) if 0 <= param <= _MAX_MSGID else -1
+
+
+def _action(command: int, params: Sequence[float]) -> Action | None:
+    """Return what is to be done to the flight controller; None: it is another command, or asks for what it cannot do.
+
+    MAV_CMD_PREFLIGHT_CALIBRATION: one thing at a time; the compass by param2, the accelerometers by param5 (1, or 4 for
+    "simple"). MAV_CMD_PREFLIGHT_STORAGE: param1 = 1 writes.
+    """
+    asked = {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
+    if command == messages.MAV_CMD_PREFLIGHT_CALIBRATION:
+        if asked in ({5: 1}, {5: 4}):
+            return CALIBRATE_ACCELEROMETER
+        return CALIBRATE_COMPASS if asked == {2: 1} else None
+    if command == messages.MAV_CMD_PREFLIGHT_STORAGE and params[0] == 1:
+        return SAVE_SETTINGS
+    return None

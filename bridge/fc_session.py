@@ -9,12 +9,12 @@ from bridge.frsky_line import FrskyLine
 from bridge.journal import Journal
 from bridge.mavlink_line import MavlinkLine
 from bridge.msp_link import MspLink
-from bridge.procedure import Send
+from bridge.poll_schedule import PollSchedule
 from bridge.runner import Runner
-from bridge.vehicle_state import POLLS, Poll, VehicleState
+from bridge.vehicle_state import VehicleState
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
+from protocols.msp.frame import MspFrame
 
 #: A flight controller that answers nothing for so long is gone: unplugged, reset, or switched to another protocol.
 MSP_SILENCE_S = 2.0
@@ -25,7 +25,6 @@ _GARBLE_SIZE = 16
 _ARMED_SPEEDS = (57600, FRSKY_SPEED)
 #: MAVLink version, sysid and compid of a Harakiri (baseflight_mavlink.c).
 _HARAKIRI_SENDER = (1, 1, 200)
-_POLL_COMMANDS = frozenset(poll.command for poll in POLLS)
 
 
 class Autopilot(Enum):
@@ -68,6 +67,7 @@ class FcSession:
         journal: Journal,
         on_change: Callable[[FlightController | None, float], None],
         on_mavlink: Callable[[list[MavlinkFrame]], None],
+        on_answer: Callable[[int, float], None],
         autopilot: Autopilot,
     ) -> None:
         self._speeds = speeds
@@ -75,6 +75,7 @@ class FcSession:
         self._journal = journal
         self._on_change = on_change
         self._on_mavlink = on_mavlink
+        self._on_answer = on_answer
         self._autopilot = autopilot
         self.state = State.NO_PORT
         self.controller: FlightController | None = None
@@ -84,7 +85,7 @@ class FcSession:
         self._met_harakiri = False
         self._search: Autosense | None = None
         self.link: MspLink | None = None
-        self._polls_due: dict[int, float] = {}
+        self.polls = PollSchedule()
         self._mavlink: MavlinkLine | None = None
         self._frsky: FrskyLine | None = None
         self._foreign = _Foreign()
@@ -141,7 +142,7 @@ class FcSession:
             for frame in self.link.tick(now):
                 self._msp_frame(frame, now)
         if self.link is not None and self.state is State.MSP:
-            self._poll(now)
+            self.polls.ask(self.link, now, beside_missions=self._runner.is_busy)
             self._notice_silence(self.link, now)
         if self._mavlink is not None:
             probe = self._mavlink.tick(now)
@@ -163,9 +164,7 @@ class FcSession:
             deadlines.append(self.link.next_deadline())
         if self.state is State.MSP and self.link is not None:
             deadlines.append(self.link.last_heard_at + self._patience_s)
-            poll = self._next_poll()
-            if poll is not None:
-                deadlines.append(self._polls_due[poll.command])
+            deadlines.append(self.polls.next_deadline(self.link))
         if self._mavlink is not None:
             deadlines.append(self._mavlink.next_deadline())
         if self._frsky is not None:
@@ -209,7 +208,8 @@ class FcSession:
         self._mavlink = None
         self._frsky = None
         self._foreign = _Foreign()
-        self.vehicle = VehicleState()
+        # Its frame stays the same whatever it speaks: an armed hexacopter is none the less one.
+        self.vehicle = VehicleState(mixer=self.vehicle.mixer)
         self._runner.link_down(now)
         if self.controller is not None:
             self.controller = None
@@ -257,7 +257,7 @@ class FcSession:
         self._enter(State.MSP)
         if controller.info is not None:
             self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
-        self._polls_due = {poll.command: now for poll in POLLS}
+        self.polls.begin(found.speed)
         self.vehicle.mixer = controller.mixer
         self._welcome(controller, found, now)
 
@@ -279,22 +279,9 @@ class FcSession:
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
         self._runner.received(frame, now)
         if self.controller is not None:
+            self.polls.answered(frame)
             self.vehicle.take(frame, self.controller)
-
-    def _next_poll(self) -> Poll | None:
-        """Return the poll that is due first, if the link has room for it: one question at a time."""
-        assert self.link is not None
-        poll = min(POLLS, key=lambda poll: self._polls_due[poll.command])
-        if self.link.awaits(_POLL_COMMANDS) or not self.link.may_send(poll.reply_payload + FRAME_OVERHEAD):
-            return None
-        return poll
-
-    def _poll(self, now: float) -> None:
-        assert self.link is not None
-        poll = self._next_poll()
-        if poll is not None and self._polls_due[poll.command] <= now:
-            self._polls_due[poll.command] = now + poll.interval_s
-            self.link.send(Send(poll.frame, poll.command, poll.reply_payload + FRAME_OVERHEAD), now)
+            self._on_answer(frame.command, now)
 
     def _is_harakiri(self, heard: MavlinkFrame | None) -> bool:
         """Tell a Harakiri from other autopilots: it was met on this port before, or it sends as only it does.

@@ -30,13 +30,23 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class FlightController:
-    """Who it is. `arm_bit` is the place of the ARM box in the status flags; `info` is there with the extension."""
+    """Who it is. `boxes` are in the order of the status flags; `info` is there with the extension."""
 
     kind: Kind
     name: str
     mixer: int | None = None
-    arm_bit: int | None = None
+    boxes: tuple[str, ...] = ()
     info: Info | None = None
+
+    @property
+    def arm_bit(self) -> int | None:
+        """The place of the ARM box in the status flags."""
+        return self.boxes.index(_ARM_BOX) if _ARM_BOX in self.boxes else None
+
+    @property
+    def is_harakiri(self) -> bool:
+        """Whether it is a Harakiri that answers MSP."""
+        return self.kind in (Kind.HARAKIRI, Kind.HARAKIRI_MISSIONS)
 
 
 class _Silence(Exception):
@@ -54,8 +64,7 @@ def identify_msp() -> Procedure[FlightController | None]:
 def _identify() -> Procedure[FlightController]:
     ident = decode_ident((yield from _question(Msp.IDENT, 7)).payload)
     boxes = decode_box_names((yield from _question(Msp.BOXNAMES, _MAX_REPLY_PAYLOAD)).payload)
-    arm_bit = boxes.index(_ARM_BOX) if _ARM_BOX in boxes else None
-    controller = FlightController(Kind.OTHER_MSP, "", ident.mixer if ident else None, arm_bit)
+    controller = FlightController(Kind.OTHER_MSP, "", ident.mixer if ident else None, boxes)
     is_harakiri = (
         ident is not None
         and (ident.version, ident.capability) == (_HARAKIRI_VERSION, _HARAKIRI_CAPABILITY)

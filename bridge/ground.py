@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 
 from bridge.journal import Journal
+from bridge.recent_texts import RecentTexts
 from bridge.station import Peer, Severity, Station
 from bridge.stations import Stations
 from protocols.mavlink.codec import FrameWriter, Packed, pack
@@ -11,8 +12,8 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
 _TEXT_SIZE = 50
 
-#: Is shown each frame that is sent to ground stations or taken from them, once.
-Tap = Callable[[bytes], None]
+#: Is shown the frames that are sent to ground stations or taken from them, each once.
+Tap = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
@@ -29,6 +30,8 @@ class Ground:
         self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._writers: dict[Peer, FrameWriter] = {}
         self._datagrams: list[tuple[Peer, bytes]] = []
+        self._texts = RecentTexts()
+        self._now = 0.0
         self._everyone: list[Peer] | None = None  # counted anew after each change
 
     # Who is there.
@@ -71,6 +74,7 @@ class Ground:
 
     def expire(self, now: float) -> list[Peer]:
         """Forget the silent, and return them."""
+        self._now = now
         silent = self._stations.expire(now)
         for peer in silent:
             self._forget(peer)
@@ -90,6 +94,7 @@ class Ground:
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> list[MavlinkFrame]:
         """Take bytes from a peer, return the whole frames in them. A datagram holds whole frames only."""
+        self._now = now
         splitter = self._splitters.get(peer)
         if splitter is None:
             splitter = MavlinkSplitter()
@@ -110,7 +115,7 @@ class Ground:
             self._everyone = None
             self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
             self._on_newcomer()
-        self.tap(frame.raw)
+        self.tap([frame.raw])
         return True
 
     # What they are sent.
@@ -123,7 +128,7 @@ class Ground:
     def to(self, station: Station, message: Message) -> None:
         """Send a message to one ground station."""
         peer = station.peer
-        self.tap(self._write(peer, message, self._stations.version(peer)))
+        self.tap([self._write(peer, message, self._stations.version(peer))])
 
     def broadcast(self, message: Message) -> None:
         """Send a message to everyone."""
@@ -136,7 +141,7 @@ class Ground:
             frame = self._writer(peer).frame(packed, self._stations.version(peer))
             self._datagrams.append((peer, frame))
         if frame is not None:
-            self.tap(frame)
+            self.tap([frame])
 
     def introduce(self, heartbeat: Message) -> None:
         """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.
@@ -150,10 +155,14 @@ class Ground:
                 self._write(peer, heartbeat, other)
 
     def say(self, severity: Severity, text: str) -> None:
-        """Show a text on every ground station, in pieces that fit STATUSTEXT."""
+        """Show a text on every ground station, in pieces that fit STATUSTEXT; the same refusal not again for 10 s."""
         self._journal("debug", "gcs.text", text=text)
+        peers = self.everyone()
+        if severity is Severity.ERROR:
+            peers = self._texts.new_to(peers, text, self._now)
         for piece in split_text(text):
-            self.broadcast(messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace")))
+            message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"))
+            self.multicast(pack(message), peers)
 
     def forward(self, frames: Sequence[bytes], peers: Iterable[Peer]) -> None:
         """Send frames on as they came: `frames` are datagrams of one whole frame or more."""

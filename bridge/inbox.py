@@ -1,17 +1,23 @@
 """Which message from a ground station is whose business: one table."""
 
 from collections.abc import Callable
+from math import inf
 
 from bridge import vehicle_messages
 from bridge.commands import Commands
 from bridge.mission_download import MissionDownloads
 from bridge.mission_upload import MISSION_TYPE_MISSION, MissionUploads
+from bridge.own_vehicle import OwnVehicle
 from bridge.parameters import Parameters
 from bridge.station import Post, Severity, Station
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.ftp import refuse
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
+from protocols.mission_item import MissionItem, MissionResult
+
+#: MISSION_ITEM.current of what is no part of a list: Mission Planner's "Fly to here" and "Change altitude".
+_GUIDED = (2, 3)
 
 _Handler = Callable[[Station, Message, float], None]
 
@@ -26,18 +32,16 @@ class Inbox:
         downloads: MissionDownloads,
         parameters: Parameters,
         commands: Commands,
+        vehicle: OwnVehicle,
     ) -> None:
         self._post = post
+        self._vehicle = vehicle
         self._uploads = uploads
         self._downloads = downloads
         self._handlers: dict[int, _Handler] = {
             m.MAVLINK_MSG_ID_MISSION_COUNT: self._mission_count,
-            m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: uploads.item(
-                s, item_from_float_message(msg), msg.mission_type, now
-            ),
-            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: uploads.item(
-                s, item_from_int_message(msg), msg.mission_type, now
-            ),
+            m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: self._item(s, msg, item_from_float_message(msg), now),
+            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: self._item(s, msg, item_from_int_message(msg), now),
             m.MAVLINK_MSG_ID_MISSION_ACK: self._mission_ack,
             m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.partial_list(s, now),
@@ -49,8 +53,16 @@ class Inbox:
                 s, msg.seq, msg.mission_type, now, as_int=True
             ),
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
-            m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, _: commands.take(s, msg.command, msg.param1),
-            m.MAVLINK_MSG_ID_COMMAND_INT: lambda s, msg, _: commands.take(s, msg.command, msg.param1),
+            m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
+                s,
+                msg.command,
+                (msg.param1, msg.param2, msg.param3, msg.param4, msg.param5, msg.param6, msg.param7),
+                now,
+            ),
+            m.MAVLINK_MSG_ID_COMMAND_INT: lambda s, msg, now: commands.take(
+                s, msg.command, (msg.param1, msg.param2, msg.param3, msg.param4, msg.x, msg.y, msg.z), now
+            ),
+            m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
             m.MAVLINK_MSG_ID_SET_MODE: lambda _s, _msg, _now: commands.refuse_mode(),
             m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, _now: post.to(
                 s, vehicle_messages.autopilot_version()
@@ -73,6 +85,15 @@ class Inbox:
         """Deal with a message that `understands` said yes to."""
         self._handlers[message.get_msgId()](station, message, now)
 
+    def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
+        if message.current in _GUIDED and not self._uploads.is_writing(station):
+            self._post.say(Severity.ERROR, "It is flown with the transmitter")
+            self._post.to(
+                station, m.MAVLink_mission_ack_message(station.sysid, station.compid, MissionResult.DENIED, 0)
+            )
+            return
+        self._uploads.item(station, item, message.mission_type, now)
+
     def _mission_count(self, station: Station, message: Message, now: float) -> None:
         self._downloads.forget(station)
         self._uploads.count(station, message.count, message.mission_type, now)
@@ -88,6 +109,10 @@ class Inbox:
 
     def _set_current(self, _station: Station, _message: Message, _now: float) -> None:
         self._post.say(Severity.ERROR, "The current waypoint cannot be set")
+
+    def _data_stream(self, station: Station, message: Message, _now: float) -> None:
+        rate_hz = message.req_message_rate if message.start_stop else 0
+        self._vehicle.set_stream(station.peer, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
 
     def _ftp(self, station: Station, message: Message, _now: float) -> None:
         answer = refuse(message.payload)

@@ -92,6 +92,10 @@ class MissionUploads:
         """Where the present transfer stands; None if there is none."""
         return None if self._transfer is None else self._transfer.phase
 
+    def is_writing(self, station: Station) -> bool:
+        """Tell whether the present transfer is this ground station's."""
+        return self._transfer is not None and self._transfer.station == station
+
     def count(self, station: Station, count: int, mission_type: int, now: float) -> None:
         """MISSION_COUNT: a transfer is announced."""
         if mission_type != MISSION_TYPE_MISSION:

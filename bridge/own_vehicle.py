@@ -4,81 +4,163 @@ It is there from the start and keeps its ids whatever the flight controller does
 the craft was armed and speaks another protocol now.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf
 
 from bridge import vehicle_messages
 from bridge.fc_session import FcSession
+from bridge.flight_mode import FlightMode
 from bridge.ground import Ground
+from bridge.message_rates import MessageRates
 from bridge.mission_desk import MissionDesk
+from bridge.station import Peer, Station
+from bridge.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY, Row
+from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
+from protocols.msp.commands import Msp
 
-_HEARTBEAT_INTERVAL_S = 1.0
+#: HEARTBEAT and MISSION_CURRENT come from no poll.
+_TICK_S = 1.0
+#: No wish is faster than this.
+_FASTEST_S = 0.01
+_MISSION_CURRENT = messages.MAVLINK_MSG_ID_MISSION_CURRENT
+_ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
+_STREAMS = {row.msgid: row.stream for row in TELEMETRY} | {_MISSION_CURRENT: EXTENDED_STATUS}
+_POLLS = {row.msgid: row.poll for row in TELEMETRY}
+_DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | {_MISSION_CURRENT: _TICK_S}
+_ROWS: dict[int, list[Row]] = {}
+for _row in TELEMETRY:
+    _ROWS.setdefault(_row.poll, []).append(_row)
 
 
 class OwnVehicle:
-    """Sends what is known of the vehicle, and answers who asks for one message of it."""
+    """Sends what is known of the vehicle, each ground station what and as often as it wishes."""
 
     def __init__(self, session: FcSession, desk: MissionDesk, ground: Ground, now: float) -> None:
         self._session = session
         self._desk = desk
         self._ground = ground
-        self._started_at = now
-        self._heartbeat_due = now
+        self._started_at = self._now = now
+        self._tick_due = now
+        self._rates = MessageRates(_DEFAULTS)
         self._announced_home: tuple[int, int] | None = None
+        self._announced: tuple[bool | None, FlightMode | None] | None = None
 
     def newcomer(self) -> None:
         """Somebody new is there: who comes later must hear of home, too."""
         self._announced_home = None
 
     def tick(self, now: float) -> None:
-        """Send what is due."""
-        if now >= self._heartbeat_due:
-            self._heartbeat_due = max(self._heartbeat_due + _HEARTBEAT_INTERVAL_S, now)
-            self._every_second(now)
+        """Send what comes every second."""
+        self._now = now
+        if now < self._tick_due:
+            return
+        self._tick_due = max(self._tick_due + _TICK_S, now)
+        everyone = self._ground.everyone()
+        self._rates.keep(everyone)
+        self._set_polls(everyone)
+        self._ground.introduce(self._heartbeat())
+        self._ground.multicast(pack(self._mission_current()), self._rates.take_due(_MISSION_CURRENT, everyone, now))
+        self._announce_home()
 
     def next_deadline(self) -> float:
         """Return when `tick` has something to do."""
-        return self._heartbeat_due
+        return self._tick_due
 
-    def on_demand(self) -> dict[int, Callable[[], Message | None]]:
-        """Return who makes a message that is asked for, by its id."""
-        return {
-            messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION: vehicle_messages.autopilot_version,
-            messages.MAVLINK_MSG_ID_HOME_POSITION: lambda: vehicle_messages.home_position(self.home()),
-            messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
-            messages.MAVLINK_MSG_ID_SYS_STATUS: lambda: vehicle_messages.sys_status(self._session.vehicle),
-        }
+    def answered(self, command: int, now: float) -> None:
+        """The flight controller has answered a poll: pass on what it said."""
+        self._now = now
+        everyone = self._ground.everyone()
+        vehicle = self._session.vehicle
+        for row in _ROWS.get(command, ()):
+            peers = self._rates.take_due(row.msgid, everyone, now)
+            if not peers:
+                continue
+            for make in row.makers:
+                message = make(vehicle, self._boot_ms())
+                if message is not None:
+                    self._ground.multicast(pack(message), peers)
+        if command == Msp.STATUS and self._announced != (vehicle.armed, vehicle.mode):
+            self._heartbeat()
 
     def home(self) -> tuple[int, int] | None:
         """Return where home is, degrees * 1e7."""
         return self._session.vehicle.home_or_position()
 
-    def _every_second(self, now: float) -> None:
+    # What ground stations ask for.
+
+    def send_once(self, station: Station, msgid: int) -> bool | None:
+        """Send one message to who asks for it; False: not enough is known, None: there is no such message."""
+        makers = self._makers(msgid)
+        sent = False
+        for make in makers:
+            message = make()
+            if message is not None:
+                self._ground.to(station, message)
+                sent = True
+        return sent if makers else None
+
+    def set_interval(self, peer: Peer, msgid: int, interval_s: float | None) -> bool:
+        """Send a message to one ground station every so often; None: as by default. False: no such message."""
+        if not self._rates.knows(msgid):
+            return False
+        self._rates.wish(peer, msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
+        self._set_polls(self._ground.everyone())
+        return True
+
+    def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
+        """Do the same with all messages of one of ArduPilot's streams."""
+        for msgid, its_stream in _STREAMS.items():
+            if its_stream == stream or (stream == _ALL_STREAMS and its_stream != NO_STREAM):
+                self.set_interval(peer, msgid, interval_s)
+
+    def interval_s(self, peer: Peer, msgid: int) -> float | None:
+        """Return how often a ground station gets a message at present; infinity: never, None: no such message."""
+        if msgid == messages.MAVLINK_MSG_ID_HEARTBEAT:
+            return _TICK_S
+        if not self._rates.knows(msgid):
+            return None
+        poll = _POLLS.get(msgid)
+        pace_s = _TICK_S if poll is None else self._session.polls.interval_s(poll)
+        return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
+
+    def _set_polls(self, everyone: Sequence[Peer]) -> None:
+        """Poll as often as somebody wants to hear of it."""
+        wanted: dict[Msp, float] = {}
+        for row in TELEMETRY:
+            wanted[row.poll] = min(wanted.get(row.poll, inf), self._rates.fastest_s(row.msgid, everyone))
+        self._session.polls.want(wanted)
+
+    def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:
+        vehicle, boot_ms = self._session.vehicle, self._boot_ms()
+        if msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            return [vehicle_messages.autopilot_version]
+        if msgid == _MISSION_CURRENT:
+            return [self._mission_current]
+        makers = (make for row in TELEMETRY if row.msgid == msgid for make in row.makers)
+        return [partial(make, vehicle, boot_ms) for make in makers]
+
+    def _boot_ms(self) -> int:
+        return int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
+
+    def _heartbeat(self) -> Message:
         vehicle = self._session.vehicle
+        self._announced = vehicle.armed, vehicle.mode
         heartbeat = vehicle_messages.heartbeat(vehicle, linked=self._session.controller is not None)
         self._ground.broadcast(heartbeat)
-        self._ground.introduce(heartbeat)
-        boot_ms = int((now - self._started_at) * 1000) & 0xFFFFFFFF
-        for message in (
-            vehicle_messages.sys_status(vehicle),
-            vehicle_messages.battery_status(vehicle),
-            vehicle_messages.attitude(vehicle, boot_ms),
-            vehicle_messages.gps_raw_int(vehicle, boot_ms),
-            vehicle_messages.global_position_int(vehicle, boot_ms),
-            self._mission_current(),
-            self._changed_home(),
-        ):
-            if message is not None:
-                self._ground.broadcast(message)
+        return heartbeat
 
     def _mission_current(self) -> Message:
         held = self._desk.held
         return vehicle_messages.mission_current(0 if held is None else held.identity.count)
 
-    def _changed_home(self) -> Message | None:
+    def _announce_home(self) -> None:
         """HOME_POSITION whenever it is another one; who asks gets it at any time."""
         home = self.home()
         if home == self._announced_home:
-            return None
-        self._announced_home = home
-        return vehicle_messages.home_position(home)
+            return
+        message = vehicle_messages.home_position(self._session.vehicle, self._boot_ms())
+        if message is not None:
+            self._announced_home = home
+            self._ground.broadcast(message)

@@ -4,16 +4,26 @@ from enum import IntEnum
 
 
 class Msp(IntEnum):
-    """Requests. All of them only read, and their frames hold no hazard byte."""
+    """Questions. They change nothing on the flight controller, and their frames hold no hazard byte."""
 
     API_VERSION = 1
     FC_VARIANT = 2
     IDENT = 100
     STATUS = 101
+    RAW_IMU = 102
     RC = 105
     RAW_GPS = 106
+    COMP_GPS = 107
     ATTITUDE = 108
     ALTITUDE = 109
     ANALOG = 110
     BOXNAMES = 116
     WP = 118
+
+
+class MspAction(IntEnum):
+    """What is done on the ground only: the firmware does not look whether it flies (serial.c)."""
+
+    ACC_CALIBRATION = 205
+    MAG_CALIBRATION = 206
+    EEPROM_WRITE = 250

@@ -5,14 +5,29 @@ Layouts: harakiri.md "Commands answered", inav.md. A payload that is too short g
 
 import struct
 from dataclasses import dataclass
+from enum import IntFlag
 
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
-_RAW_GPS = struct.Struct("<BBiiHH")
+_RAW_IMU = struct.Struct("<9h")
+_RAW_GPS = struct.Struct("<BBiihH")
+_COMP_GPS = struct.Struct("<Hh")
 _ATTITUDE = struct.Struct("<hhh")
 _ALTITUDE = struct.Struct("<ih")
 _ANALOG = struct.Struct("<BHH")
+_AMPERAGE = struct.Struct("<h")
 _WP = struct.Struct("<Bii")
+_MIN_CHANNELS, _MAX_CHANNELS = 4, 18
+
+
+class Sensor(IntFlag):
+    """Bits of MSP_STATUS: what is on board and answers, the same on all firmware."""
+
+    ACCELEROMETER = 1
+    BAROMETER = 2
+    COMPASS = 4
+    GPS = 8
+    SONAR = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,26 +46,51 @@ class StatusReport:
 
     cycle_time_us: int
     i2c_errors: int
-    sensors: int
+    sensors: Sensor
     box_flags: int
 
 
 @dataclass(frozen=True, slots=True)
-class RawGps:
-    """MSP_RAW_GPS: degrees * 1e7, metres above sea level, cm/s; ground course in 0.1 degrees where it is sent."""
+class RawImu:
+    """MSP_RAW_IMU: x, y, z of accelerometer, gyro and compass; every firmware has units of its own."""
 
-    has_fix: bool
+    acc: tuple[int, int, int]
+    gyro: tuple[int, int, int]
+    mag: tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class RawGps:
+    """MSP_RAW_GPS: degrees * 1e7, metres above sea level, cm/s; course in 0.1 degrees and HDOP * 100 where sent.
+
+    `fix` is 0 or 1; INAV's is 0, 1 (two dimensions) or 2 (three).
+    """
+
+    fix: int
     satellites: int
     lat_e7: int
     lon_e7: int
     altitude_m: int
     speed_cms: int
-    course_ddeg: int | None
+    course_ddeg: int | None = None
+    hdop_e2: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class HomeVector:
+    """MSP_COMP_GPS: the way home, in metres and degrees; 0, 0 while there is no home."""
+
+    distance_m: int
+    direction_deg: int
 
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """MSP_ATTITUDE: roll and pitch in 0.1 degrees, heading in degrees (-180..180 on Harakiri)."""
+    """MSP_ATTITUDE: roll and pitch in 0.1 degrees, heading in degrees.
+
+    Right wing down and nose down are positive on all firmware; Harakiri's and baseflight's heading is -180..180, the
+    others' 0..360.
+    """
 
     roll_ddeg: int
     pitch_ddeg: int
@@ -67,11 +107,15 @@ class Altitude:
 
 @dataclass(frozen=True, slots=True)
 class Analog:
-    """MSP_ANALOG: battery in 0.1 V, receiver strength 0..1023."""
+    """MSP_ANALOG: battery in 0.1 V, receiver strength 0..1023; mAh drawn and 0.01 A where the current is sent.
+
+    A sensor that is not there reads 0.
+    """
 
     battery_dv: int
-    power: int
     rssi: int
+    drawn_mah: int | None = None
+    current_ca: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +133,26 @@ def decode_ident(payload: bytes) -> Ident | None:
 
 def decode_status(payload: bytes) -> StatusReport | None:
     """Read MSP_STATUS."""
-    return StatusReport(*_STATUS.unpack_from(payload)[:4]) if len(payload) >= _STATUS.size else None
+    if len(payload) < _STATUS.size:
+        return None
+    cycle_time, i2c_errors, sensors, box_flags, _ = _STATUS.unpack_from(payload)
+    return StatusReport(cycle_time, i2c_errors, Sensor(sensors), box_flags)
+
+
+def decode_raw_imu(payload: bytes) -> RawImu | None:
+    """Read MSP_RAW_IMU."""
+    if len(payload) < _RAW_IMU.size:
+        return None
+    values = _RAW_IMU.unpack_from(payload)
+    return RawImu(values[0:3], values[3:6], values[6:9])
+
+
+def decode_channels(payload: bytes) -> tuple[int, ...] | None:
+    """Read MSP_RC: roll, pitch, yaw, throttle, then what there is of aux, microseconds; at most 18."""
+    count = len(payload) // 2
+    if count < _MIN_CHANNELS:
+        return None
+    return struct.unpack_from(f"<{min(count, _MAX_CHANNELS)}H", payload)
 
 
 def decode_raw_gps(payload: bytes) -> RawGps | None:
@@ -98,7 +161,13 @@ def decode_raw_gps(payload: bytes) -> RawGps | None:
         return None
     fix, satellites, lat, lon, altitude, speed = _RAW_GPS.unpack_from(payload)
     course = int.from_bytes(payload[14:16], "little") if len(payload) >= 16 else None
-    return RawGps(bool(fix), satellites, lat, lon, altitude, speed, course)
+    hdop = int.from_bytes(payload[16:18], "little") if len(payload) >= 18 else None
+    return RawGps(fix, satellites, lat, lon, altitude, speed, course, hdop)
+
+
+def decode_comp_gps(payload: bytes) -> HomeVector | None:
+    """Read MSP_COMP_GPS."""
+    return HomeVector(*_COMP_GPS.unpack_from(payload)) if len(payload) >= _COMP_GPS.size else None
 
 
 def decode_attitude(payload: bytes) -> Attitude | None:
@@ -112,8 +181,14 @@ def decode_altitude(payload: bytes) -> Altitude | None:
 
 
 def decode_analog(payload: bytes) -> Analog | None:
-    """Read MSP_ANALOG."""
-    return Analog(*_ANALOG.unpack_from(payload)) if len(payload) >= _ANALOG.size else None
+    """Read MSP_ANALOG: 5 bytes on Harakiri, whose second field is always 0; 7 elsewhere."""
+    if len(payload) < _ANALOG.size:
+        return None
+    battery, drawn, rssi = _ANALOG.unpack_from(payload)
+    if len(payload) < _ANALOG.size + _AMPERAGE.size:
+        return Analog(battery, rssi)
+    (current,) = _AMPERAGE.unpack_from(payload, _ANALOG.size)
+    return Analog(battery, rssi, drawn, current)
 
 
 def decode_home(payload: bytes) -> HomePoint | None:

@@ -1,0 +1,60 @@
+"""How often each ground station gets which message: its own wishes, else the defaults. Sans-IO."""
+
+from collections.abc import Iterable, Mapping
+from math import inf
+
+from bridge.station import Peer
+
+#: A message that is due within this part of its interval goes out now: what carries it comes at a pace of its own.
+_EARLY = 0.25
+
+
+class MessageRates:
+    """Intervals in seconds; infinity: never. `defaults` names the messages that there are, by their ids."""
+
+    def __init__(self, defaults: Mapping[int, float]) -> None:
+        self._defaults = defaults
+        self._wishes: dict[Peer, dict[int, float]] = {}
+        self._due: dict[tuple[Peer, int], float] = {}
+
+    def knows(self, msgid: int) -> bool:
+        """Tell whether there is such a message."""
+        return msgid in self._defaults
+
+    def wish(self, peer: Peer, msgid: int, interval_s: float | None) -> None:
+        """Note what a ground station wants; None: the default."""
+        self._due.pop((peer, msgid), None)
+        if interval_s is None:
+            self._wishes.get(peer, {}).pop(msgid, None)
+        else:
+            self._wishes.setdefault(peer, {})[msgid] = interval_s
+
+    def interval_s(self, peer: Peer, msgid: int) -> float:
+        """Return what a ground station wants, or the default."""
+        wishes = self._wishes.get(peer)
+        return self._defaults[msgid] if wishes is None else wishes.get(msgid, self._defaults[msgid])
+
+    def fastest_s(self, msgid: int, peers: Iterable[Peer]) -> float:
+        """Return the shortest interval that any of `peers` wants."""
+        return min((self.interval_s(peer, msgid) for peer in peers), default=inf)
+
+    def take_due(self, msgid: int, peers: Iterable[Peer], now: float) -> list[Peer]:
+        """Return those of `peers` to whom the message is to be sent now; the next time counts from here."""
+        taken = []
+        for peer in peers:
+            interval_s = self.interval_s(peer, msgid)
+            due, early_s = self._due.get((peer, msgid), -inf), interval_s * _EARLY
+            if interval_s == inf or now < due - early_s:
+                continue
+            # On from when it was due, so that the rate is kept; but what was missed is not made up for.
+            self._due[peer, msgid] = (due if now <= due + early_s else now) + interval_s
+            taken.append(peer)
+        return taken
+
+    def keep(self, peers: Iterable[Peer]) -> None:
+        """Forget who is none of `peers`."""
+        present = set(peers)
+        for peer in [peer for peer in self._wishes if peer not in present]:
+            del self._wishes[peer]
+        for key in [key for key in self._due if key[0] not in present]:
+            del self._due[key]

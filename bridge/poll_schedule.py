@@ -1,0 +1,210 @@
+"""Which telemetry question is asked when. Sans-IO.
+
+Each poll has an interval at which it is wanted: what ground stations asked for, or what the bridge itself needs. The
+line bends these intervals: questions and replies together may take a share of its bytes (missions and commands have
+the rest), and lost replies slow all polls down until they come again. A question is asked again only when its reply
+has come or is given up, so a long round trip slows the fast ones down by itself.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+
+from bridge.msp_link import MspLink
+from bridge.procedure import Send
+from protocols.msp.commands import Msp
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, request
+
+#: What telemetry may take of the line, both directions added.
+_LINE_SHARE = 0.6
+#: What STATUS gets of that, if it needs it: arming must be noticed at any speed.
+_STATUS_SHARE = 0.25
+#: A line without a speed (TCP) has an UART behind it somewhere: Harakiri's default.
+_ASSUMED_BAUD = 115200
+#: While a mission is under way telemetry goes on at this part of its rates.
+_BESIDE_MISSIONS = 0.2
+#: No poll is slowed down beyond this.
+_SLOWEST_S = 5.0
+#: Questions that are due within so short a time go out together: each wake-up has its price.
+_GATHER_S = 0.01
+#: A lost reply costs a tenth of the rates, each one that comes gives a little back: 1 % lost changes nothing, 10 % cost
+#: half the rates.
+_LOSS_FACTOR = 0.9
+_RECOVERY = 0.005
+_WORST_QUALITY = 0.1
+#: So many unanswered questions in a row, while others are answered, are no bad luck: then it is asked less and less.
+_PATIENCE = 4
+#: So many error frames in a row say that the flight controller does not know the command: one may be line noise.
+_REFUSALS = 2
+_MAX_DOUBLINGS = 6
+_HALVINGS = 12
+_LEAST_SCALE = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Poll:
+    """One telemetry question: its frame, the longest reply's payload, and the interval that the bridge itself needs."""
+
+    command: Msp
+    frame: bytes
+    reply_payload: int
+    needed_s: float
+
+
+#: STATUS comes most often: arming must be noticed while a mission transfer runs.
+POLLS = (
+    Poll(Msp.STATUS, request(Msp.STATUS), 11, 0.25),
+    Poll(Msp.ATTITUDE, request(Msp.ATTITUDE), 8, 1.0),
+    Poll(Msp.RAW_GPS, request(Msp.RAW_GPS), 18, 1.0),
+    Poll(Msp.ALTITUDE, request(Msp.ALTITUDE), 10, 1.0),
+    Poll(Msp.ANALOG, request(Msp.ANALOG), 9, 1.0),
+    Poll(Msp.RC, request(Msp.RC), 68, 1.0),
+    Poll(Msp.COMP_GPS, request(Msp.COMP_GPS), 5, 5.0),
+    Poll(Msp.WP, request(Msp.WP, b"\0"), 21, 2.0),
+    Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
+)
+
+
+@dataclass(slots=True)
+class _Slot:
+    """One poll's place in the schedule. `size`: bytes of its reply, guessed until one was seen."""
+
+    poll: Poll
+    commands: frozenset[int]
+    size: int
+    wanted_s: float = inf
+    interval_s: float = inf
+    asked_at: float = -inf
+    is_asked: bool = False
+    misses: int = 0
+    refusals: int = 0
+
+    @property
+    def cost(self) -> int:
+        """Bytes of a question and its reply."""
+        return len(self.poll.frame) + self.size
+
+    @property
+    def due(self) -> float:
+        """When it is to be asked next."""
+        return inf if self.interval_s == inf else self.asked_at + self.interval_s
+
+
+class PollSchedule:
+    """The schedule of one line: `begin` when a flight controller is found, then `ask` whenever time has passed."""
+
+    def __init__(self) -> None:
+        self._wanted: Mapping[Msp, float] = {}
+        self._slots: dict[int, _Slot] = {}
+        self._budget = 0.0
+        self._line_scale = 1.0
+        self._quality = 1.0
+        self._lost_before = 0
+        self._beside_missions = False
+
+    @property
+    def quality(self) -> float:
+        """What losses leave of the rates, 0.1..1."""
+        return self._quality
+
+    def begin(self, baud: int | None) -> None:
+        """A flight controller is there: ask it everything once, then as often as wanted."""
+        self._budget = (baud or _ASSUMED_BAUD) / 10 * _LINE_SHARE
+        self._quality = 1.0
+        self._lost_before = 0
+        self._slots = {
+            poll.command: _Slot(poll, frozenset((poll.command,)), poll.reply_payload + FRAME_OVERHEAD) for poll in POLLS
+        }
+        self._fit()
+
+    def want(self, wanted: Mapping[Msp, float]) -> None:
+        """Set what ground stations want, seconds by command; the bridge's own needs are added."""
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self._fit()
+
+    def interval_s(self, command: Msp) -> float | None:
+        """Return how often it is asked at present; None: not at all."""
+        slot = self._slots.get(command)
+        return None if slot is None or slot.interval_s == inf else slot.interval_s
+
+    def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
+        """Send what is due, as long as the link has room for it."""
+        self._look_at(link, beside_missions)
+        limit = now
+        while True:
+            ready = [slot for slot in self._slots.values() if slot.due <= limit and _may_ask(slot, link)]
+            if not ready:
+                return
+            slot = max(ready, key=lambda slot: (now - slot.asked_at) / slot.interval_s)
+            if slot.is_asked:
+                slot.misses += 1
+                self._bend()
+            slot.is_asked = True
+            slot.asked_at = now if now >= slot.due + slot.interval_s else slot.due
+            link.send(Send(slot.poll.frame, slot.poll.command, slot.size), now)
+            limit = now + _GATHER_S
+
+    def answered(self, frame: MspFrame) -> None:
+        """Take note of a reply."""
+        slot = self._slots.get(frame.command)
+        if slot is None:
+            return
+        slot.is_asked = False
+        is_bent = slot.misses > _PATIENCE or self._quality < 1
+        slot.misses = 0
+        self._quality = min(self._quality + _RECOVERY, 1.0)
+        known = slot.size, slot.refusals
+        if frame.direction is Direction.ERROR:
+            slot.refusals += 1
+        else:
+            slot.size, slot.refusals = len(frame.payload) + FRAME_OVERHEAD, 0
+        if known != (slot.size, slot.refusals):
+            self._fit()
+        elif is_bent:
+            self._bend()
+
+    def next_deadline(self, link: MspLink) -> float | None:
+        """Return when `ask` has something to send; None: not before a reply."""
+        due = min((slot.due for slot in self._slots.values() if _may_ask(slot, link)), default=inf)
+        return None if due == inf else due
+
+    def _look_at(self, link: MspLink, beside_missions: bool) -> None:
+        lost, self._lost_before = link.requests_lost - self._lost_before, link.requests_lost
+        if lost or beside_missions != self._beside_missions:
+            self._quality = max(self._quality * _LOSS_FACTOR**lost, _WORST_QUALITY)
+            self._beside_missions = beside_missions
+            self._bend()
+
+    def _fit(self) -> None:
+        """Find the part of the wanted rates that the line bears."""
+        for slot in self._slots.values():
+            wanted_s = min(self._wanted.get(slot.poll.command, inf), slot.poll.needed_s)
+            slot.wanted_s = wanted_s if slot.refusals < _REFUSALS else inf
+        self._line_scale = 1.0
+        if self._bytes_per_s(1.0) > self._budget:
+            step, self._line_scale = 0.5, _LEAST_SCALE
+            for _ in range(_HALVINGS):
+                if self._bytes_per_s(self._line_scale + step) <= self._budget:
+                    self._line_scale += step
+                step /= 2
+        self._bend()
+
+    def _bytes_per_s(self, scale: float) -> float:
+        return sum(slot.cost / self._interval(slot, scale) for slot in self._slots.values())
+
+    def _bend(self) -> None:
+        """Set the intervals."""
+        scale = self._line_scale * self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
+        for slot in self._slots.values():
+            slot.interval_s = self._interval(slot, scale)
+
+    def _interval(self, slot: _Slot, scale: float) -> float:
+        is_status = slot.poll.command is Msp.STATUS
+        slowest = slot.cost / (self._budget * _STATUS_SHARE) if is_status else _SLOWEST_S
+        patience = 2.0 ** min(max(slot.misses - _PATIENCE, 0), _MAX_DOUBLINGS)
+        return min(slot.wanted_s / scale * patience, max(slot.wanted_s, slowest))
+
+
+def _may_ask(slot: _Slot, link: MspLink) -> bool:
+    return link.may_send(slot.size) and not (slot.is_asked and link.awaits(slot.commands))
