@@ -1,0 +1,65 @@
+"""Missions as plain data: on the control socket and in what --json prints."""
+
+import json
+import math
+from typing import Any
+
+from protocols.mission_item import MissionItem
+
+Json = dict[str, Any]
+
+_WHOLE = {"seq": 65535, "command": 65535, "frame": 255}
+_NUMBERS = ("p1", "p2", "p3", "p4", "alt_m")
+
+
+def to_json(value: object) -> str:
+    """Return one line of JSON as every language reads it: "not given" (NaN) is null, an infinite number a string."""
+    return json.dumps(_strict(value), allow_nan=False)
+
+
+def mission_items(data: object) -> list[MissionItem]:
+    """Return the items of a list that came as plain data; ValueError says what is wrong with it."""
+    if not isinstance(data, list):
+        raise ValueError("items must be a list")
+    return [_item(entry) for entry in data]
+
+
+def whole_number(data: Json, key: str, least: int, most: int) -> int:
+    """Return data[key]; ValueError if it is no whole number from `least` to `most`."""
+    value = data.get(key)
+    if type(value) is not int or not least <= value <= most:
+        raise ValueError(f"{key} must be a whole number from {least} to {most}")
+    return value
+
+
+def _item(entry: object) -> MissionItem:
+    if not isinstance(entry, dict):
+        raise ValueError("an item must be an object")
+    whole = {key: whole_number(entry, key, 0, most) for key, most in _WHOLE.items()}
+    numbers = {key: _number(entry, key) for key in _NUMBERS}
+    return MissionItem(**whole, **numbers, lat_e7=_place(entry, "lat_e7"), lon_e7=_place(entry, "lon_e7"))
+
+
+def _number(entry: Json, key: str) -> float:
+    value = entry.get(key)
+    try:
+        return math.nan if value is None else float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{key} must be a number, or null if it is not given") from None
+
+
+def _place(entry: Json, key: str) -> int | None:
+    value = entry.get(key)
+    if value is None or (type(value) is int and math.isfinite(_number(entry, key))):
+        return value
+    raise ValueError(f"{key} must be degrees * 1e7, or null if it is not given")
+
+
+def _strict(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _strict(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_strict(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value

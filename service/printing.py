@@ -1,0 +1,23 @@
+"""What commands print: tables that end where their text ends, and strict JSON."""
+
+import re
+
+import click
+from rich.console import Console, RenderableType
+
+from service.mission_data import to_json
+
+_BLANK_END = re.compile(r"(?: |\x1b\[[\d;]*m)+$", re.MULTILINE)
+
+
+def print_table(table: RenderableType) -> None:
+    """Print a table as wide as the terminal lets it, 80 columns into a file; no blanks at the ends of lines."""
+    console = Console(highlight=False)
+    with console.capture() as capture:
+        console.print(table)
+    click.echo(_BLANK_END.sub(lambda end: end[0].replace(" ", ""), capture.get()), nl=False)
+
+
+def print_json(value: object) -> None:
+    """Print one line of JSON."""
+    click.echo(to_json(value))

@@ -1,0 +1,117 @@
+"""The daemon's control socket: what is wrong with a request is said, and nothing ends the daemon but a signal."""
+
+import json
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from plan import plain_plan
+from programs import Daemon, run_naze_bridge, until
+
+ITEM = {"seq": 0, "command": 16, "frame": 3, "p1": 0, "p2": 0, "p3": 0, "p4": 0, "lat_e7": 1, "lon_e7": 1, "alt_m": 1}
+
+
+def push(**changes: object) -> bytes:
+    return json.dumps({"do": "push", "source": "test", "items": [ITEM | changes]}).encode()
+
+
+BAD_REQUESTS = {
+    "nothing": b"",
+    "no JSON": b"status",
+    "no text": b"\xff\xfe\x00",
+    "no object": b"[]",
+    "a number": b"12",
+    "nothing to do": b"{}",
+    "nothing known": b'{"do": "arm"}',
+    "no word": b'{"do": ["status"]}',
+    "a huge number": b'{"do": "mission", "number": 99999999999999999999}',
+    "an infinite number": b'{"do": "mission", "number": 1e999}',
+    "no number": b'{"do": "missions", "limit": "all"}',
+    "less than nothing": b'{"do": "missions", "limit": -1}',
+    "digits without end": b'{"do": "mission", "number": %b}' % (b"9" * 5000),
+    "brackets without end": b"[" * 100_000,
+    "a line without end": b" " * (2 << 20),
+    "no items": b'{"do": "push", "source": "test"}',
+    "items of nothing": b'{"do": "push", "source": "test", "items": [[]]}',
+    "half an item": b'{"do": "push", "source": "test", "items": [{"seq": 0}]}',
+    "a parameter in words": push(p1="much"),
+    "a parameter beyond all numbers": push(p1=10**400),
+    "a place in words": push(lat_e7="here"),
+    "a place beyond all numbers": push(lat_e7=10**400),
+    "a command that is none": push(command=-1),
+}
+
+
+def say(daemon: Daemon, line: bytes) -> dict[str, object]:
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(str(daemon.state_dir / "control.sock"))
+        connection.sendall(line + b"\n")
+        connection.shutdown(socket.SHUT_WR)
+        answer: dict[str, object] = json.loads(connection.makefile().readline())
+        return answer
+
+
+def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    daemon.push(plain_plan(5))
+    held = daemon.held()
+    for name, line in BAD_REQUESTS.items():
+        answer = say(daemon, line)
+        assert list(answer) == ["error"], name
+        assert len(str(answer["error"])) < 200, name
+    assert daemon.held() == held
+    daemon.push(plain_plan(6))
+    assert daemon.end() == 0
+    assert "Traceback" not in daemon.printed
+
+
+def test_a_client_that_hangs_up_before_its_answer_does_no_harm(start: Starter) -> None:
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    for line in (b'{"do": "pull"}\n', b'{"do": "missions", "limit": 5}\n', b'{"do":'):
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(daemon.state_dir / "control.sock"))
+            connection.sendall(line)
+    daemon.push(plain_plan(5))
+    assert daemon.end() == 0
+    assert "Traceback" not in daemon.printed
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stop_is_told_to_who_waits(start: Starter, number: signal.Signals) -> None:
+    """One client has said nothing yet, another waits for a push to a flight controller that hangs."""
+    bench = start.bench()
+    daemon = bench.daemon
+    with socket.socket(socket.AF_UNIX) as idle, socket.socket(socket.AF_UNIX) as pushing:
+        for connection in (idle, pushing):
+            connection.connect(str(daemon.state_dir / "control.sock"))
+        bench.board.set("hang 1")
+        pushing.sendall(push() + b"\n")
+        assert daemon.status() is not None  # it was accepted after the push: that has begun
+        assert daemon.end(number) == 0
+        assert "was stopped" in json.loads(pushing.makefile().readline())["error"]
+    assert "Traceback" not in daemon.printed
+    assert not (daemon.state_dir / "control.sock").exists()
+
+
+def test_a_path_that_is_too_long_for_a_socket(tmp_path: Path) -> None:
+    state = tmp_path / ("long" * 30)
+    ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", "udpout:127.0.0.1:9", "--state-dir", state)
+    assert ended.returncode == 1
+    (sentence,) = [line for line in ended.stderr.splitlines() if not line.startswith("{")]
+    assert sentence.startswith("naze-bridge: the control socket ")
+    assert str(state) in sentence
+
+
+def test_what_the_command_line_does_is_logged(start: Starter) -> None:
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    daemon.push(plain_plan(5))
+    event = until(lambda: daemon.has_logged("mission.push_ended"), "a word about the push")
+    assert (event["source"], event["ack"], event["mission"]) == ("test", "ACCEPTED", 1)
+    assert event["detail"] == "Mission verified: 5 records"
+    daemon.clears()
+    until(lambda: len([one for one in daemon.events() if one["event"] == "mission.push_ended"]) == 2, "and the clear")
