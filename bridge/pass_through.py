@@ -11,7 +11,7 @@ from bridge.ground import Ground
 from bridge.station import Peer
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.target import target_of
+from protocols.mavlink.target import is_for_all, target_of
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
@@ -29,21 +29,17 @@ class PassThrough:
 
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
         """Send the autopilot's frames on."""
+        self._aboard.add(frames[0].sysid)
         for_all: list[bytes] = []
-        tap = self._ground.tap
         for frame in frames:
-            self._aboard.add(frame.sysid)
-            if frame.msgid == _NEVER_FORWARDED:
-                continue
-            tap(frame.raw)
-            system, component = target_of(frame)
-            if system == 0:
-                for_all.append(frame.raw)
+            raw = frame.raw
+            if is_for_all(raw):
+                for_all.append(raw)
                 continue
             # In order: what came before goes first.
             self._send(for_all)
             for_all = []
-            self._ground.forward([frame.raw], self._peers_of(system, component))
+            self._send_addressed(frame)
         self._send(for_all)
 
     def from_station(self, peer: Peer, frame: MavlinkFrame) -> bool:
@@ -71,8 +67,20 @@ class PassThrough:
                 found |= peers
         return [peer for peer in self._ground.peers() if peer in found]
 
+    def _send_addressed(self, frame: MavlinkFrame) -> None:
+        self._aboard.add(frame.sysid)
+        if frame.msgid == _NEVER_FORWARDED:
+            return
+        system, component = target_of(frame)
+        if system == 0:
+            self._send([frame.raw])
+            return
+        self._ground.tap([frame.raw])
+        self._ground.forward([frame.raw], self._peers_of(system, component))
+
     def _send(self, frames: list[bytes]) -> None:
         if frames:
+            self._ground.tap(frames)
             self._ground.forward(in_datagrams(frames), self._ground.everyone())
 
 

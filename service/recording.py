@@ -1,6 +1,6 @@
 """What a daemon records of itself: telemetry logs always, the UART if it is asked to."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from bridge.ground import Tap
 from service.connection import FcAddress
@@ -14,7 +14,7 @@ TLOG_FOLDER = "logs"
 
 
 class Recording:
-    """Holds what `settings` ask for. UartFileError if the UART cannot be recorded. `tap` takes each MAVLink frame."""
+    """Holds what `settings` ask for. UartFileError if the UART cannot be recorded. `tap` takes MAVLink frames."""
 
     def __init__(self, settings: Settings) -> None:
         self._uart = None if settings.record_uart is None else UartRecorder(settings.record_uart)
@@ -43,5 +43,5 @@ class Recording:
             self._tlog.close()
 
 
-def _nothing(_frame: bytes) -> None:
+def _nothing(_frames: Sequence[bytes]) -> None:
     """Record nothing."""

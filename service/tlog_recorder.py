@@ -1,6 +1,7 @@
 """Writes what ground stations hear and say into telemetry logs."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from protocols.tlog import tlog_record
@@ -21,11 +22,12 @@ class TlogRecorder:
         self._file_is_over = False
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
 
-    def tap(self, frame: bytes) -> None:
-        """Record a whole frame that was sent or received just now."""
+    def tap(self, frames: Sequence[bytes]) -> None:
+        """Record whole frames that were sent or received just now."""
         now_us = time.monotonic_ns() // 1000
         with self._writer.lock:
-            self._writer.put(tlog_record(frame, self._epoch_us + now_us))
+            at_us = self._epoch_us + now_us
+            self._writer.put(b"".join([tlog_record(frame, at_us) for frame in frames]))
 
     def close(self) -> None:
         """Write what is left."""

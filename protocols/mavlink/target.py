@@ -16,6 +16,11 @@ _PLACES = {
 }
 
 
+def is_for_all(raw: bytes) -> bool:
+    """Tell of a whole frame's bytes whether its message has no target at all, as telemetry has none."""
+    return (raw[7:10] if raw[0] == MAGIC_V2 else raw[5:6]) not in _PLACES
+
+
 def target_of(frame: MavlinkFrame) -> tuple[int, int]:
     """Return the system and the component that a frame is meant for.
 
