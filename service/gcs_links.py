@@ -10,12 +10,14 @@ import structlog
 
 from bridge.station import Peer
 from service.connection import GcsAddress
+from service.send_queue import SendQueue
 
 _DATAGRAM_SIZE = 2048
 #: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.
 _DATAGRAMS_AT_ONCE = 64
-#: What a stalled TCP client may leave unread; then frames for it are dropped.
+#: What a stalled TCP client may leave unread; then telemetry for it is dropped, the oldest first.
 _MAX_UNSENT = 65536
+_KERNEL_BUFFER = 32768
 
 _log = structlog.get_logger()
 
@@ -148,6 +150,8 @@ class TcpLink:
             return
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # The kernel would keep minutes of old telemetry for who does not read.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
         peer = Peer(self.name, sender)
         # A TCP client hears the vehicle from the start: it may wait for a heartbeat before it speaks.
         self._events.add_default_peer(peer)
@@ -177,18 +181,20 @@ class _TcpClient:
         self._loop = loop
         self._received = received
         self._gone = gone
-        self._unsent = bytearray()
+        self._unsent = SendQueue(_MAX_UNSENT)
         loop.add_reader(connection.fileno(), self._readable)
 
     def send(self, data: bytes) -> None:
-        if len(self._unsent) + len(data) > _MAX_UNSENT:
+        if self._unsent:
+            if not self._unsent.add(data):
+                # It has not read so many answers that it can make no sense of the next one.
+                self.close()
             return
-        waiting = bool(self._unsent)
-        self._unsent += data
-        if not waiting:
-            self._writable()
-            if self._unsent:
-                self._loop.add_writer(self._socket.fileno(), self._writable)
+        sent = self._try_send(memoryview(data))
+        if sent < len(data) and self._socket.fileno() >= 0:
+            self._unsent.add(data)
+            self._unsent.sent(sent)
+            self._loop.add_writer(self._socket.fileno(), self._writable)
 
     def close(self) -> None:
         if self._socket.fileno() < 0:
@@ -196,20 +202,28 @@ class _TcpClient:
         self._loop.remove_reader(self._socket.fileno())
         self._loop.remove_writer(self._socket.fileno())
         self._socket.close()
-        self._unsent.clear()
+        self._unsent = SendQueue(_MAX_UNSENT)
         self._gone()
 
     def _writable(self) -> None:
+        while self._unsent:
+            first = self._unsent.first()
+            sent = self._try_send(first)
+            if self._socket.fileno() < 0:
+                return
+            if sent == 0:
+                return
+            self._unsent.sent(sent)
+        self._loop.remove_writer(self._socket.fileno())
+
+    def _try_send(self, data: memoryview) -> int:
         try:
-            sent = self._socket.send(self._unsent)
-        except BlockingIOError:
-            return
+            return self._socket.send(data)
+        except (BlockingIOError, InterruptedError):
+            return 0
         except OSError:
             self.close()
-            return
-        del self._unsent[:sent]
-        if not self._unsent:
-            self._loop.remove_writer(self._socket.fileno())
+            return 0
 
     def _readable(self) -> None:
         try:

@@ -1,0 +1,92 @@
+"""TCP clients that stop reading cost nobody anything, and find what matters when they read again."""
+
+import asyncio
+import socket
+
+from bridge.station import Peer
+from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from service.connection import GcsAddress
+from service.gcs_links import TcpLink
+
+
+class Listener:
+    """Notes what the link tells."""
+
+    def __init__(self) -> None:
+        self.peers: list[Peer] = []
+        self.came = asyncio.Event()
+
+    def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
+        raise AssertionError("nobody speaks here")
+
+    def gcs_gone(self, peer: Peer) -> None:
+        """The connection is closed."""
+
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
+        self.peers.append(peer)
+        self.came.set()
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        self.peers.remove(peer)
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+async def connected(listener: Listener, link: TcpLink, port: int) -> tuple[socket.socket, Peer]:
+    client = socket.socket()
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    client.setblocking(False)
+    listener.came.clear()
+    await asyncio.get_running_loop().sock_connect(client, ("127.0.0.1", port))
+    await listener.came.wait()
+    return client, listener.peers[-1]
+
+
+async def read(client: socket.socket, quiet_s: float = 0.3) -> list[MavlinkFrame]:
+    """Read until nothing comes any more; all of it must be whole frames."""
+    loop, data = asyncio.get_running_loop(), b""
+    while True:
+        try:
+            piece = await asyncio.wait_for(loop.sock_recv(client, 65536), quiet_s)
+        except TimeoutError:
+            break
+        if not piece:
+            break
+        data += piece
+    frames = MavlinkSplitter().feed(data)
+    assert b"".join(frame.raw for frame in frames) == data
+    return frames
+
+
+async def test_a_stalled_client_loses_old_telemetry_and_nothing_else() -> None:
+    listener, port = Listener(), free_port()
+    link = TcpLink(GcsAddress("tcpin", "127.0.0.1", port), listener)
+    stalled, stalled_peer = await connected(listener, link, port)
+    reading, reading_peer = await connected(listener, link, port)
+    writer = FrameWriter(1, 1)
+    heard: list[MavlinkFrame] = []
+    count = 20000
+    for number in range(count):
+        frame = writer.frame(pack(m.MAVLink_attitude_message(number, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)), 2)
+        for peer in (stalled_peer, reading_peer):
+            link.send(peer, frame)
+        if number % 500 == 0:
+            ack = writer.frame(pack(m.MAVLink_mission_request_message(255, 190, number // 500, 0)), 2)
+            link.send(stalled_peer, ack)
+            heard += await read(reading, 0.02)
+    heard += await read(reading)
+    assert len(heard) == count
+    late = await read(stalled)
+    assert [f.payload[0] for f in late if f.msgid == m.MAVLINK_MSG_ID_MISSION_REQUEST] == list(range(count // 500))
+    attitudes = [int.from_bytes(f.payload[:4], "little") for f in late if f.msgid == m.MAVLINK_MSG_ID_ATTITUDE]
+    assert attitudes == sorted(attitudes)
+    assert attitudes[-1] == count - 1
+    assert len(attitudes) < count / 2
+    link.close()
+    stalled.close()
+    reading.close()
