@@ -1,6 +1,7 @@
 """Messages from frames and frames from messages, for the messages that the bridge itself reads or writes."""
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from fastcrc.crc16 import mcrf4xx
@@ -8,6 +9,7 @@ from fastcrc.crc16 import mcrf4xx
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame
 
+_SIGNED = 0x01
 _HEADER_V2 = 10
 _CRC_SIZE = 2
 #: MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them all the
@@ -68,12 +70,14 @@ def pack(message: Message) -> Packed:
 class FrameWriter:
     """Makes the frames of one sender to one receiver.
 
-    Each receiver has a sequence number of its own: ground stations show gaps in it as a bad link.
+    Each receiver has a sequence number of its own: ground stations show gaps in it as a bad link. `sign` returns the
+    signature of a MAVLink 2 frame; MAVLink 1 has none.
     """
 
-    def __init__(self, sysid: int, compid: int) -> None:
+    def __init__(self, sysid: int, compid: int, sign: Callable[[bytes], bytes] | None = None) -> None:
         self._sysid = sysid
         self._compid = compid
+        self._sign = sign
         self._seq = 0
 
     def frame(self, packed: Packed, version: int) -> bytes:
@@ -85,7 +89,10 @@ class FrameWriter:
             body = bytes((len(payload), seq, self._sysid, self._compid, msgid)) + payload
         else:
             magic, payload = MAGIC_V2, packed.payload_v2
-            header = (len(payload), 0, 0, seq, self._sysid, self._compid, msgid & 0xFF, msgid >> 8 & 0xFF, msgid >> 16)
-            body = bytes(header) + payload
+            flags = 0 if self._sign is None else _SIGNED
+            body = (
+                bytes((len(payload), flags, 0, seq, self._sysid, self._compid)) + msgid.to_bytes(3, "little") + payload
+            )
         crc = mcrf4xx(body + bytes((CRC_EXTRA[msgid],)))
-        return bytes((magic,)) + body + crc.to_bytes(_CRC_SIZE, "little")
+        frame = bytes((magic,)) + body + crc.to_bytes(_CRC_SIZE, "little")
+        return frame if self._sign is None or version == 1 else frame + self._sign(frame)

@@ -1,0 +1,107 @@
+"""MAVLink 2 message signing (https://mavlink.io/en/guide/message_signing.html).
+
+A signed frame ends in 13 bytes: a link id, a timestamp of 48 bits in 10 us since 2015-01-01, and the first 6 bytes of
+the SHA-256 of key, frame, link id and timestamp. It tells who sent a frame and that it is new; it hides nothing.
+"""
+
+from collections.abc import Callable
+from enum import Enum
+from hashlib import sha256
+from hmac import compare_digest
+
+from protocols.mavlink.frame import MavlinkFrame
+
+TICKS_PER_S = 100_000
+#: 2015-01-01 in seconds since the Unix epoch.
+EPOCH_UNIX_S = 1_420_070_400
+#: What a stream that was not heard before may lag behind us.
+TOLERANCE = 60 * TICKS_PER_S
+_MAX_TIMESTAMP = (1 << 48) - 1
+_TIMESTAMP_SIZE = 6
+_DIGEST_SIZE = 6
+_SIGNATURE_SIZE = 1 + _TIMESTAMP_SIZE + _DIGEST_SIZE
+
+#: Who numbers its timestamps: sysid, compid, link id.
+Stream = tuple[int, int, int]
+
+
+def key_from_passphrase(passphrase: str) -> bytes:
+    """Return the key of 32 bytes that Mission Planner and MAVProxy make of a passphrase."""
+    return sha256(passphrase.encode()).digest()
+
+
+def ticks(unix_s: float) -> int:
+    """Return a time in seconds since the Unix epoch as a timestamp; 0 for what was before 2015."""
+    return max(0, int((unix_s - EPOCH_UNIX_S) * TICKS_PER_S))
+
+
+class Timestamps:
+    """What we sign with: the time, but never the same twice and never back, whatever the clock does.
+
+    `clock` returns seconds since the Unix epoch. `at_least`: the last one of an earlier run.
+    """
+
+    def __init__(self, clock: Callable[[], float], at_least: int = 0) -> None:
+        self._clock = clock
+        self.last = min(at_least, _MAX_TIMESTAMP)
+
+    def now(self) -> int:
+        """Return the present timestamp, without using it up."""
+        return max(self.last, ticks(self._clock()))
+
+    def take(self) -> int:
+        """Return the timestamp for the next frame."""
+        self.last = min(max(self.last + 1, ticks(self._clock())), _MAX_TIMESTAMP)
+        return self.last
+
+    def follow(self, timestamp: int) -> None:
+        """Take over the time of somebody who has the key, and a clock that is ahead of ours."""
+        self.last = max(self.last, timestamp)
+
+
+class Check(Enum):
+    """What a frame's signature is worth. The value is how the log says it."""
+
+    VALID = "signed"
+    UNSIGNED = "not signed"
+    WRONG = "signed with another key"
+    REPLAYED = "signed with a timestamp that was used before"
+    LATE = "signed with a timestamp more than a minute behind ours"
+
+
+class Signing:
+    """One key, and the timestamps that were used with it. Whoever shares the key shares this."""
+
+    def __init__(self, key: bytes, timestamps: Timestamps) -> None:
+        self._key = key
+        self._timestamps = timestamps
+        self._heard: set[Stream] = set()
+        #: The last timestamp of each stream. Those of an earlier run may be put in before the first frame.
+        self.streams: dict[Stream, int] = {}
+
+    def signature(self, frame: bytes, link_id: int) -> bytes:
+        """Return the 13 bytes that end a MAVLink 2 frame whose flags say that it is signed."""
+        stamp = bytes((link_id,)) + self._timestamps.take().to_bytes(_TIMESTAMP_SIZE, "little")
+        return stamp + self._digest(frame + stamp)
+
+    def check(self, frame: MavlinkFrame) -> Check:
+        """Check a signature. One that is valid is so only once."""
+        if not frame.is_signed:
+            return Check.UNSIGNED
+        raw = frame.raw
+        if not compare_digest(self._digest(raw[:-_DIGEST_SIZE]), raw[-_DIGEST_SIZE:]):
+            return Check.WRONG
+        stream = frame.sysid, frame.compid, raw[-_SIGNATURE_SIZE]
+        timestamp = int.from_bytes(raw[-_SIGNATURE_SIZE + 1 : -_DIGEST_SIZE], "little")
+        if timestamp <= self.streams.get(stream, -1):
+            return Check.REPLAYED
+        # A stream of an earlier run is held to both rules: it may have been recorded while we were off.
+        if stream not in self._heard and timestamp + TOLERANCE < self._timestamps.now():
+            return Check.LATE
+        self._heard.add(stream)
+        self.streams[stream] = timestamp
+        self._timestamps.follow(timestamp)
+        return Check.VALID
+
+    def _digest(self, signed: bytes) -> bytes:
+        return sha256(self._key + signed).digest()[:_DIGEST_SIZE]

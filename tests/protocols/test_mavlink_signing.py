@@ -1,0 +1,165 @@
+"""Signing against pymavlink's, both ways, and the rules for timestamps."""
+
+from datetime import UTC, datetime
+from hashlib import sha256
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Timestamps, key_from_passphrase, ticks
+
+KEY = key_from_passphrase("a passphrase")
+#: A moment in 2026, in seconds since the Unix epoch.
+NOON = 1_795_262_400.0
+HEARTBEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+def pymavlink_side(key: bytes = KEY, timestamp: int = ticks(NOON), link_id: int = 7) -> mavlink.MAVLink:
+    side = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    side.robust_parsing = False
+    side.signing.secret_key = key
+    side.signing.sign_outgoing = True
+    side.signing.link_id = link_id
+    side.signing.timestamp = timestamp
+    return side
+
+
+def our_side(unix_s: float = NOON, at_least: int = 0) -> Signing:
+    return Signing(KEY, Timestamps(lambda: unix_s, at_least))
+
+
+def frame_of(side: mavlink.MAVLink, message: mavlink.MAVLink_message = HEARTBEAT) -> MavlinkFrame:
+    return MavlinkFrame(bytes(message.pack(side)))
+
+
+def test_the_key_is_what_mission_planner_makes_of_a_passphrase() -> None:
+    assert key_from_passphrase("grüezi") == sha256("grüezi".encode()).digest()
+
+
+def test_timestamps_count_10_us_since_2015() -> None:
+    assert ticks(datetime(2015, 1, 1, tzinfo=UTC).timestamp()) == 0
+    assert ticks(datetime(2015, 1, 1, 0, 1, tzinfo=UTC).timestamp()) == 60 * TICKS_PER_S
+    # A Pi that has no clock starts in 1970.
+    assert ticks(0.0) == 0
+
+
+@pytest.mark.parametrize("link_id", [0, 3, 255])
+def test_pymavlink_takes_what_we_sign(link_id: int) -> None:
+    signing = our_side()
+    writer = FrameWriter(1, 1, lambda frame: signing.signature(frame, link_id))
+    receiver = pymavlink_side()
+    for count in range(300):
+        sent = mavlink.MAVLink_statustext_message(6, b"x" * (count % 50))
+        (message,) = receiver.parse_buffer(writer.frame(pack(sent), 2))
+        assert message.text == "x" * (count % 50)
+        assert message.get_signed()
+        assert message.get_link_id() == link_id
+    assert receiver.signing.badsig_count == 0
+    stranger = pymavlink_side(sha256(b"another").digest())
+    with pytest.raises(mavlink.MAVError):
+        stranger.parse_buffer(writer.frame(pack(HEARTBEAT), 2))
+
+
+def test_a_mavlink_1_frame_is_never_signed() -> None:
+    signing = our_side()
+    signed = FrameWriter(1, 1, lambda frame: signing.signature(frame, 0))
+    assert signed.frame(pack(HEARTBEAT), 1) == FrameWriter(1, 1).frame(pack(HEARTBEAT), 1)
+
+
+def test_we_take_what_pymavlink_signs() -> None:
+    signing = our_side()
+    side = pymavlink_side()
+    data = b"".join(frame_of(side, mavlink.MAVLink_ping_message(n, n, 1, 1)).raw for n in range(300))
+    frames = MavlinkSplitter().feed(data)
+    assert len(frames) == 300
+    assert {signing.check(frame) for frame in frames} == {Check.VALID}
+    # None of them is worth anything a second time.
+    assert {signing.check(frame) for frame in frames} == {Check.REPLAYED}
+
+
+def test_unsigned_frames_of_both_versions() -> None:
+    side = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    for mavlink_1 in (False, True):
+        assert our_side().check(MavlinkFrame(bytes(HEARTBEAT.pack(side, force_mavlink1=mavlink_1)))) is Check.UNSIGNED
+
+
+def test_another_key_is_noticed_and_leaves_no_trace() -> None:
+    signing = our_side()
+    far_ahead = ticks(NOON) + TOLERANCE
+    assert signing.check(frame_of(pymavlink_side(sha256(b"").digest(), far_ahead))) is Check.WRONG
+    # Mission Planner signs with 32 zeros before it knows which key is asked for.
+    assert signing.check(frame_of(pymavlink_side(bytes(32), far_ahead))) is Check.WRONG
+    assert signing.check(frame_of(pymavlink_side())) is Check.VALID
+
+
+@given(at=st.integers(1, 21 + 12), bit=st.integers(0, 7))
+def test_no_bit_can_be_changed(at: int, bit: int) -> None:
+    raw = bytearray(frame_of(pymavlink_side()).raw)
+    assert len(raw) == 21 + 13
+    raw[at] ^= 1 << bit
+    assert our_side().check(MavlinkFrame(bytes(raw))) is not Check.VALID
+
+
+def test_each_stream_has_its_own_timestamps() -> None:
+    signing = our_side()
+    for link_id in (1, 2):
+        for timestamp in (ticks(NOON), ticks(NOON) + 1, ticks(NOON) + 3):
+            assert signing.check(frame_of(pymavlink_side(timestamp=timestamp, link_id=link_id))) is Check.VALID
+        for timestamp in (ticks(NOON) + 3, ticks(NOON) + 2, ticks(NOON)):
+            assert signing.check(frame_of(pymavlink_side(timestamp=timestamp, link_id=link_id))) is Check.REPLAYED
+
+
+@pytest.mark.parametrize(
+    ("lag", "expected"),
+    [(0, Check.VALID), (TOLERANCE, Check.VALID), (TOLERANCE + 1, Check.LATE), (-(10**9), Check.VALID)],
+)
+def test_a_new_stream_is_at_most_a_minute_behind_us(lag: int, expected: Check) -> None:
+    assert our_side().check(frame_of(pymavlink_side(timestamp=ticks(NOON) - lag))) is expected
+
+
+def test_a_stream_that_is_known_may_fall_behind_others() -> None:
+    signing = our_side()
+    slow = pymavlink_side(timestamp=ticks(NOON) - 100, link_id=1)
+    assert signing.check(frame_of(slow)) is Check.VALID
+    assert signing.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + 10 * TOLERANCE, link_id=2))) is Check.VALID
+    assert signing.check(frame_of(slow)) is Check.VALID
+
+
+def test_our_timestamps_never_repeat_whatever_the_clock_does() -> None:
+    clock = [NOON, NOON, NOON - 3600, 0.0, NOON + 1, NOON + 1]
+    timestamps = Timestamps(lambda: clock.pop(0))
+    start = ticks(NOON)
+    taken = [timestamps.take() for _ in range(6)]
+    assert taken == [start, start + 1, start + 2, start + 3, start + TICKS_PER_S, start + TICKS_PER_S + 1]
+
+
+def test_who_has_no_clock_goes_on_where_he_stopped_and_follows_who_has_one() -> None:
+    stored = ticks(NOON)
+    signing = our_side(unix_s=0.0, at_least=stored)
+    assert signing.check(frame_of(pymavlink_side(timestamp=stored - TOLERANCE - 1))) is Check.LATE
+    later = stored + 3600 * TICKS_PER_S
+    assert signing.check(frame_of(pymavlink_side(timestamp=later))) is Check.VALID
+    assert signing.signature(b"", 0)[1:7] == (later + 1).to_bytes(6, "little")
+
+
+def test_what_an_earlier_run_heard_is_a_replay_in_the_next() -> None:
+    before = our_side()
+    frame = frame_of(pymavlink_side())
+    assert before.check(frame) is Check.VALID
+    after = our_side(unix_s=NOON + 5)
+    after.streams.update(before.streams)
+    assert after.check(frame) is Check.REPLAYED
+    # What was recorded while we were off is held to the minute, though its stream is known.
+    much_after = our_side(unix_s=NOON + 3600)
+    much_after.streams.update(before.streams)
+    assert much_after.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + 1))) is Check.LATE
+
+
+def test_the_last_of_all_timestamps_raises_nothing() -> None:
+    signing = our_side()
+    assert signing.check(frame_of(pymavlink_side(timestamp=(1 << 48) - 1))) is Check.VALID
+    assert len(signing.signature(b"frame", 0)) == 13
