@@ -89,6 +89,8 @@ class MavlinkSplitter:
     Any other header is believed until its frame is there, or `reset`. A cut frame so holds back what follows it, by as
     many bytes as were cut off, 279 at most. To give out whole frames from within an incomplete one would be wrong: a
     log that is downloaded over MAVLink is full of them.
+
+    No CRC covers a signature. If bytes are missing in it, the next frame has begun within: it is searched like noise.
     """
 
     def __init__(self) -> None:
@@ -137,6 +139,9 @@ class MavlinkSplitter:
                     if mcrf4xx(data[start + 1 : crc_at] + crc_extra) == data[crc_at] | data[crc_at + 1] << 8:
                         frames.append(MavlinkFrame(data[start:end]))
                         start = end
+                        if end > crc_at + _CRC_SIZE:
+                            start -= _SIGNATURE_SIZE
+                            self.skipped_bytes -= _SIGNATURE_SIZE
                         continue
                     self.bad_frames += 1
                 elif not is_end:
