@@ -10,6 +10,8 @@ from protocols.uart_capture import UartDeed, UartEvent
 
 #: An answer that comes later is none: even a flight controller that writes its flash is faster.
 _LONGEST_WAIT_S = 5.0
+#: What was asked so shortly before the port was closed, or the recording ended, might have been answered.
+_CUT_SHORT_S = 0.5
 
 #: Command and payload of a request.
 Question = tuple[int, bytes]
@@ -35,17 +37,22 @@ class Conversation:
 
 
 def take_apart(events: Sequence[UartEvent]) -> Conversation:
-    """Match answers with requests as they were matched then: by command, in their order, after the request."""
+    """Match answers with requests as they were matched then: by command, in their order, after the request.
+
+    Requests of which nobody can know whether they would have been answered are left out.
+    """
     exchanges: list[Exchange] = []
     unasked: list[Piece] = []
     waiting: list[Exchange] = []
+    unknown: list[Exchange] = []
     answers = _answers(events, unasked)
     answered_by, frame, pieces = next(answers, _NO_MORE)
     requests = MspParser()
     for number, event in enumerate(events):
-        if event.deed is UartDeed.OPEN:
+        if event.deed in (UartDeed.OPEN, UartDeed.CLOSE):
             requests = MspParser()
-            waiting.clear()
+            unknown += _cut_short(waiting, event.at)
+            waiting = []
         elif event.deed is UartDeed.WRITE:
             asked = [
                 Exchange((found.command, found.payload), event.at)
@@ -65,7 +72,12 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
                 # Requests are answered in their order.
                 del waiting[: waiting.index(asker) + 1]
             answered_by, frame, pieces = next(answers, _NO_MORE)
-    return Conversation(exchanges, sorted(unasked))
+    unknown += _cut_short(waiting, events[-1].at if events else 0.0)
+    return Conversation([exchange for exchange in exchanges if exchange not in unknown], sorted(unasked))
+
+
+def _cut_short(waiting: Sequence[Exchange], at: float) -> list[Exchange]:
+    return [exchange for exchange in waiting if exchange.asked_at > at - _CUT_SHORT_S]
 
 
 _Answer = tuple[int, MspFrame, Sequence[Piece]]

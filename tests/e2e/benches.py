@@ -45,8 +45,14 @@ class Starter:
         board.wait()
         return board
 
-    def daemon(self, fc: str, gcs: Sequence[str] = (), state_dir: Path | None = None) -> Daemon:
-        return self._ended_at_last(Daemon(self.directory, fc, gcs, state_dir))
+    def daemon(
+        self, fc: str, gcs: Sequence[str] = (), state_dir: Path | None = None, options: Sequence[str] = ()
+    ) -> Daemon:
+        return self._ended_at_last(Daemon(self.directory, fc, gcs, state_dir, options))
+
+    def program(self, name: str, *arguments: str) -> Program:
+        """Any other subcommand; what it prints goes to a file of that name."""
+        return self._ended_at_last(Program(self.directory / name, *arguments))
 
     def bench(self, *options: str, gcs: Sequence[str] = ()) -> Bench:
         """A board with `options`, and a daemon that has found it."""

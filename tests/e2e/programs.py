@@ -134,11 +134,19 @@ class Board(Program):
 class Daemon(Program):
     """`naze-bridge run`. Without `gcs` it listens for UDP on a free port, `port`."""
 
-    def __init__(self, directory: Path, fc: str, gcs: Sequence[str] = (), state_dir: Path | None = None) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        fc: str,
+        gcs: Sequence[str] = (),
+        state_dir: Path | None = None,
+        options: Sequence[str] = (),
+    ) -> None:
         self.port = 0 if gcs else free_port()
         self.state_dir = state_dir or directory / "state"
         links = [word for link in gcs or (f"udpin:127.0.0.1:{self.port}",) for word in ("--gcs", link)]
-        super().__init__(directory / "daemon.log", "run", "--fc", fc, *links, "--state-dir", str(self.state_dir))
+        state = ("--state-dir", str(self.state_dir))
+        super().__init__(directory / "daemon.log", "run", "--fc", fc, *links, *state, *options)
 
     @property
     def address(self) -> tuple[str, int]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -177,6 +178,7 @@ def test_whatever_was_read_is_played_byte_for_byte(data: st.DataObject) -> None:
     for pause_ms, (deed, content) in drawn:
         at += pause_ms / 1000
         events.append(UartEvent(at, 115200, deed, content))
+    events.append(closed(at + 1.0))
     listener = Listener(events)
     heard = b""
     for event in events:
@@ -185,3 +187,22 @@ def test_whatever_was_read_is_played_byte_for_byte(data: st.DataObject) -> None:
             heard += b"".join(piece for _, piece in listener.heard)
     heard += b"".join(piece for _, piece in listener.listen(at + 10))
     assert heard == b"".join(event.data for event in events if event.deed is UartDeed.READ)
+
+
+@pytest.mark.parametrize("rest", [[], [closed(2.002)], [closed(2.002), opened(2.5), wrote(2.6, IDENT)]])
+def test_what_was_asked_at_the_very_end_tells_nothing(rest: list[UartEvent]) -> None:
+    """The end of the recording, or the plug, cut the answers off: the flight controller had not fallen silent."""
+    events = [opened(0.0), wrote(1.0, STATUS), read(1.01, reply(Msp.STATUS)), wrote(1.9, STATUS), wrote(2.0, IDENT)]
+    listener = Listener([*events, *rest])
+    listener.ask(1.95, STATUS)
+    assert listener.listen(2.0) == [(1.96, reply(Msp.STATUS))]
+    listener.ask(9.0, STATUS)
+    assert listener.listen(9.5) == [(9.01, reply(Msp.STATUS))]
+
+
+def test_what_was_asked_in_vain_before_the_end_tells_that_it_was_silent() -> None:
+    events = [opened(0.0), wrote(1.0, STATUS), read(1.01, reply(Msp.STATUS)), wrote(2.0, STATUS), wrote(2.3, IDENT)]
+    listener = Listener([*events, wrote(4.0, IDENT), closed(4.1)])
+    listener.ask(3.0, STATUS)
+    listener.ask(9.0, STATUS)
+    assert listener.listen(19.0) == []

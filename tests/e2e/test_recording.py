@@ -1,0 +1,222 @@
+"""What a running daemon records: telemetry logs, and the flight controller's port, which is then played again."""
+
+import os
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from benches import Starter
+from programs import Daemon, run_naze_bridge, until
+from pymavlink import mavutil
+
+from protocols.mavlink.dialect import messages
+from protocols.tlog import TlogRecord, read_tlog
+from protocols.uart_capture import UartDeed, read_capture
+
+STATION = 250
+HEARTBEAT = 0
+
+
+class Listener:
+    """A ground station that keeps the bytes that it heard and said."""
+
+    def __init__(self, address: tuple[str, int]) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.connect(address)
+        self._socket.setblocking(False)
+        self._codec = messages.MAVLink(None, srcSystem=STATION, srcComponent=190)
+        self.heard: list[bytes] = []
+        self.said: list[bytes] = []
+
+    def say(self, *what: Any) -> None:
+        for message in what:
+            frame = bytes(message.pack(self._codec))
+            self._socket.send(frame)
+            self.said.append(frame)
+
+    def listen(self) -> None:
+        while True:
+            try:
+                data = self._socket.recv(4096)
+            except BlockingIOError:
+                return
+            while data:
+                size = 12 + data[1]
+                self.heard.append(data[:size])
+                data = data[size:]
+
+    def has_heard(self, msgid: int, count: int) -> bool:
+        self.listen()
+        return sum(int.from_bytes(frame[7:10], "little") == msgid for frame in self.heard) >= count
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+Connect = Callable[[Daemon], Listener]
+
+
+@pytest.fixture
+def connect() -> Iterator[Connect]:
+    """Makes ground stations that have said hello to a daemon."""
+    with ExitStack() as stack:
+
+        def connected(daemon: Daemon) -> Listener:
+            listener = Listener(daemon.address)
+            stack.callback(listener.close)
+            listener.say(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+            return listener
+
+        yield connected
+
+
+def logs_of(daemon: Daemon) -> list[Path]:
+    return sorted((daemon.state_dir / "logs").glob("*.tlog"))
+
+
+def records_of(path: Path) -> list[TlogRecord]:
+    return list(read_tlog(path.read_bytes()))
+
+
+def test_a_telemetry_log_holds_what_was_heard_and_said(start: Starter, connect: Connect) -> None:
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    listener = connect(daemon)
+    listener.say(messages.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    listener.say(messages.MAVLink_setup_signing_message(1, 1, bytes(range(32)), 1))
+    listener.say(messages.MAVLink_mission_request_list_message(1, 1))
+    until(lambda: listener.has_heard(HEARTBEAT, 4), "telemetry")
+    assert daemon.end() == 0
+    listener.listen()
+
+    (path,) = logs_of(daemon)
+    records = records_of(path)
+    assert [record.frame.raw for record in records if record.frame.sysid == 1] == listener.heard
+    said = [frame for frame in listener.said if bytes(range(32)) not in frame]
+    assert len(said) == len(listener.said) - 1
+    assert [record.frame.raw for record in records if record.frame.sysid == STATION] == said
+
+    reader = mavutil.mavlink_connection(str(path))
+    for record in records:
+        message = reader.recv_match()
+        assert bytes(message.get_msgbuf()) == record.frame.raw
+        assert message._timestamp == record.at_us * 1e-6
+    assert reader.recv_match() is None
+    reader.close()
+    times = [record.at_us for record in records]
+    assert times == sorted(times)
+    assert os.path.getmtime(path) - 60 < times[0] / 1e6 <= times[-1] / 1e6 <= os.path.getmtime(path) + 1
+
+
+def test_a_daemon_that_is_killed_loses_the_last_second_at_most(start: Starter, connect: Connect) -> None:
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    listener = connect(daemon)
+    until(lambda: listener.has_heard(HEARTBEAT, 4), "telemetry")
+    daemon.end(signal.SIGKILL)
+    listener.listen()
+    (path,) = logs_of(daemon)
+    recorded = [record.frame.raw for record in records_of(path) if record.frame.sysid == 1]
+    assert recorded == listener.heard[: len(recorded)]
+    lost = [frame for frame in listener.heard[len(recorded) :] if int.from_bytes(frame[7:10], "little") == HEARTBEAT]
+    # There is one each second.
+    assert len(lost) <= 2
+
+
+def test_a_second_start_begins_a_second_log(start: Starter, connect: Connect) -> None:
+    daemon = start.daemon("sim:")
+    for count in (1, 2):
+        daemon.wait()
+        connect(daemon)
+        until(lambda count=count: len(logs_of(daemon)) == count, "a log")  # type: ignore[misc]
+        daemon.kill_and_restart()
+
+
+def test_logs_that_cannot_be_written_are_told_once_and_hold_nothing_up(start: Starter, connect: Connect) -> None:
+    (start.directory / "state").mkdir()
+    (start.directory / "state" / "logs").write_text("in the way")
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    listener = connect(daemon)
+    until(lambda: listener.has_heard(HEARTBEAT, 5), "telemetry")
+    assert daemon.end() == 0
+    assert [event["event"] for event in daemon.events() if "tlog" in event["event"]] == ["tlog.stopped"]
+
+
+def test_recording_can_be_switched_off(start: Starter, connect: Connect) -> None:
+    config = start.directory / "naze.toml"
+    config.write_text("record_tlog = false\n")
+    daemon = start.daemon("sim:", options=("--config", str(config)))
+    daemon.wait()
+    listener = connect(daemon)
+    until(lambda: listener.has_heard(HEARTBEAT, 3), "telemetry")
+    assert daemon.end() == 0
+    assert logs_of(daemon) == []
+
+
+# -- the UART --------------------------------------------------------------------------------------------------------
+
+
+def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: Starter, connect: Connect) -> None:
+    """Recorded at the built-in simulator, killed, recorded on; then played on a port of its own."""
+    capture = start.directory / "naze.uart"
+    recorded = start.daemon("sim:", options=("--record-uart", str(capture)))
+    recorded.wait()
+    listener = connect(recorded)
+    until(lambda: listener.has_heard(HEARTBEAT, 3), "telemetry")
+    recorded.kill_and_restart()
+    recorded.wait()
+    assert recorded.end() == 0
+    events = read_capture(capture.read_bytes())
+    assert [event.deed for event in events if event.deed in (UartDeed.OPEN, UartDeed.CLOSE)] == [
+        UartDeed.OPEN,
+        UartDeed.CLOSE,
+        UartDeed.OPEN,
+        UartDeed.CLOSE,
+    ]
+
+    link = start.directory / "played"
+    player = start.program("player.log", "sim", "--play", str(capture), "--link", str(link))
+    until(lambda: "Playing" in player.printed or not player.is_alive, "the player")
+    daemon = start.daemon(str(link), state_dir=start.directory / "second")
+    daemon.wait()
+    found = daemon.has_logged("fc.found")
+    assert found is not None
+    assert found["name"] == "Harakiri with the mission extension"
+    listener = connect(daemon)
+    until(lambda: listener.has_heard(messages.MAVLINK_MSG_ID_ATTITUDE, 3), "the recorded attitude")
+    until(lambda: "That was all" in player.printed, "the end")
+    # It goes on with what it answered last.
+    daemon.wait()
+    assert player.end() == 0
+    assert not link.is_symlink()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "complaint"),
+    [
+        (("run", "--fc", "sim:", "--record-uart", "{dir}"), 1, "cannot record into {dir}: Is a directory"),
+        (("run", "--fc", "sim:", "--record-uart", "{dir}/notes.txt"), 1, "notes.txt is no UART capture"),
+        (("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt"), 1, "notes.txt holds no UART capture"),
+        (("sim", "--link", "{dir}/naze", "--play", "{dir}/nothing"), 2, "does not exist"),
+        (
+            ("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt", "--armed"),
+            2,
+            "--armed is for a simulated board",
+        ),
+    ],
+)
+def test_what_cannot_be_recorded_or_played(
+    tmp_path: Path, arguments: tuple[str, ...], status: int, complaint: str
+) -> None:
+    (tmp_path / "notes.txt").write_text("mine\n")
+    state = ("--state-dir", "{dir}/state", "--gcs", "udpout:127.0.0.1:14999") if arguments[0] == "run" else ()
+    done = run_naze_bridge(*(word.replace("{dir}", str(tmp_path)) for word in (*arguments, *state)))
+    assert done.returncode == status
+    assert complaint.replace("{dir}", str(tmp_path)) in done.stderr.replace("\n", " ")
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "notes.txt").read_text() == "mine\n"
