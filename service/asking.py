@@ -11,10 +11,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from service.connection import AddressError, parse_fc
-from service.control import ControlError, Json, MissionJobs, ask_daemon
+from service.control import ControlError, MissionJobs, ask_daemon
 from service.daemon import Daemon
 from service.log_setup import set_up_logging
-from service.settings import Settings, default_state_dir
+from service.mission_data import Json
+from service.settings import Settings, SettingsError, default_state_dir
+from storage.store_error import StoreError
 
 #: An unknown speed is found within 8 s.
 _SEARCH_PATIENCE_S = 12.0
@@ -23,33 +25,39 @@ _SEARCH_INTERVAL_S = 0.05
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def bridge_options(command: F) -> F:
-    """Add the options that say which bridge is meant."""
+def daemon_options(command: F) -> F:
+    """Add the options that say which daemon is meant."""
     state_dir = click.option(
         "--state-dir",
         type=click.Path(path_type=Path),
-        default=default_state_dir,
         show_default="as the daemon's",
         help="State directory of the running daemon.",
     )
-    fc = click.option("--fc", metavar="FC", help="Talk to this flight controller directly, without a daemon.")
     as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-    return state_dir(fc(as_json(command)))
+    return state_dir(as_json(command))
 
 
-def ask(state_dir: Path, fc: str | None, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
-    """Ask the bridge; a refusal ends the program with status 1, an unusable --fc with 2."""
+def bridge_options(command: F) -> F:
+    """Add the options that say which bridge is meant, be it a daemon's or one of the command's own."""
+    fc = click.option("--fc", metavar="FC", help="Talk to this flight controller directly, without a daemon.")
+    return daemon_options(fc(command))
+
+
+def ask(
+    state_dir: Path | None, fc: str | None, request: Json, progress: Callable[[int], None] = lambda _: None
+) -> Json:
+    """Ask the bridge; a refusal ends the program with status 1, an unusable option with 2."""
     try:
         if fc is None:
-            return ask_daemon(state_dir, request, progress)
+            return ask_daemon(state_dir or default_state_dir(), request, progress)
         return asyncio.run(_ask_directly(fc, request, progress))
-    except AddressError as error:
+    except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error
-    except ControlError as error:
+    except (ControlError, StoreError) as error:
         fail(str(error))
 
 
-def ask_with_progress(state_dir: Path, fc: str | None, request: Json, total: int) -> Json:
+def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, total: int) -> Json:
     """Ask the bridge to push `total` records, with a progress bar on standard error."""
     columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:

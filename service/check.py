@@ -1,22 +1,20 @@
 """`naze-bridge check`: what would become of a mission file, offline."""
 
-import json
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
 
 import click
-from rich.console import Console
 
-from bridge.finding import DROPPED, Finding
+from bridge.finding import DROPPED
 from bridge.mission_check import Result, RuleProfile, Verdict, check_list
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem
+from service.mission_data import Json
 from service.mission_source import load_mission
 from service.mission_table import mission_table
+from service.printing import print_json, print_table
 
 _DEFAULT = RuleProfile()
 
@@ -65,40 +63,33 @@ def _check_file(path: Path, profile: RuleProfile, strict: bool, as_json: bool) -
         sent = load_mission(path)
     except MissionFileError as error:
         if as_json:
-            click.echo(json.dumps({"file": name, "error": str(error)}))
+            print_json({"file": name, "error": str(error)})
         else:
             click.echo(f"Error: {error}", err=True)
         return ExitCode.UNREADABLE
     verdict = check_list(sent, profile)
     if as_json:
-        click.echo(json.dumps({"file": name, **verdict_as_json(verdict)}, allow_nan=False))
+        print_json({"file": name, **_verdict_data(verdict)})
     else:
         _print_verdict(name, sent, verdict)
     rejected = verdict.result is Result.REJECTED or (strict and bool(verdict.findings))
     return ExitCode.REJECTED if rejected else ExitCode.ACCEPTED
 
 
-def verdict_as_json(verdict: Verdict) -> dict[str, Any]:
-    """Return what a script gets to see of a verdict; a value that JSON has no number for becomes a string."""
+def _verdict_data(verdict: Verdict) -> Json:
     return {
         "result": verdict.result.name,
         "ack": f"MAV_MISSION_{verdict.ack.name}",
         "items": [asdict(item) for item in verdict.items],
         "records": [record.pack().hex() for record in verdict.records],
-        "findings": [_finding_as_json(finding) for finding in verdict.findings],
+        "findings": [asdict(finding) for finding in verdict.findings],
     }
 
 
-def _finding_as_json(finding: Finding) -> dict[str, Any]:
-    infinite = isinstance(finding.was, float) and math.isinf(finding.was)
-    return asdict(finding) | ({"was": str(finding.was)} if infinite else {})
-
-
 def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict) -> None:
-    console = Console(highlight=False)
-    console.print(name, style="bold", markup=False)
-    console.print(mission_table(sent, verdict.items, verdict.findings))
-    console.print(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n", markup=False)
+    click.secho(name, bold=True)
+    print_table(mission_table(sent, verdict.items, verdict.findings))
+    click.echo(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n")
 
 
 def _summary(sent: int, verdict: Verdict) -> str:

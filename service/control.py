@@ -11,23 +11,25 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import structlog
 
 from bridge.mission_desk import Delivery, HeldMission, Refusal
 from bridge.mission_log import ArrivedMission
-from protocols.mission_item import MissionItem
+from protocols.mission_item import MissionItem, MissionResult
 from protocols.wp_record import pack_records
 from service.daemon import Daemon
+from service.mission_data import Json, mission_items, to_json, whole_number
 from service.store_worker import as_dicts
 from storage.mission_store import StoreError
 
 SOCKET_NAME = "control.sock"
+#: The greatest number that a request may hold.
+MOST = 2**31 - 1
 _MAX_LINE = 1 << 20
 _log = structlog.get_logger()
-
-Json = dict[str, Any]
+T = TypeVar("T")
 
 
 class ControlError(Exception):
@@ -42,21 +44,20 @@ class MissionJobs:
         self._loop = asyncio.get_running_loop()
 
     async def do(self, request: Json, tell: Callable[[Json], None]) -> Json:
-        """Do what a request asks for; `tell` takes the progress. ControlError or StoreError say why not."""
-        match request["do"]:
+        """Do what a request asks for; `tell` takes the progress. ControlError, StoreError or ValueError say why not."""
+        match request.get("do"):
             case "push":
-                items = [MissionItem(**item) for item in request["items"]]
-                return await self.push(items, str(request["source"]), tell)
+                return await self.push(mission_items(request.get("items")), str(request.get("source")), tell)
             case "pull":
                 return await self.pull()
             case "status":
                 return self.status()
             case "missions":
-                return await self.list_missions(int(request["limit"]))
+                return await self.list_missions(whole_number(request, "limit", 1, MOST))
             case "mission":
-                return await self.show_mission(int(request["number"]))
+                return await self.show_mission(whole_number(request, "number", 0, MOST))
             case "restore":
-                return await self.restore(int(request["number"]), tell)
+                return await self.restore(whole_number(request, "number", 0, MOST), tell)
             case other:
                 raise ControlError(f"{other!r} is no request")
 
@@ -74,7 +75,10 @@ class MissionJobs:
                     "findings": as_dicts(arrived.verdict.findings),
                     "mission": outcome.number if isinstance(outcome, Delivery) else None,
                 }
-            future.set_result(answer)
+            _resolve(future, answer)
+            level = _log.info if outcome.ack is MissionResult.ACCEPTED else _log.warning
+            mission, ack = answer.get("mission"), outcome.ack.name
+            level("mission.push_ended", source=source, mission=mission, ack=ack, detail=outcome.text)
 
         bridge = self._daemon.bridge
         bridge.push_locally(items, source, lambda records: progress({"progress": records}), done, self._loop.time())
@@ -84,14 +88,14 @@ class MissionJobs:
     async def pull(self) -> Json:
         """Read what the flight controller holds."""
         future: asyncio.Future[HeldMission | Refusal] = self._loop.create_future()
-        self._daemon.bridge.pull_locally(future.set_result, self._loop.time())
+        self._daemon.bridge.pull_locally(lambda held: _resolve(future, held), self._loop.time())
         self._daemon.flush()
         held = await future
         if isinstance(held, Refusal):
             raise ControlError(held.text)
         return {
             "count": held.identity.count,
-            "checksum": f"{held.identity.checksum:08x}",
+            "checksum": _hex(held.identity.checksum),
             "items": as_dicts(held.items),
             "records": [pack_records([record]).hex() for record in held.records],
         }
@@ -113,7 +117,7 @@ class MissionJobs:
             "satellites": vehicle.gps.satellites if vehicle.gps else None,
             "ground_stations": [str(peer) for peer in bridge.ground.peers()],
             "mission_records": None if held is None else held.identity.count,
-            "mission_checksum": None if held is None else f"{held.identity.checksum:08x}",
+            "mission_checksum": None if held is None else _hex(held.identity.checksum),
             "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),
             "requests_lost": None if link is None else link.requests_lost,
             "bad_checksums": None if link is None else link.bad_checksums,
@@ -122,7 +126,7 @@ class MissionJobs:
     async def list_missions(self, limit: int) -> Json:
         """List what came in, newest first."""
         missions = await self._daemon.store.ask(lambda store: store.list(limit))
-        return {"missions": [asdict(mission) for mission in missions]}
+        return {"missions": [asdict(mission) | {"checksum": _hex(mission.checksum)} for mission in missions]}
 
     async def show_mission(self, number: int) -> Json:
         """Return one mission with all that is known of it."""
@@ -131,13 +135,13 @@ class MissionJobs:
             raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows which there are")
         data = asdict(mission)
         data["received"]["records"] = mission.received.records.hex()
+        data["received"]["checksum"] = _hex(mission.received.checksum)
         return data
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:
         """Push a stored mission again, as it was sent then: the rules of today apply."""
         data = await self.show_mission(number)
-        items = [MissionItem(**item) for item in data["received"]["items"]]
-        return await self.push(items, f"restore of mission {number}", progress)
+        return await self.push(mission_items(data["received"]["items"]), f"restore of mission {number}", progress)
 
 
 class ControlServer:
@@ -147,38 +151,75 @@ class ControlServer:
         self._jobs = MissionJobs(daemon)
         self._path = path
         self._server: asyncio.Server | None = None
+        self._clients: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
-        """Listen. A socket that a killed daemon left behind is replaced: the state lock says that it is dead."""
-        self._path.unlink(missing_ok=True)
-        self._server = await asyncio.start_unix_server(self._serve, self._path, limit=_MAX_LINE)
-        self._path.chmod(0o660)
+        """Listen; ControlError if that is impossible.
 
-    def close(self) -> None:
-        """Stop listening."""
+        A socket that a killed daemon left behind is replaced: the state lock says that it is dead.
+        """
+        try:
+            self._path.unlink(missing_ok=True)
+            self._server = await asyncio.start_unix_server(self._serve, self._path, limit=_MAX_LINE)
+            self._path.chmod(0o660)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise ControlError(f"the control socket {self._path} cannot be made: {reason}") from error
+
+    async def close(self) -> None:
+        """Stop listening, and tell those who wait for an answer that none will come."""
         if self._server is not None:
             self._server.close()
-        self._path.unlink(missing_ok=True)
+            self._path.unlink(missing_ok=True)
+        for client in self._clients:
+            client.cancel()
+        await asyncio.gather(*self._clients)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        client = asyncio.current_task()
+        assert client is not None
+        self._clients.add(client)
+        try:
+            await self._answer(reader, writer)
+        finally:
+            self._clients.discard(client)
+            writer.close()
+
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         def tell(answer: Json) -> None:
-            writer.write(json.dumps(answer).encode() + b"\n")
+            writer.write(to_json(answer).encode() + b"\n")
 
         try:
-            line = await reader.readline()
-            tell({"result": await self._jobs.do(json.loads(line), tell)})
+            tell({"result": await self._jobs.do(_request(await reader.readline()), tell)})
             await writer.drain()
         except (ControlError, StoreError) as error:
             tell({"error": str(error)})
-        except (ValueError, KeyError, TypeError) as error:
-            _log.debug("control.bad_request", why=str(error))
+        except ValueError as error:
             tell({"error": f"request not understood: {error}"})
         except ConnectionError:
             pass
-        finally:
-            with suppress(ConnectionError):
-                writer.close()
-                await writer.wait_closed()
+        except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
+            tell({"error": "the daemon was stopped meanwhile; `pull` tells what the flight controller holds"})
+
+
+def _request(line: bytes) -> Json:
+    try:
+        request = json.loads(line)
+    except RecursionError:
+        raise ValueError("it is nested too deep") from None
+    if not isinstance(request, dict):
+        raise ValueError("it must be one JSON object on one line")
+    return request
+
+
+def _resolve(future: asyncio.Future[T], result: T) -> None:
+    # Whoever asked may be gone by now.
+    if not future.done():
+        future.set_result(result)
+
+
+def _hex(checksum: int) -> str:
+    return f"{checksum:08x}"
 
 
 def ask_daemon(state_dir: Path, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
@@ -187,19 +228,23 @@ def ask_daemon(state_dir: Path, request: Json, progress: Callable[[int], None] =
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
             connection.connect(str(path))
+        except PermissionError as error:
+            remedy = "use sudo, or add yourself to the group that the daemon runs as"
+            raise ControlError(f"no permission to ask the daemon on {path}: {remedy}") from error
         except OSError as error:
             raise ControlError(
                 f"no daemon answers on {path}: start one with `naze-bridge run`, or use --fc directly"
             ) from error
-        connection.sendall(json.dumps(request).encode() + b"\n")
-        for answer in _lines(connection):
-            if "progress" in answer:
-                progress(answer["progress"])
-            elif "error" in answer:
-                raise ControlError(answer["error"])
-            else:
-                result: Json = answer["result"]
-                return result
+        with suppress(ConnectionError):
+            connection.sendall(to_json(request).encode() + b"\n")
+            for answer in _lines(connection):
+                if "progress" in answer:
+                    progress(answer["progress"])
+                elif "error" in answer:
+                    raise ControlError(answer["error"])
+                else:
+                    result: Json = answer["result"]
+                    return result
     raise ControlError("the daemon ended before it answered")
 
 

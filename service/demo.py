@@ -18,8 +18,9 @@ from bridge.finding import Finding
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult
 from service.asking import fail
-from service.control import ControlError, Json, ask_daemon
+from service.control import ControlError, ask_daemon
 from service.mission_client import ClientError, connect
+from service.mission_data import Json, mission_items
 from service.mission_source import load_mission
 from service.mission_table import mission_table
 
@@ -64,7 +65,7 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, cons
     console.print(mission_table(items, held, findings))
     if result is not MissionResult.ACCEPTED:
         raise ClientError(f"the mission was not accepted: {'; '.join(client.texts)}")
-    if held != [MissionItem(**item) for item in received["stored_items"]]:
+    if held != mission_items(received["stored_items"]):
         raise ClientError("what was read back is not what was stored")
     console.print(
         f"\nSent {len(items)} items; the flight controller holds {len(held)}, read back from it and compared."

@@ -1,29 +1,27 @@
 """`naze-bridge push`, `pull`, `clear` and `status`."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 import click
-from rich.console import Console
-from rich.table import Table
 
 from bridge.finding import Finding
 from protocols.mission_file import MissionFileError, write_qgc_wpl
-from protocols.mission_item import MissionItem
 from service.asking import ask, ask_with_progress, bridge_options, fail
-from service.control import Json
+from service.mission_data import Json, mission_items
 from service.mission_source import load_mission, save_mission
 from service.mission_table import mission_table
+from service.printing import print_json, print_table
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _UNREADABLE = 2
+_STANDARD_OUTPUT = Path("-")
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @bridge_options
-def push(file: Path, state_dir: Path, fc: str | None, as_json: bool) -> None:
+def push(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Write a mission file to the flight controller and verify it there.
 
     Exit code 0: verified, 1: refused or failed (the old mission is kept), 2: the file is unreadable.
@@ -40,55 +38,64 @@ def push(file: Path, state_dir: Path, fc: str | None, as_json: bool) -> None:
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @bridge_options
-def pull(file: Path | None, state_dir: Path, fc: str | None, as_json: bool) -> None:
-    """Read the mission that the flight controller holds; into FILE (QGC WPL 110), or to the screen."""
+def pull(file: Path | None, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Read the mission that the flight controller holds: into FILE (QGC WPL 110; - is standard output), or as a table.
+
+    Exit code 0: read, 1: there is no link, or FILE cannot be written.
+    """
+    if as_json and file == _STANDARD_OUTPUT:
+        raise click.UsageError("the file and --json cannot both go to standard output: leave one of them away")
     held = ask(state_dir, fc, {"do": "pull"})
-    items = [MissionItem(**item) for item in held["items"]]
+    items = mission_items(held["items"])
+    summary = f"{held['count']} records, checksum {held['checksum']}"
+    if file == _STANDARD_OUTPUT:
+        click.echo(write_qgc_wpl(items), nl=False)
+        click.echo(summary, err=True)
+        return
     if file is not None:
         try:
             save_mission(file, write_qgc_wpl(items))
         except MissionFileError as error:
             fail(str(error))
+        summary += f", written to {click.format_filename(file)}"
     if as_json:
-        click.echo(json.dumps(held))
+        print_json(held)
         return
     if file is None and items:
-        Console(highlight=False).print(mission_table(items, items, ()))
-    where = f", written to {file}" if file is not None else ""
-    click.echo(f"{held['count']} records, checksum {held['checksum']}{where}")
+        print_table(mission_table(items, items, ()))
+    click.echo(summary)
 
 
 @click.command()
 @bridge_options
-def clear(state_dir: Path, fc: str | None, as_json: bool) -> None:
+def clear(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Clear the mission on the flight controller and verify that."""
     show_delivery(ask(state_dir, fc, {"do": "push", "items": [], "source": "clear"}), as_json=as_json)
 
 
 @click.command()
 @bridge_options
-def status(state_dir: Path, fc: str | None, as_json: bool) -> None:
+def status(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Show how the bridge stands: flight controller, link, ground stations."""
     facts = ask(state_dir, fc, {"do": "status"})
     if as_json:
-        click.echo(json.dumps(facts))
+        print_json(facts)
         return
-    table = Table(show_header=False, box=None)
+    width = max(map(len, facts))
     for name, value in facts.items():
         shown = "-" if value is None else ", ".join(value) or "none" if isinstance(value, list) else str(value)
-        table.add_row(name.replace("_", " "), shown)
-    Console(highlight=False).print(table)
+        click.echo(f"{name.replace('_', ' '):{width}}  {shown}")
 
 
 def show_delivery(delivery: Json, *, as_json: bool) -> None:
     """Print what was sent beside what is held now; end the program with status 1 if it was not accepted."""
     if as_json:
-        click.echo(json.dumps(delivery))
+        print_json(delivery)
     else:
         if delivery.get("sent"):
-            sent, stored = ([MissionItem(**item) for item in delivery[key]] for key in ("sent", "stored"))
+            sent, stored = (mission_items(delivery[key]) for key in ("sent", "stored"))
             findings = [Finding(**finding) for finding in delivery["findings"]]
-            Console(highlight=False).print(mission_table(sent, stored, findings))
+            print_table(mission_table(sent, stored, findings))
         click.echo(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
     if delivery["ack"] != _ACCEPTED:
         raise SystemExit(1)

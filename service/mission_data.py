@@ -35,9 +35,9 @@ def whole_number(data: Json, key: str, least: int, most: int) -> int:
 def _item(entry: object) -> MissionItem:
     if not isinstance(entry, dict):
         raise ValueError("an item must be an object")
-    whole = {key: whole_number(entry, key, 0, most) for key, most in _WHOLE.items()}
-    numbers = {key: _number(entry, key) for key in _NUMBERS}
-    return MissionItem(**whole, **numbers, lat_e7=_place(entry, "lat_e7"), lon_e7=_place(entry, "lon_e7"))
+    seq, command, frame = (whole_number(entry, key, 0, most) for key, most in _WHOLE.items())
+    p1, p2, p3, p4, alt_m = (_number(entry, key) for key in _NUMBERS)
+    return MissionItem(seq, command, frame, p1, p2, p3, p4, _place(entry, "lat_e7"), _place(entry, "lon_e7"), alt_m)
 
 
 def _number(entry: Json, key: str) -> float:

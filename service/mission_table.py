@@ -13,6 +13,8 @@ from protocols.mission_item import MissionItem
 
 _CHANGED = "yellow"
 _DROPPED = "red"
+#: Names of commands that are stored are never cut up.
+_LONGEST_STORED = len("RETURN_TO_LAUNCH")
 
 
 def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]) -> Table:
@@ -24,16 +26,15 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     reasons = Text("".join(f"\n{finding.full_text()}" for finding in findings))
     table = Table(
         box=box.SIMPLE_HEAD,
-        collapse_padding=True,
-        pad_edge=False,
+        padding=0,
         show_edge=False,
         caption=reasons,
         caption_justify="left",
     )
-    table.add_column("WP", justify="right", overflow="fold")
-    table.add_column("Command", overflow="fold")
+    table.add_column("WP", justify="right", no_wrap=True)
+    table.add_column("Command", min_width=_LONGEST_STORED, overflow="fold")
     for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):
-        table.add_column(title, justify="right", overflow="fold")
+        table.add_column(title, justify="right", overflow="fold", no_wrap=True)
     dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
     left = iter(stored)
     for item in sent:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from service.connection import AddressError
-from service.control import SOCKET_NAME, ControlServer
+from service.control import SOCKET_NAME, ControlError, ControlServer
 from service.daemon import Daemon, run_until_signal
 from service.gcs_links import LinkError
 from service.log_setup import set_up_logging
@@ -40,7 +40,7 @@ def run(
         raise click.UsageError(str(error)) from error
     try:
         _serve(settings)
-    except (LinkError, StoreError, UartFileError) as error:
+    except (ControlError, LinkError, StoreError, UartFileError) as error:
         click.echo(f"naze-bridge: {error}", err=True)
         sys.exit(1)
 
@@ -58,4 +58,4 @@ async def _main(settings: Settings, socket_path: Path) -> None:
     try:
         await run_until_signal(daemon)
     finally:
-        control.close()
+        await control.close()

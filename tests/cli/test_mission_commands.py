@@ -1,18 +1,24 @@
 """`push`, `pull`, `clear` and `status` as a person and as a script use them, against a running daemon."""
 
+import json
+import math
 import os
 import stat
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from benches import Starter
-from plan import plain_plan
+from plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
 from programs import Daemon, run_naze_bridge
 
-from protocols.mission_file import read_mission_file
+from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_item import Command
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +40,86 @@ def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *par
     (sentence,) = ended.stderr.splitlines()
     assert sentence.startswith("naze-bridge: ")
     assert not [part for part in parts if part not in sentence], sentence
+
+
+def strict(text: str) -> Any:
+    """Read JSON as other languages do, which know no NaN."""
+
+    def refuse(token: str) -> None:
+        raise AssertionError(f"{token} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def write_plan(path: Path, plan: list[PlanRow]) -> Path:
+    path.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
+    return path
+
+
+# -- what is printed -----------------------------------------------------------------------------------------
+
+
+def test_a_mission_there_and_back(daemon: Daemon, tmp_path: Path) -> None:
+    plan = plain_plan(7, start=20)
+    pushed = ask(daemon, "push", write_plan(tmp_path / "plan", plan))
+    assert pushed.returncode == 0
+    assert pushed.stdout.endswith("ACCEPTED: Mission verified: 7 records\n")
+    assert daemon.held()["records"] == records_of(judge(plan))
+    pulled = ask(daemon, "pull")
+    assert pulled.stdout.endswith(f"7 records, checksum {daemon.held()['checksum']}\n")
+    assert "45.3847523" in pulled.stdout
+    assert ask(daemon, "clear").stdout == "ACCEPTED: Mission on the flight controller cleared\n"
+    assert ask(daemon, "pull").stdout == "0 records, checksum 00000000\n"
+
+
+def test_a_refusal_is_told_and_ends_with_1(daemon: Daemon, tmp_path: Path) -> None:
+    refused = ask(daemon, "push", write_plan(tmp_path / "plan", [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]))
+    assert refused.returncode == 1
+    assert refused.stdout.splitlines()[-1] == "INVALID: WP 1: rejected, LAND must be the last item"
+
+
+def test_an_unreadable_file_ends_with_2(daemon: Daemon, tmp_path: Path) -> None:
+    assert_one_sentence(ask(daemon, "push", tmp_path / "none"), 2, "none", "no such file")
+
+
+def test_json_says_null_where_nothing_was_given(daemon: Daemon, tmp_path: Path) -> None:
+    plan = [replace(row, p1=math.nan, p4=math.nan) for row in plain_plan(4, start=30)]
+    file = write_plan(tmp_path / "plan", plan)
+    file.write_text(file.read_text().replace("\tNaN\t45", "\tinf\t45"))
+    delivery = strict(ask(daemon, "push", file, "--json").stdout)
+    assert [(item["p1"], item["p4"]) for item in delivery["sent"]] == [(None, "inf")] * 4
+    assert [(item["p1"], item["p4"]) for item in delivery["stored"]] == [(0, 0)] * 4
+    number = delivery["mission"]
+    shown = strict(ask(daemon, "missions", "show", str(number), "--json").stdout)
+    assert shown["received"]["items"] == delivery["sent"]
+    # And what was not given then is not given again.
+    again = strict(ask(daemon, "missions", "restore", str(number), "--json").stdout)
+    assert again["sent"] == delivery["sent"]
+    assert strict(ask(daemon, "missions", "diff", str(number), str(again["mission"]), "--json").stdout)["equal"]
+
+
+def test_a_checksum_looks_the_same_everywhere(daemon: Daemon, tmp_path: Path) -> None:
+    number = strict(ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(5)), "--json").stdout)["mission"]
+    assert {
+        strict(ask(daemon, "pull", "--json").stdout)["checksum"],
+        strict(ask(daemon, "status", "--json").stdout)["mission_checksum"],
+        strict(ask(daemon, "missions", "list", "--limit", "1", "--json").stdout)[0]["checksum"],
+        strict(ask(daemon, "missions", "show", str(number), "--json").stdout)["received"]["checksum"],
+    } == {daemon.held()["checksum"]}
+
+
+def test_tables_fit_and_end_where_their_text_ends(daemon: Daemon, tmp_path: Path) -> None:
+    far = replace(waypoint(1), lat=-45.3838, lng=-178.4733, alt=1000.5, p1=400.5)
+    plan = [HOME, replace(far, command=Command.NAV_LOITER_TIME), far, PlanRow(Command.NAV_RETURN_TO_LAUNCH, alt=15)]
+    file = write_plan(tmp_path / "plan", plan)
+    number = strict(ask(daemon, "push", file, "--json").stdout)["mission"]
+    for arguments in (["push", file], ["pull"], ["missions", "show", str(number)], ["missions", "list"]):
+        lines = ask(daemon, *arguments).stdout.splitlines()
+        assert len(lines) > 2, arguments
+        assert [line for line in lines if len(line) > 80 or line != line.rstrip()] == []
+        if arguments[0] in ("push", "pull"):
+            assert sum("RETURN_TO_LAUNCH" in line for line in lines) == 1
+            assert sum("1000" in line and "-178.4733000" in line for line in lines) == 2
 
 
 # -- pull into a file ----------------------------------------------------------------------------------------
@@ -91,3 +177,59 @@ def test_pull_into_a_link_that_leads_to_itself(daemon: Daemon, tmp_path: Path) -
 
 def test_pull_into_a_folder_that_is_not_there(daemon: Daemon, tmp_path: Path) -> None:
     assert_one_sentence(ask(daemon, "pull", tmp_path / "none" / "held"), 1, "no such file or directory")
+
+
+def test_pull_into_standard_output_is_a_mission_file(daemon: Daemon) -> None:
+    daemon.push(plain_plan(6))
+    pulled = ask(daemon, "pull", "-")
+    assert len(read_mission_file(pulled.stdout.encode(), "-")) == 6
+    assert pulled.stderr == f"6 records, checksum {daemon.held()['checksum']}\n"
+    assert ask(daemon, "pull", "-", "--json").returncode == 2
+
+
+# -- whom to ask ---------------------------------------------------------------------------------------------
+
+
+def test_no_daemon(tmp_path: Path) -> None:
+    assert_one_sentence(run_naze_bridge("status", "--state-dir", tmp_path), 1, str(tmp_path), "naze-bridge run")
+
+
+def test_a_daemon_that_belongs_to_somebody_else(daemon: Daemon) -> None:
+    """Nobody may look into root's directory; who is not root is kept out of a directory of his own."""
+    as_nobody = (
+        "import os; from service.cli import main; import service.mission_commands;"
+        "os.geteuid() or os.setuid(65534); main(prog_name='naze-bridge')"
+    )
+    daemon.state_dir.chmod(0)
+    try:
+        ended = subprocess.run(
+            [sys.executable, "-c", as_nobody, "status", "--state-dir", str(daemon.state_dir)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    finally:
+        daemon.state_dir.chmod(0o755)
+    assert_one_sentence(ended, 1, "no permission", "sudo", "group", str(daemon.state_dir))
+
+
+def test_missions_are_a_daemons() -> None:
+    ended = run_naze_bridge("missions", "list", "--fc", "sim:")
+    assert ended.returncode == 2
+    assert "No such option" in ended.stderr
+
+
+def test_numbers_that_are_no_missions(daemon: Daemon) -> None:
+    for wrong in (["show", "99999999999999999999"], ["list", "--limit", "99999999999999999999"], ["show", "-1"]):
+        ended = ask(daemon, "missions", *wrong)
+        assert ended.returncode == 2, ended
+        assert "Traceback" not in ended.stderr
+    assert_one_sentence(ask(daemon, "missions", "show", "2147483647"), 1, "there is no mission 2147483647")
+
+
+def test_a_list_of_nothing_says_so(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        daemon = Starter(tmp_path, stack).daemon("sim:")
+        daemon.wait_up()
+        assert ask(daemon, "missions", "list").stdout == "No mission has come in yet.\n"
+        assert strict(ask(daemon, "missions", "list", "--json").stdout) == []
