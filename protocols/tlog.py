@@ -19,6 +19,9 @@ _LINK_BITS = 0b11
 _CRC_SIZE = 2
 _SIGNATURE_SIZE = 13
 _SIGNED = 0x01
+#: In a MAVLink 2 header.
+_MSGID = slice(7, 10)
+_SETUP_SIGNING = messages.MAVLINK_MSG_ID_SETUP_SIGNING.to_bytes(3, "little")
 _HEADERS = {MAGIC_V1: 6, MAGIC_V2: 10}
 
 
@@ -32,13 +35,13 @@ class TlogRecord:
 
 def tlog_record(frame: bytes, at_us: int) -> bytes:
     """Return the record of a whole, checked frame of the dialect; nothing for one that must not be in a log."""
-    if frame[0] == MAGIC_V1:
-        # SETUP_SIGNING has a number that MAVLink 1 cannot name.
-        return _stamp(at_us) + frame
-    msgid = int.from_bytes(frame[7:10], "little")
-    if msgid == messages.MAVLINK_MSG_ID_SETUP_SIGNING:
-        return b""
-    return _stamp(at_us) + (_without_signature(frame, msgid) if frame[2] & _SIGNED else frame)
+    # (MAVLink 1 can neither be signed nor name SETUP_SIGNING.)
+    if frame[0] == MAGIC_V2:
+        if frame[_MSGID] == _SETUP_SIGNING:
+            return b""
+        if frame[2] & _SIGNED:
+            frame = _without_signature(frame)
+    return (at_us & ~_LINK_BITS).to_bytes(_STAMP_SIZE, "big") + frame
 
 
 def read_tlog(data: bytes) -> Iterator[TlogRecord]:
@@ -59,10 +62,6 @@ def first_stamp_us(records: bytes) -> int:
     return int.from_bytes(records[:_STAMP_SIZE], "big")
 
 
-def _stamp(at_us: int) -> bytes:
-    return (at_us & ~_LINK_BITS).to_bytes(_STAMP_SIZE, "big")
-
-
 def _frame_at(data: bytes, start: int) -> MavlinkFrame | None:
     header = _HEADERS.get(data[start])
     if header is None or len(data) < start + header:
@@ -75,8 +74,8 @@ def _frame_at(data: bytes, start: int) -> MavlinkFrame | None:
     return found[0] if found and found[0].raw == raw else None
 
 
-def _without_signature(frame: bytes, msgid: int) -> bytes:
+def _without_signature(frame: bytes) -> bytes:
     """Clear the flag, cut the signature, and compute the CRC anew: it covers the flags."""
     checked = frame[1:2] + bytes((frame[2] & ~_SIGNED,)) + frame[3 : -_SIGNATURE_SIZE - _CRC_SIZE]
-    crc = mcrf4xx(checked + bytes((CRC_EXTRA[msgid],)))
+    crc = mcrf4xx(checked + bytes((CRC_EXTRA[int.from_bytes(frame[_MSGID], "little")],)))
     return frame[:1] + checked + crc.to_bytes(_CRC_SIZE, "little")

@@ -33,6 +33,9 @@ class UartDeed(Enum):
     CLOSE = "close"
 
 
+_WITH_DATA = frozenset({UartDeed.READ, UartDeed.WRITE})
+
+
 @dataclass(frozen=True, slots=True)
 class UartEvent:
     """One line. `speed` in baud, None where the line has none; `text`: why it was closed."""
@@ -46,14 +49,15 @@ class UartEvent:
 
 def capture_header(started: str) -> bytes:
     """Return the line with which a recording begins. `started`: time in UTC, for people."""
-    return _line({_MARK: _VERSION, "started": started})
+    return f'{{"{_MARK}":{_VERSION},"started":{json.dumps(started)}}}\n'.encode()
 
 
 def capture_line(event: UartEvent) -> bytes:
     """Return an event's line."""
-    is_data = event.deed in (UartDeed.READ, UartDeed.WRITE)
-    content = event.data.hex() if is_data else event.text
-    return _line({"t": round(event.at, 6), "baud": event.speed, event.deed.value: content})
+    speed = "null" if event.speed is None else event.speed
+    # Hex needs no escapes, and these lines are many.
+    content = f'"{event.data.hex()}"' if event.deed in _WITH_DATA else json.dumps(event.text)
+    return f'{{"t":{event.at:.6f},"baud":{speed},"{event.deed.value}":{content}}}\n'.encode()
 
 
 def is_capture(beginning: bytes) -> bool:
@@ -101,7 +105,7 @@ def _parse(line: bytes) -> UartEvent | None:
     deed = next((deed for deed in UartDeed if deed.value in found), None)
     if deed is None or not _is_time(at) or not _is_speed(speed) or not isinstance(found[deed.value], str):
         return None
-    if deed in (UartDeed.OPEN, UartDeed.CLOSE):
+    if deed not in _WITH_DATA:
         return UartEvent(at, speed, deed, text=found[deed.value])
     try:
         return UartEvent(at, speed, deed, bytes.fromhex(found[deed.value]))
@@ -115,7 +119,3 @@ def _is_time(value: object) -> TypeGuard[float]:
 
 def _is_speed(value: object) -> TypeGuard[int | None]:
     return value is None or (isinstance(value, int) and value > 0)
-
-
-def _line(content: dict[str, object]) -> bytes:
-    return json.dumps(content, separators=(",", ":")).encode() + b"\n"
