@@ -4,6 +4,7 @@
     power on|off
     plug, unplug
     stats               one line of JSON: counters, state, and the stored records in hex
+    truth               one line of JSON: what the craft is doing at this moment (service.simulator.flight)
 
 The answer is `ok`, the JSON, or `error: ...`.
 """
@@ -47,6 +48,9 @@ class Control:
         match line.split():
             case ["stats"]:
                 return json.dumps(self._stats())
+            case ["truth"]:
+                craft = self._naze.truth(now)
+                return json.dumps(None if craft is None else asdict(craft))
             case ["power", "on"]:
                 self._naze.power_on(now)
             case ["power", "off"]:

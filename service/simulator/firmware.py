@@ -11,7 +11,7 @@ from protocols.mavlink.frame import MavlinkSplitter
 from protocols.wp_record import RECORD_SIZE
 from service.simulator import frsky
 from service.simulator.flash import FlashError, NorFlash
-from service.simulator.flight import FlightState, fly
+from service.simulator.flight import Craft, FlightState, fly
 from service.simulator.mavlink_port import MavlinkSchedule, MavlinkSender
 from service.simulator.mission_slots import StoredConfig
 from service.simulator.missions import Board, BootMissions
@@ -21,6 +21,11 @@ from service.simulator.traps import Trap, TrapCounters
 from service.simulator.uart import Uart
 
 _AUTOSENSE_SECONDS = 4.0
+#: The option that says how long it takes.
+_CALIBRATIONS: dict[int, str] = {
+    HarakiriCommand.ACC_CALIBRATION: "acc_calibration_ms",
+    HarakiriCommand.MAG_CALIBRATION: "mag_calibration_ms",
+}
 _FRSKY_BAUD = 9600
 _MINIMOSD_BAUD = 57600
 _CLI_PROMPT = b"\r\n# "
@@ -65,13 +70,16 @@ class Firmware:
         self._booted_at = self._clock = self._next_loop = now
         self._looptime = options.looptime_ms / 1000
         self._flown = 0.0
+        self._home: tuple[int, int] | None = None
+        # A calibration freezes all until it restarts the board.
+        self._calibrated_at: float | None = None
 
         self._config = StoredConfig(flash, options)
         self._board = Board(options, faults, self._config.load())
         self._missions = boot_missions(flash, self._board) if faults.extension else None
         # The extension brings a buffer for its longest CHUNK: mask, number, records.
         self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
-        self._answers = MspAnswers(lambda: (self._flight(), self.armed))
+        self._answers = MspAnswers(lambda: self.craft_at(self._clock))
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
         self._schedule = MavlinkSchedule(now)
@@ -84,10 +92,18 @@ class Firmware:
         """Whether the craft is armed."""
         return self._board.armed
 
+    def craft_at(self, now: float) -> Craft:
+        """Return what the sensors would say at a moment that is not before the last loop's."""
+        since = now - self._clock
+        flight = fly(now - self._booted_at, self._flown + (since if self.armed else 0.0), self.armed)
+        return Craft(flight, self.armed, self._faults.boxes, self._home)
+
     # -- the main loop ---------------------------------------------------------------------------------------
 
     def next_loop(self) -> float | None:
         """Tell when the next main loop runs that has anything to do; None if it waits for a byte or the pilot."""
+        if self._calibrated_at is not None:
+            return self._calibrated_at
         wanted = [self._uart.next_arrival()]
         if not self.in_cli:
             if self._pilot_is_obeyed():
@@ -106,6 +122,9 @@ class Firmware:
         if self.armed:
             self._flown += at - self._clock
         self._clock = at
+        if self._calibrated_at is not None:
+            self._write_config()
+            raise ResetError
         if self.in_cli:
             self._serve_cli()
         else:
@@ -121,7 +140,7 @@ class Firmware:
             self._schedule.resume(now)
 
     def _flight(self) -> FlightState:
-        return fly(self._clock - self._booted_at, self._flown, self.armed)
+        return self.craft_at(self._clock).flight
 
     def _pilot_is_obeyed(self) -> bool:
         """Arming is refused while a configuration write is scheduled."""
@@ -132,6 +151,8 @@ class Firmware:
         if not self._pilot_is_obeyed():
             return
         self._board.armed = not self.armed
+        here = self._flight()
+        self._home = (here.lat_e7, here.lon_e7) if self.armed else None
         if self._missions:
             self._missions.drop_stale(self._clock)
         match self._options.tele_prot:
@@ -166,7 +187,7 @@ class Firmware:
         self._send_telemetry()
         if self._missions and self._clock - self._last_byte > self._options.inter_byte_timeout_ms / 1000:
             self._msp.forget()
-        while (byte := self._uart.read(self._clock)) is not None:
+        while self._calibrated_at is None and (byte := self._uart.read(self._clock)) is not None:
             self._last_byte = self._clock
             match self._traps.count(byte, self.protocol is Protocol.AUTOSENSE, self.armed):
                 case Trap.CLI:
@@ -242,6 +263,9 @@ class Firmware:
         else:
             if command == HarakiriCommand.EEPROM_WRITE:
                 self._write_config()
+            elif command in _CALIBRATIONS:
+                seconds = getattr(self._options, _CALIBRATIONS[command]) / 1000
+                self._calibrated_at = self._clock + seconds
             frame = self._answers.answer(command, payload)
         self._stall()
         self._uart.write(frame, self._clock)

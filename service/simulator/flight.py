@@ -3,14 +3,16 @@
 import math
 from dataclasses import dataclass
 
-HOME_LAT_E7 = 473977000
-HOME_LON_E7 = 85456000
-_FIELD_ALTITUDE_M = 488
+#: The field of examples/naze-field.waypoints.
+FIELD_LAT_E7 = 453838000
+FIELD_LON_E7 = 84733000
+_FIELD_ALTITUDE_M = 131
 _CRUISE_HEIGHT_M = 20.0
 _CIRCLE_RADIUS_M = 25.0
 _CRUISE_SPEED_MS = 2.5
 _CLIMB_SECONDS = 8.0
 _METRES_PER_DEGREE = 111_320.0
+_METRES_PER_DEGREE_EAST = _METRES_PER_DEGREE * math.cos(math.radians(FIELD_LAT_E7 / 1e7))
 _FULL_BATTERY_V = 12.6
 _EMPTY_BATTERY_V = 10.2
 _IDLE_SAG_VS = 0.0002
@@ -32,25 +34,41 @@ class FlightState:
     pitch: float
     heading: float
     volts: float
-    distance_home_m: float
-    direction_home: float
     satellites: int = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Craft:
+    """The craft at one moment. `boxes`: the pilot's switches but ARM, one bit each; `home`: where it was armed."""
+
+    flight: FlightState
+    armed: bool
+    boxes: int
+    home: tuple[int, int] | None
+
+    def way_home(self) -> tuple[float, float]:
+        """Return metres and degrees; zeros while there is no home."""
+        if self.home is None:
+            return 0.0, 0.0
+        lat_e7, lon_e7 = self.home
+        north = (lat_e7 - self.flight.lat_e7) / 1e7 * _METRES_PER_DEGREE
+        east = (lon_e7 - self.flight.lon_e7) / 1e7 * _METRES_PER_DEGREE_EAST
+        return math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360
 
 
 def fly(uptime: float, flown: float, armed: bool) -> FlightState:
     """Return the state `uptime` seconds after boot, of which the craft was armed for `flown`."""
-    # Metres north and east of home on a circle that begins and ends there.
+    # Metres north and east of the field's middle on a circle that begins and ends there.
     angle = flown * _CRUISE_SPEED_MS / _CIRCLE_RADIUS_M
     north = _CIRCLE_RADIUS_M * math.sin(angle)
     east = _CIRCLE_RADIUS_M * (1 - math.cos(angle))
     course = math.degrees(angle) % 360
     climbed = 1 - math.exp(-flown / _CLIMB_SECONDS)
     height = _CRUISE_HEIGHT_M * climbed if armed else 0.0
-    degrees_of_longitude = _METRES_PER_DEGREE * math.cos(math.radians(HOME_LAT_E7 / 1e7))
     sway = 1.0 if armed else 0.1
     return FlightState(
-        lat_e7=HOME_LAT_E7 + round(north / _METRES_PER_DEGREE * 1e7),
-        lon_e7=HOME_LON_E7 + round(east / degrees_of_longitude * 1e7),
+        lat_e7=FIELD_LAT_E7 + round(north / _METRES_PER_DEGREE * 1e7),
+        lon_e7=FIELD_LON_E7 + round(east / _METRES_PER_DEGREE_EAST * 1e7),
         altitude_m=_FIELD_ALTITUDE_M + height,
         height_m=height,
         climb_ms=_CRUISE_HEIGHT_M / _CLIMB_SECONDS * (1 - climbed) if armed else 0.0,
@@ -60,6 +78,4 @@ def fly(uptime: float, flown: float, armed: bool) -> FlightState:
         pitch=sway * (3.0 + 1.5 * math.sin(uptime * 0.7)),
         heading=course,
         volts=max(_FULL_BATTERY_V - _IDLE_SAG_VS * uptime - _FLIGHT_SAG_VS * flown, _EMPTY_BATTERY_V),
-        distance_home_m=math.hypot(north, east),
-        direction_home=math.degrees(math.atan2(-east, -north)) % 360 if flown else 0.0,
     )

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from protocols.msp.frame import Direction, MspFrame
-from service.simulator.flight import HOME_LAT_E7, HOME_LON_E7, FlightState
+from service.simulator.flight import Craft
 
 _STOCK_BUFFER = 64
 _VERSION = 211
@@ -14,7 +14,7 @@ _MSP_VERSION = 0
 _CAPABILITY = 0x8000_0000
 _CYCLE_TIME_US = 3000
 _SENSORS = 0b1111  # accelerometer, barometer, magnetometer, GPS
-_ANGLE_BIT, _ARM_BIT = 0, 5
+_ARM_BIT = 5
 _BOXES = (
     "ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO", "PASSTHRU",
     "HEADFREE", "BEEPER", "HEADADJ", "OSD SW", "GTUNE",
@@ -129,10 +129,10 @@ class MspReceiver:
 
 
 class MspAnswers:
-    """Answers to the stock commands. `state` gives the flight of this moment and whether it is armed."""
+    """Answers to the stock commands. `craft` gives the state of this moment."""
 
-    def __init__(self, state: Callable[[], tuple[FlightState, bool]]) -> None:
-        self._state = state
+    def __init__(self, craft: Callable[[], Craft]) -> None:
+        self._craft = craft
         self._settings = {
             HarakiriCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
             HarakiriCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
@@ -154,12 +154,13 @@ class MspAnswers:
         return MspFrame(Direction.ERROR, command).encode() if answer is None else reply(command, answer)
 
     def _read(self, command: int) -> bytes | None:
-        flight, armed = self._state()
+        craft = self._craft()
+        flight, armed = craft.flight, craft.armed
         match command:
             case HarakiriCommand.IDENT:
                 return struct.pack("<BBBI", _VERSION, _QUADX, _MSP_VERSION, _CAPABILITY)
             case HarakiriCommand.STATUS:
-                flags = 1 << _ANGLE_BIT | armed << _ARM_BIT
+                flags = craft.boxes & ~(1 << _ARM_BIT) | armed << _ARM_BIT
                 return struct.pack("<HHHIB", _CYCLE_TIME_US, 0, _SENSORS, flags, 0)
             case HarakiriCommand.RAW_IMU:
                 return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
@@ -178,8 +179,8 @@ class MspAnswers:
                 )
                 return struct.pack("<BBiiHH", 1, flight.satellites, *position)
             case HarakiriCommand.COMP_GPS:
-                direction = round((flight.direction_home + 180) % 360 - 180)
-                return struct.pack("<HhB", round(flight.distance_home_m), direction, 1)
+                distance, direction = craft.way_home()
+                return struct.pack("<HhB", round(distance), round((direction + 180) % 360 - 180), 1)
             case HarakiriCommand.ATTITUDE:
                 heading = round((flight.heading + 180) % 360 - 180)
                 return struct.pack("<4h", round(flight.roll * 10), round(flight.pitch * 10), heading, 0)
@@ -202,12 +203,12 @@ class MspAnswers:
         return None
 
     def _waypoint(self, payload: bytes) -> bytes:
-        flight, _ = self._state()
+        craft = self._craft()
         match payload[0] if payload else _HOME:
             case 0:
-                number, lat, lon = _HOME, HOME_LAT_E7, HOME_LON_E7
+                number, (lat, lon) = _HOME, craft.home or (0, 0)
             case 16:
-                number, lat, lon = _HOLD, flight.lat_e7, flight.lon_e7
+                number, lat, lon = _HOLD, craft.flight.lat_e7, craft.flight.lon_e7
             case _:
                 # The firmware announces 12 bytes, sends none, and closes with the checksum.
                 return b"$M>" + bytes((_MALFORMED_WP_SIZE, HarakiriCommand.WP, _MALFORMED_WP_SIZE ^ HarakiriCommand.WP))

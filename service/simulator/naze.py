@@ -10,6 +10,7 @@ from math import inf
 
 from service.simulator.firmware import Firmware, Protocol, ResetError
 from service.simulator.flash import ERASED, NorFlash, PowerCutError
+from service.simulator.flight import Craft
 from service.simulator.mission_commands import MissionCommands
 from service.simulator.mission_slots import flash_size
 from service.simulator.missions import Board, BootMissions
@@ -76,6 +77,11 @@ class SimulatedNaze:
     def armed(self) -> bool:
         """Whether the craft is armed, which `faults.armed` only wishes."""
         return self._firmware is not None and self._firmware.armed
+
+    def truth(self, now: float) -> Craft | None:
+        """Return what the craft is doing, as nobody but the simulation knows; None while no firmware runs."""
+        self._run_until(now)
+        return self._firmware.craft_at(now) if self._firmware else None
 
     @property
     def stored(self) -> bytes:

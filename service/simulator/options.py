@@ -37,6 +37,9 @@ class SimOptions:
     record_program_ms: float = 0.45
     config_write_ms: float = 150.0
     config_write_delay_ms: float = 1000.0
+    # Gyro, then 3100 samples at 500 Hz; 525 averages of five at 42 Hz (sensors.c).
+    acc_calibration_ms: float = 9400.0
+    mag_calibration_ms: float = 61000.0
 
 
 @dataclass(slots=True, kw_only=True)
@@ -44,7 +47,8 @@ class Faults:
     """Switches that may be turned at any moment.
 
     The rates are probabilities a bit and a byte, in both directions. `armed` is the pilot's wish: the firmware refuses
-    it while a configuration write is scheduled. `extension` counts from the next boot. The power goes in the middle of
+    it while a configuration write is scheduled. `boxes`: the other switches, one bit for each of BOXNAMES.
+    `extension` counts from the next boot. The power goes in the middle of
     that flash operation (page erases and 16-byte programs, from 1; 0: never), or so many of them fail.
     """
 
@@ -52,6 +56,7 @@ class Faults:
     lost_byte_rate: float = 0.0
     hang: bool = False
     armed: bool = False
+    boxes: int = 1
     busy: bool = False
     extension: bool = True
     power_cut_at_flash_operation: int = 0

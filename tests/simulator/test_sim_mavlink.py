@@ -93,7 +93,7 @@ def test_the_stream_tells_of_a_flight() -> None:
     messages = decode(bench.run(60))
     fixes = [message for message in messages if message.get_type() == "GPS_RAW_INT"]
     assert {(fix.fix_type, fix.satellites_visible) for fix in fixes} == {(3, 9)}
-    for axis, home in (("lat", 473977000), ("lon", 85456000)):
+    for axis, home in (("lat", 453838000), ("lon", 84733000)):
         positions = [getattr(fix, axis) for fix in fixes]
         assert 1000 < max(positions) - min(positions) < 20_000
         assert all(abs(position - home) < 20_000 for position in positions)
