@@ -17,6 +17,8 @@ from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, request
 
 #: What telemetry may take of the line, both directions added.
 _LINE_SHARE = 0.6
+#: Questions may come so close together that they take their share of this time at once.
+_BURST_S = 0.05
 #: What STATUS gets of that, if it needs it: arming must be noticed at any speed.
 _STATUS_SHARE = 0.25
 #: A line without a speed (TCP) has an UART behind it somewhere: Harakiri's default.
@@ -99,6 +101,7 @@ class PollSchedule:
         self._budget = 0.0
         self._line_scale = 1.0
         self._quality = 1.0
+        self._free_at = 0.0
         self._lost_before = 0
         self._beside_missions = False
 
@@ -132,7 +135,7 @@ class PollSchedule:
         """Send what is due, as long as the link has room for it."""
         self._look_at(link, beside_missions)
         limit = now
-        while True:
+        while now >= self._free_at:
             ready = [slot for slot in self._slots.values() if slot.due <= limit and _may_ask(slot, link)]
             if not ready:
                 return
@@ -142,6 +145,7 @@ class PollSchedule:
                 self._bend()
             slot.is_asked = True
             slot.asked_at = now if now >= slot.due + slot.interval_s else slot.due
+            self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget
             link.send(Send(slot.poll.frame, slot.poll.command, slot.size), now)
             limit = now + _GATHER_S
 
@@ -167,7 +171,7 @@ class PollSchedule:
     def next_deadline(self, link: MspLink) -> float | None:
         """Return when `ask` has something to send; None: not before a reply."""
         due = min((slot.due for slot in self._slots.values() if _may_ask(slot, link)), default=inf)
-        return None if due == inf else due
+        return None if due == inf else max(due, self._free_at)
 
     def _look_at(self, link: MspLink, beside_missions: bool) -> None:
         lost, self._lost_before = link.requests_lost - self._lost_before, link.requests_lost

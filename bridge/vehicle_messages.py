@@ -283,7 +283,7 @@ def home_position(vehicle: VehicleState, _boot_ms: int) -> Message | None:
     lat_e7, lon_e7 = home
     unknown_attitude = [math.nan] * 4
     return messages.MAVLink_home_position_message(
-        lat_e7, lon_e7, round(altitude_m * 1000), 0.0, 0.0, 0.0, unknown_attitude, math.nan, math.nan, math.nan
+        lat_e7, lon_e7, _fit(round(altitude_m * 1000), 32), 0.0, 0.0, 0.0, unknown_attitude, math.nan, math.nan, math.nan
     )
 
 

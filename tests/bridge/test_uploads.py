@@ -196,6 +196,8 @@ def test_armed_nothing_is_cleared() -> None:
         world.run(1)
         assert acks(station) == [A.DENIED]
         assert any("disarm" in text for text in station.texts())
+        # The same refusal is not said again for ten seconds.
+        world.run(10)
     assert world.stored == OLD_RECORDS
 
 
