@@ -21,6 +21,10 @@ STATION = 250
 HEARTBEAT = 0
 
 
+def msgid_of(frame: bytes) -> int:
+    return frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")
+
+
 class Listener:
     """A ground station that keeps the bytes that it heard and said."""
 
@@ -45,13 +49,13 @@ class Listener:
             except BlockingIOError:
                 return
             while data:
-                size = 12 + data[1]
+                size = data[1] + (8 if data[0] == 0xFE else 12)
                 self.heard.append(data[:size])
                 data = data[size:]
 
     def has_heard(self, msgid: int, count: int) -> bool:
         self.listen()
-        return sum(int.from_bytes(frame[7:10], "little") == msgid for frame in self.heard) >= count
+        return sum(msgid_of(frame) == msgid for frame in self.heard) >= count
 
     def close(self) -> None:
         self._socket.close()
@@ -82,9 +86,11 @@ def records_of(path: Path) -> list[TlogRecord]:
     return list(read_tlog(path.read_bytes()))
 
 
-def test_a_telemetry_log_holds_what_was_heard_and_said(start: Starter, connect: Connect) -> None:
-    daemon = start.daemon("sim:")
-    daemon.wait()
+@pytest.mark.parametrize("protocol", ["MSP", "MAVLink"])
+def test_a_telemetry_log_holds_what_was_heard_and_said(start: Starter, connect: Connect, protocol: str) -> None:
+    board = start.board(*(("--armed", "--tele-prot", "2") if protocol == "MAVLink" else ()))
+    daemon = start.daemon(str(board.link))
+    daemon.wait(protocol)
     listener = connect(daemon)
     listener.say(messages.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
     listener.say(messages.MAVLink_setup_signing_message(1, 1, bytes(range(32)), 1))
@@ -122,7 +128,7 @@ def test_a_daemon_that_is_killed_loses_the_last_second_at_most(start: Starter, c
     (path,) = logs_of(daemon)
     recorded = [record.frame.raw for record in records_of(path) if record.frame.sysid == 1]
     assert recorded == listener.heard[: len(recorded)]
-    lost = [frame for frame in listener.heard[len(recorded) :] if int.from_bytes(frame[7:10], "little") == HEARTBEAT]
+    lost = [frame for frame in listener.heard[len(recorded) :] if msgid_of(frame) == HEARTBEAT]
     # There is one each second.
     assert len(lost) <= 2
 
