@@ -47,6 +47,7 @@ class TlogFolder:
         self._limits = limits
         self._measure_free_space = measure_free_space
         self._file: _OpenFile | None = None
+        self._own: list[Path] = []
         self._synced_at = 0.0
         self._retry_at = 0.0
         self._has_complained = False
@@ -88,16 +89,23 @@ class TlogFolder:
         self._make_room(began)
         while (path := self._folder / began.strftime(_NAME_FORMAT)).exists():
             began += timedelta(seconds=1)
+        self._own.append(path)
         return _OpenFile(path)
 
     def _make_room(self, now: datetime) -> None:
-        """Remove the oldest until another file fits. What is not named as ours are is left alone."""
+        """Remove the oldest until another file fits. What is not named as ours are is left alone.
+
+        Our own of this run go last, in the order in which they were written, and not for their age: the clock may have
+        been weeks behind when we began.
+        """
         too_old = (now - timedelta(days=self._limits.days)).strftime(_NAME_FORMAT)
-        files = sorted(path for path in self._folder.iterdir() if _NAME_PATTERN.fullmatch(path.name))
-        sizes = {path: path.stat().st_size for path in files}
+        sizes = {path: path.stat().st_size for path in self._folder.iterdir() if _NAME_PATTERN.fullmatch(path.name)}
         total = sum(sizes.values())
-        for path in files:
-            if path.name >= too_old and total + self._limits.file_size <= self._limits.total_size:
+        earlier = sorted(sizes.keys() - set(self._own))
+        self._own = [path for path in self._own if path in sizes]
+        for path in (*earlier, *self._own):
+            is_too_old = path in earlier and path.name < too_old
+            if not is_too_old and total + self._limits.file_size <= self._limits.total_size:
                 return
             path.unlink()
             total -= sizes[path]

@@ -1,7 +1,7 @@
 """Writes what ground stations hear and say into telemetry logs."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from protocols.tlog import tlog_record
@@ -14,11 +14,15 @@ _CLOCK_STEP_US = 10_000_000
 
 
 class TlogRecorder:
-    """Offers `tap`. Within a file time runs on evenly; after a step of the clock a new file begins."""
+    """Offers `tap`. Within a file time runs on evenly; after a step of the clock a new file begins.
 
-    def __init__(self, folder: Path, limits: TlogLimits) -> None:
+    `read_clock`: nanoseconds since the Unix epoch, as far as the system knows.
+    """
+
+    def __init__(self, folder: Path, limits: TlogLimits, read_clock: Callable[[], int] = time.time_ns) -> None:
         self._folder = TlogFolder(folder, limits)
-        self._epoch_us = _epoch_us()
+        self._read_clock = read_clock
+        self._epoch_us = self._present_epoch_us()
         self._file_is_over = False
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
 
@@ -35,7 +39,7 @@ class TlogRecorder:
 
     def _taken(self) -> None:
         """Decide whether what comes from now on goes into a new file; only between two files time may jump."""
-        epoch_us = _epoch_us()
+        epoch_us = self._present_epoch_us()
         stepped = abs(epoch_us - self._epoch_us) > _CLOCK_STEP_US
         self._file_is_over = stepped or self._folder.is_full
         if self._file_is_over:
@@ -46,7 +50,6 @@ class TlogRecorder:
         if self._file_is_over:
             self._folder.close()
 
-
-def _epoch_us() -> int:
-    """Return when the monotonic clock was 0, in microseconds since the Unix epoch."""
-    return (time.time_ns() - time.monotonic_ns()) // 1000
+    def _present_epoch_us(self) -> int:
+        """Return when the monotonic clock was 0, in microseconds since the Unix epoch."""
+        return (self._read_clock() - time.monotonic_ns()) // 1000

@@ -1,5 +1,6 @@
 """The folder of telemetry logs: its bounds, and what a disk does to it."""
 
+import resource
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -66,11 +67,23 @@ def test_the_oldest_make_room_and_all_together_keep_their_bound(tmp_path: Path) 
 
 
 def test_what_is_too_old_goes(tmp_path: Path) -> None:
-    folder = TlogFolder(tmp_path, TlogLimits(days=30))
     for days in (31, 30, 1):
-        fill(folder, NOON - timedelta(days=days), 1)
-    fill(folder, NOON + timedelta(seconds=1), 1)
+        fill(TlogFolder(tmp_path, TlogLimits()), NOON - timedelta(days=days), 1)
+    fill(TlogFolder(tmp_path, TlogLimits(days=30)), NOON + timedelta(seconds=1), 1)
     assert names(tmp_path) == ["2026-11-20 12-00-00.tlog", "2026-11-21 12-00-01.tlog"]
+
+
+def test_what_was_written_before_the_clock_was_set_is_not_old(tmp_path: Path) -> None:
+    """A Pi that lay in a box for a winter: this flight began in autumn, and goes last if there is no room."""
+    fill(TlogFolder(tmp_path, TlogLimits()), NOON - timedelta(days=1), 10)
+    limits = TlogLimits(file_size=1000, total_size=2000)
+    folder = TlogFolder(tmp_path, limits)
+    fill(folder, NOON - timedelta(days=90), 10)
+    assert names(tmp_path) == ["2026-08-23 12-00-00.tlog", "2026-11-20 12-00-00.tlog"]
+    fill(folder, NOON, 10)
+    assert names(tmp_path) == ["2026-08-23 12-00-00.tlog", "2026-11-21 12-00-00.tlog"]
+    fill(folder, NOON + timedelta(days=1), 10)
+    assert names(tmp_path) == ["2026-11-21 12-00-00.tlog", "2026-11-22 12-00-00.tlog"]
 
 
 def test_other_files_are_left_alone(tmp_path: Path) -> None:
@@ -114,3 +127,20 @@ def test_a_disk_that_is_nearly_full_is_left_to_others(tmp_path: Path, is_recordi
     free[0] = PLENTY
     folder.write(record(NOON + timedelta(seconds=300)), 300.0)
     assert names(tmp_path)[-1] == "2026-11-21 12-05-00.tlog"
+
+
+def test_a_full_disk_is_told_once_and_what_fitted_can_be_read(tmp_path: Path) -> None:
+    """The kernel's own refusal in the middle of a record; a limit of this process stands in for the disk's."""
+    folder = TlogFolder(tmp_path, TlogLimits(), lambda _: PLENTY)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (250, hard))
+    try:
+        with capture_logs() as events:
+            for second in range(10):
+                folder.write(record(NOON + timedelta(seconds=second)), float(second))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [event["event"] for event in events] == ["tlog.recording", "tlog.stopped"]
+    assert (tmp_path / "2026-11-21 12-00-00.tlog").stat().st_size == 250
+    folder.write(record(NOON + timedelta(seconds=100)), 100.0)
+    assert names(tmp_path) == ["2026-11-21 12-00-00.tlog", "2026-11-21 12-01-40.tlog"]

@@ -1,0 +1,49 @@
+"""What is recorded, as the configuration file says it."""
+
+from pathlib import Path
+
+import pytest
+
+from service.settings import Settings, SettingsError, TlogLimits, load_settings
+
+
+def settings_of(tmp_path: Path, text: str, record_uart: Path | None = None) -> Settings:
+    config = tmp_path / "naze.toml"
+    config.write_text(text)
+    return load_settings(config, "sim:", (), tmp_path, record_uart)
+
+
+def test_telemetry_is_recorded_unless_it_is_switched_off(tmp_path: Path) -> None:
+    assert settings_of(tmp_path, "").tlog == TlogLimits(file_size=16 << 20, total_size=256 << 20, days=30)
+    assert settings_of(tmp_path, "record_tlog = false\ntlog_days = 3").tlog is None
+
+
+def test_the_bounds_are_set(tmp_path: Path) -> None:
+    limits = settings_of(tmp_path, "tlog_file_mb = 200\ntlog_days = 365").tlog
+    assert limits == TlogLimits(file_size=200 << 20, total_size=400 << 20, days=365)
+    limits = settings_of(tmp_path, "tlog_file_mb = 1\ntlog_total_mb = 2\ntlog_days = 1").tlog
+    assert limits == TlogLimits(file_size=1 << 20, total_size=2 << 20, days=1)
+
+
+def test_the_flag_goes_before_the_file(tmp_path: Path) -> None:
+    text = 'record_uart = "/var/lib/naze-bridge/naze.uart"'
+    assert settings_of(tmp_path, "").record_uart is None
+    assert settings_of(tmp_path, text).record_uart == Path("/var/lib/naze-bridge/naze.uart")
+    assert settings_of(tmp_path, text, Path("here.uart")).record_uart == Path("here.uart")
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("record_tlog = 1", "record_tlog must be a bool"),
+        ("tlog_days = true", "tlog_days must be a int"),
+        ("tlog_days = 0", "tlog_days is 0, but must be 1..3650"),
+        ("tlog_file_mb = 2000", "tlog_file_mb is 2000, but must be 1..1024"),
+        ("tlog_total_mb = 20", "tlog_total_mb is 20, but must be 32.."),
+        ("tlog_day = 20", "did you mean 'tlog_days'"),
+        ("record_uart = true", "record_uart must be a str"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(tmp_path: Path, text: str, complaint: str) -> None:
+    with pytest.raises(SettingsError, match=complaint.replace(".", r"\.")):
+        settings_of(tmp_path, text)
