@@ -20,6 +20,7 @@ from bridge.fc_session import Autopilot, FcSession
 from bridge.flight_controller import FlightController, Kind
 from bridge.ground import Ground, Tap
 from bridge.harakiri import HarakiriMissions
+from bridge.harakiri_mavlink import HarakiriMavlinkMissions
 from bridge.harakiri_relay import HarakiriRelay
 from bridge.inbox import Inbox
 from bridge.journal import Journal
@@ -245,6 +246,8 @@ class Bridge:
         dialect: MissionDialect | None = None
         if controller is not None and controller.info is not None:
             dialect = HarakiriMissions(controller.info, self._config.takeoff_max_m)
+        elif controller is not None and controller.kind is Kind.HARAKIRI_MAVLINK:
+            dialect = HarakiriMavlinkMissions(self._is_armed, self._config.takeoff_max_m)
         self.desk.controller_changed(controller, dialect)
         self._downloads.forget_all()
         if controller is None:

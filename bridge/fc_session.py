@@ -116,6 +116,8 @@ class FcSession:
             output += self._search.take_output()
         if self.link is not None:
             output += self.link.take_output()
+        if self._mavlink is not None:
+            output += self._mavlink.take_output()
         return output
 
     def received(self, data: bytes, now: float) -> None:
@@ -145,9 +147,7 @@ class FcSession:
             self.polls.ask(self.link, now, beside_missions=self._runner.is_busy)
             self._notice_silence(self.link, now)
         if self._mavlink is not None:
-            probe = self._mavlink.tick(now)
-            if probe:
-                self._output.append(probe)
+            self._mavlink.tick(now, is_conversing=self._runner.is_busy)
             if self._mavlink.ended:
                 self._begin_search(now, self._mavlink.ended)
         if self._frsky is not None:
@@ -245,6 +245,8 @@ class FcSession:
         self._enter(State.MAVLINK)
         is_harakiri = self._is_harakiri(found.heard)
         self._mavlink = MavlinkLine(is_harakiri=is_harakiri, now=now)
+        if is_harakiri:
+            self._runner.mavlink_up(self._mavlink)
         kind = Kind.HARAKIRI_MAVLINK if is_harakiri else Kind.MAVLINK
         self._welcome(FlightController(kind, kind.value), found, now)
 
@@ -298,7 +300,10 @@ class FcSession:
         self.vehicle.armed = line.armed
         if frames:
             self._on_mavlink(frames)
-        if line.ended:
+        if self._runner.is_busy:
+            for frame in frames:
+                self._runner.received_mavlink(frame, now)
+        if line.ended and self.state is State.MAVLINK:
             self._begin_search(now, line.ended)
 
     def send_mavlink(self, frame: bytes) -> None:

@@ -1,6 +1,8 @@
 """A port on which MAVLink is spoken: what comes in, and when it is over. Sans-IO."""
 
 from bridge.autosense import PROBE, is_plausible_heartbeat
+from bridge.mavlink_sender import HarakiriSender
+from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspParser
 
@@ -23,6 +25,8 @@ class MavlinkLine:
         self._msp = MspParser()
         self._heard_at = now
         self._probe_due = now + _PROBE_INTERVAL_S
+        self._sender = HarakiriSender()
+        self._output: list[bytes] = []
         self.armed: bool | None = None
         self.ended: str | None = None
 
@@ -41,14 +45,27 @@ class MavlinkLine:
             self.ended = "it answers MSP again"
         return frames
 
-    def tick(self, now: float) -> bytes:
-        """Return what is to be sent. To other autopilots goes nothing but what ground stations send."""
+    def send(self, packed: Packed) -> bool:
+        """Send a message to a Harakiri; False if there is no safe way to."""
+        frame = self._sender.frame(packed)
+        if frame is None:
+            return False
+        self._output.append(frame)
+        return True
+
+    def take_output(self) -> list[bytes]:
+        """Return what is to be written. To other autopilots goes nothing but what ground stations send."""
+        output, self._output = self._output, []
+        return output
+
+    def tick(self, now: float, *, is_conversing: bool) -> None:
+        """Ask for MSP when that is due, but not amidst a conversation; notice silence."""
         if now >= self._silent_at:
             self.ended = f"no MAVLink for {self._patience_s} s"
         elif self._is_harakiri and now >= self._probe_due:
             self._probe_due = now + _PROBE_INTERVAL_S
-            return PROBE
-        return b""
+            if not is_conversing:
+                self._output.append(PROBE)
 
     def next_deadline(self) -> float:
         """Return when `tick` has something to do."""

@@ -49,7 +49,6 @@ ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")
 _REASONS: dict[Kind, Refusal] = {
     Kind.HARAKIRI: Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
     Kind.OTHER_MSP: Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions"),
-    Kind.HARAKIRI_MAVLINK: Refusal(MissionResult.DENIED, "Flight controller is in MAVLink mode"),
     Kind.FRSKY: ARMED,
 }
 _NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
@@ -132,13 +131,22 @@ class MissionDesk:
                     result.failure.value,
                 )
             )
-        self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
+        if result.held is None:
+            self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
+        else:
+            self.held = HeldMission(
+                identify(result.held),
+                result.held,
+                tuple(items_from_records(result.held, verdict.roi_commands)),
+            )
         if verdict.result is Result.CLEARED:
             text = "Mission on the flight controller cleared"
         else:
             text = f"Mission verified: {len(verdict.records)} records"
         if result.unchanged:
             text += ", unchanged"
+        if result.held is not None and result.held != verdict.records:
+            text += ", places within 0.4 m"
         return (yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text))
 
     def read_back(self) -> Procedure[HeldMission | Refusal]:
@@ -152,6 +160,8 @@ class MissionDesk:
                 return _NO_LINK
             if self.held is not None and self.held.identity == report.stored:
                 return self.held
+            if report.state is StoreState.ARMED and report.stored is None:
+                return ARMED
             records = yield from dialect.pull()
             if records is None:
                 return _NO_LINK

@@ -1,7 +1,7 @@
 """The seam between missions and the flight controllers that store them.
 
 A dialect is one kind of flight controller: how a list is put there, proven and read back.
-`bridge.harakiri` is the first.
+`bridge.harakiri` and `bridge.harakiri_mavlink` are two.
 """
 
 from collections.abc import Callable
@@ -24,11 +24,11 @@ class StoreState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StoreReport:
-    """What the flight controller says of its mission store."""
+    """What the flight controller says of its mission store. `stored` None: not known without reading the list."""
 
     state: StoreState
     profile: RuleProfile
-    stored: ListIdentity
+    stored: ListIdentity | None
 
 
 class PushFailure(Enum):
@@ -38,6 +38,7 @@ class PushFailure(Enum):
     BUSY = "the flight controller is busy writing its configuration: try again"
     NO_SPACE = "the list does not fit the flight controller"
     REFUSED = "the flight controller refused a record"
+    UNSAFE = "an item's bytes would set off a trap of the firmware: move a waypoint a little"
     FLASH = "the flight controller could not write its flash; its old mission is kept"
     NO_ANSWER = "the flight controller does not answer; its old mission is kept"
     UNCERTAIN = "the flight controller fell silent while writing: read the mission back"
@@ -45,10 +46,14 @@ class PushFailure(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PushResult:
-    """`failure` is None when the list was read back by its checksum. `unchanged`: it was there already."""
+    """`failure` is None when the list was proven there. `unchanged`: it was there already.
+
+    `held`: what is there, if the flight controller could not take the records exactly.
+    """
 
     failure: PushFailure | None
     unchanged: bool = False
+    held: tuple[WpRecord, ...] | None = None
 
 
 #: Called with the number of records that the flight controller has.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from bridge.mission_log import ArrivedMission, Conclusion
+from protocols.mavlink.codec import Packed
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
 from protocols.wp_record import ListIdentity
 
@@ -35,6 +36,21 @@ class Receive:
     """Wait for the next reply to one of `commands`. Answer: the frame, or None on time-out."""
 
     commands: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Transmit:
+    """Send a MAVLink message. Answer: False if no frame of it is safe to send."""
+
+    packed: Packed
+
+
+@dataclass(frozen=True, slots=True)
+class Await:
+    """Wait for the next MAVLink frame with one of these message ids. Answer: the frame, or None on time-out."""
+
+    msgids: frozenset[int]
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +82,7 @@ class Recall:
     identity: ListIdentity
 
 
-Effect = Send | Receive | Pause | Save | Conclude | Recall
+Effect = Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall
 StoreEffect = Save | Conclude | Recall
 
 _MAX_ASKS = 5

@@ -4,8 +4,22 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from bridge.mavlink_line import MavlinkLine
 from bridge.msp_link import MspLink
-from bridge.procedure import Conclude, LinkLost, Pause, Procedure, Recall, Receive, Save, Send, StoreEffect
+from bridge.procedure import (
+    Await,
+    Conclude,
+    LinkLost,
+    Pause,
+    Procedure,
+    Recall,
+    Receive,
+    Save,
+    Send,
+    StoreEffect,
+    Transmit,
+)
+from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
 
 
@@ -18,9 +32,10 @@ class Runner:
     def __init__(self, on_store: Callable[[StoreEffect], None]) -> None:
         self._on_store = on_store
         self._link: MspLink | None = None
+        self._mavlink: MavlinkLine | None = None
         self._queue: deque[tuple[Procedure[Any], Callable[[Any, float], None]]] = deque()
         self._current: tuple[Procedure[Any], Callable[[Any, float], None]] | None = None
-        self._awaited: Receive | Pause | StoreEffect | None = None
+        self._awaited: Receive | Await | Pause | StoreEffect | None = None
         self._deadline: float | None = None
         self._busy = False
 
@@ -38,15 +53,25 @@ class Runner:
         """Use this link from now on."""
         self._link = link
 
+    def mavlink_up(self, line: MavlinkLine) -> None:
+        """Use this line from now on."""
+        self._mavlink = line
+
     def link_down(self, now: float) -> None:
         """Tell the running procedure that its partner is gone."""
         self._link = None
-        if isinstance(self._awaited, Receive | Pause):
+        self._mavlink = None
+        if isinstance(self._awaited, Receive | Await | Pause):
             self._advance(LinkLost("the flight controller's port is gone"), now)
 
     def received(self, frame: MspFrame, now: float) -> None:
         """Take a reply from the flight controller; the running procedure gets it if it waits for it."""
         if isinstance(self._awaited, Receive) and frame.command in self._awaited.commands:
+            self._advance(frame, now)
+
+    def received_mavlink(self, frame: MavlinkFrame, now: float) -> None:
+        """Take a MAVLink frame from the flight controller, in the same way."""
+        if isinstance(self._awaited, Await) and frame.msgid in self._awaited.msgids:
             self._advance(frame, now)
 
     def store_answered(self, answer: object, now: float) -> None:
@@ -93,6 +118,15 @@ class Runner:
                 answer = None
                 if isinstance(effect, Send | Receive) and self._link is None:
                     answer = LinkLost("there is no link to the flight controller")
+                elif isinstance(effect, Transmit | Await) and self._mavlink is None:
+                    answer = LinkLost("the flight controller speaks MAVLink no more")
+                elif isinstance(effect, Transmit):
+                    assert self._mavlink is not None
+                    answer = self._mavlink.send(effect.packed)
+                elif isinstance(effect, Await):
+                    self._awaited = effect
+                    self._deadline = now + effect.seconds
+                    return
                 elif isinstance(effect, Send):
                     assert self._link is not None
                     self._link.send(effect, now)

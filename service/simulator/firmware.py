@@ -7,11 +7,13 @@ import contextlib
 from enum import Enum, auto
 from math import ceil
 
+from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.wp_record import RECORD_SIZE
 from service.simulator import frsky
 from service.simulator.flash import FlashError, NorFlash
 from service.simulator.flight import Craft, FlightState, fly
+from service.simulator.floppy import Floppy
 from service.simulator.mavlink_port import MavlinkSchedule, MavlinkSender
 from service.simulator.mission_slots import StoredConfig
 from service.simulator.missions import Board, BootMissions
@@ -82,6 +84,8 @@ class Firmware:
         self._answers = MspAnswers(lambda: self.craft_at(self._clock))
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
+        # The firmware's own list, which the extension takes the place of.
+        self._floppy = None if self._missions else Floppy(flash, self._board, self._send_message)
         self._schedule = MavlinkSchedule(now)
         self._frsky_number, self._frsky_time = 0, now
         self._traps = TrapCounters()
@@ -171,6 +175,8 @@ class Firmware:
         self._board.config_write_due = None
         with contextlib.suppress(FlashError):
             self._config.save(self._board.wp_radius_cm)
+            if self._floppy:
+                self._floppy.save()
         self._stall()
 
     def _stall(self) -> None:
@@ -233,8 +239,11 @@ class Firmware:
             return
         for message in self._schedule.take_due(self._clock, self.protocol is Protocol.AUTOSENSE):
             uptime = self._clock - self._booted_at
-            frame = self._sender.pack(message, self._flight(), self.armed, uptime)
+            frame = self._sender.telemetry(message, self._flight(), self.armed, uptime)
             self._uart.write(frame, self._clock)
+
+    def _send_message(self, packed: Packed) -> None:
+        self._uart.write(self._sender.frame(packed), self._clock)
 
     def _send_frsky(self) -> None:
         if self._clock - self._frsky_time >= frsky.PERIOD_SECONDS - _EPSILON:
@@ -243,18 +252,19 @@ class Firmware:
             self._uart.write(frsky.frame(self._flight(), self._frsky_number), self._clock)
 
     def _completes_packet(self, byte: int) -> bool:
-        """Give a byte to the receivers that listen; what a MAVLink frame says is not simulated."""
-        if self.protocol is not Protocol.MSP and self._completes_mavlink_1(byte):
-            self._switch(Protocol.MAVLINK)
-            return True
-        if self.protocol is not Protocol.MAVLINK and (request := self._msp.push(byte)):
+        """Give a byte to the receivers that listen."""
+        if self.protocol is not Protocol.MSP:
+            for frame in self._mavlink.feed(bytes((byte,))):
+                if frame.version == 1:
+                    self._switch(Protocol.MAVLINK)
+                    if self._floppy:
+                        self._floppy.take(frame, self._clock)
+                    return True
+        if self.protocol is not Protocol.MAVLINK and self._faults.msp and (request := self._msp.push(byte)):
             self._switch(Protocol.MSP)
             self._answer(*request)
             return True
         return False
-
-    def _completes_mavlink_1(self, byte: int) -> bool:
-        return any(frame.version == 1 for frame in self._mavlink.feed(bytes((byte,))))
 
     def _answer(self, command: int, payload: bytes) -> None:
         if self._missions and (answer := self._missions.answer(command, payload, self._clock)) is not None:

@@ -1,6 +1,6 @@
 """Harakiri's MAVLink 1 stream: what it sends, when, and as whom (baseflight_mavlink.c).
 
-Frames are packed here rather than by pymavlink: the firmware sends them without the fields that MAVLink 2
+Payloads are packed here rather than by pymavlink: the firmware sends them without the fields that MAVLink 2
 added.
 """
 
@@ -8,10 +8,7 @@ import math
 import struct
 from enum import Enum
 
-from fastcrc.crc16 import mcrf4xx
-
-from protocols.mavlink.dialect import CRC_EXTRA
-from protocols.mavlink.frame import MAGIC_V1
+from protocols.mavlink.codec import FrameWriter, Packed
 from service.simulator.flight import FlightState
 
 _SYSID = 1
@@ -84,15 +81,17 @@ class MavlinkSender:
     """Packs frames with a running sequence number."""
 
     def __init__(self) -> None:
-        self._seq = 0
+        self._writer = FrameWriter(_SYSID, _COMPID)
 
-    def pack(self, message: Stream, flight: FlightState, armed: bool, uptime: float) -> bytes:
+    def telemetry(self, message: Stream, flight: FlightState, armed: bool, uptime: float) -> bytes:
         """Encode a message of this moment; `uptime` in seconds."""
         _, msgid, layout = message.value
         payload = struct.pack(layout, *_fields(message, flight, armed, round(uptime * 1000)))
-        body = bytes((len(payload), self._seq, _SYSID, _COMPID, msgid)) + payload
-        self._seq = (self._seq + 1) & 0xFF
-        return bytes((MAGIC_V1,)) + body + struct.pack("<H", mcrf4xx(body + bytes((CRC_EXTRA[msgid],))))
+        return self.frame(Packed(msgid, payload, payload))
+
+    def frame(self, packed: Packed) -> bytes:
+        """Make the frame of any message."""
+        return self._writer.frame(packed, 1)
 
 
 def _fields(message: Stream, flight: FlightState, armed: bool, uptime_ms: int) -> tuple[float, ...]:

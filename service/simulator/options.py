@@ -48,7 +48,7 @@ class Faults:
 
     The rates are probabilities a bit and a byte, in both directions. `armed` is the pilot's wish: the firmware refuses
     it while a configuration write is scheduled. `boxes`: the other switches, one bit for each of BOXNAMES.
-    `extension` counts from the next boot. The power goes in the middle of
+    `extension` counts from the next boot. Without `msp` only MAVLink is answered. The power goes in the middle of
     that flash operation (page erases and 16-byte programs, from 1; 0: never), or so many of them fail.
     """
 
@@ -59,6 +59,7 @@ class Faults:
     boxes: int = 1
     busy: bool = False
     extension: bool = True
+    msp: bool = True
     power_cut_at_flash_operation: int = 0
     flash_failures: int = 0
 

@@ -23,7 +23,7 @@ from bridge.procedure import Conclude, Recall, Save, StoreEffect
 from bridge.station import Peer
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.msp.frame import MspParser
 from protocols.msp.hazards import is_clean
 from protocols.wp_record import WpRecord, identify, unpack_records
@@ -273,6 +273,10 @@ class World:
             # What ground stations send to an autopilot that speaks for itself.
             (passed,) = MavlinkSplitter().feed(data)
             assert passed.raw == data
+        elif self.kind is Kind.HARAKIRI_MAVLINK and data[0] == MAGIC_V1:
+            # Whether it sets off a trap is counted by the board.
+            (sent,) = MavlinkSplitter().feed(data)
+            assert sent.raw == data
         else:
             frames = MspParser().feed(data)
             assert b"".join(frame.encode() for frame in frames) == data, f"not whole frames: {data.hex()}"

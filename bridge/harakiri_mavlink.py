@@ -1,0 +1,259 @@
+"""Missions for a Harakiri that answers nothing but MAVLink: its own mission messages (baseflight_mavlink.c).
+
+It takes MISSION_ITEM only, with coordinates in single precision, one item at a time, and forgets a transfer after
+500 ms. What is then in its memory, a part of the list, it writes a second later. But any error that it finds meanwhile
+makes it load the old list again: so after a failure it is sent an item that is out of sequence. The traps
+of its serial port are minded by `bridge.mavlink_sender`; an item that cannot be sent safely refuses the list.
+
+A written list is read back, item by item. Single precision holds a coordinate to 0.4 m.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from bridge.mission_check import RuleProfile
+from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.mission_records import items_from_records
+from bridge.mission_rules import MAV_COMMANDS
+from bridge.procedure import Await, LinkLost, Procedure, Transmit, pause
+from protocols.float32 import neighbours, single
+from protocols.mavlink.codec import MavlinkDecoder, pack
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkFrame
+from protocols.mission_item import Command, Frame, MissionItem
+from protocols.wp_record import WpRecord
+
+#: Harakiri's ids; it does not look whether it is meant.
+_TARGET = (1, 200)
+#: Well within its 500 ms: there is time for a second try.
+_PATIENCE_S = 0.2
+_TRIES = 2
+_MAX_BEGINS = 3
+#: The list is written 1 s after the last item, and the CPU stands still for that.
+_WRITTEN_AFTER_S = 1.6
+_REQUEST, _ACK = m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK
+_COUNT, _ITEM = m.MAVLINK_MSG_ID_MISSION_COUNT, m.MAVLINK_MSG_ID_MISSION_ITEM
+_NO_SEQ = 0xFFFF
+_E7 = single(1e7)
+_COMMANDS = {int(command): number for number, command in MAV_COMMANDS.items()}
+#: What is told if this ends the last attempt; others say nothing but "the line is bad".
+_FAILURES = {
+    m.MAV_MISSION_NO_SPACE: PushFailure.NO_SPACE,
+    m.MAV_MISSION_INVALID: PushFailure.REFUSED,
+    m.MAV_MISSION_ERROR: PushFailure.BUSY,
+}
+
+
+class _Failed(Exception):
+    """An attempt is over."""
+
+    def __init__(self, failure: PushFailure, *, is_final: bool = False) -> None:
+        super().__init__(failure.value)
+        self.failure = failure
+        self.is_final = is_final
+
+
+class HarakiriMavlinkMissions:
+    """The mission store of one Harakiri in MAVLink mode. `is_armed`: None while no heartbeat told."""
+
+    def __init__(self, is_armed: Callable[[], bool | None], takeoff_max_m: int) -> None:
+        self._is_armed = is_armed
+        self._profile = RuleProfile(takeoff_max_m=takeoff_max_m)
+        self._decoder = MavlinkDecoder()
+        self._known: tuple[WpRecord, ...] | None = None
+
+    @property
+    def wp_radius_cm(self) -> int:
+        """Harakiri's default: its own value cannot be asked for here."""
+        return self._profile.wp_radius_cm
+
+    def report(self) -> Procedure[StoreReport | None]:
+        """Tell whether it would take a list; what it holds is not known without reading it."""
+        yield from pause(0.0)
+        armed = self._is_armed()
+        if armed is None:
+            return None
+        return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._profile, None)
+
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult]:
+        """Write the list and read it back."""
+        wanted = tuple(as_stored(record) for record in records)
+        items = [_message(seq, item) for seq, item in enumerate(items_from_records(wanted))] or _NOTHING
+        failure = PushFailure.NO_ANSWER
+        try:
+            for _ in range(_MAX_BEGINS):
+                try:
+                    yield from self._write(items, progress)
+                    yield from pause(_WRITTEN_AFTER_S)
+                    held = yield from self._read(wanted)
+                    if held != wanted:
+                        return PushResult(PushFailure.UNCERTAIN)
+                    self._known = wanted
+                    return PushResult(None, held=wanted)
+                except _Failed as failed:
+                    failure = failed.failure
+                    restored = yield from self._restore()
+                    if not restored:
+                        return PushResult(PushFailure.UNCERTAIN)
+                    if failed.is_final:
+                        break
+                    if failure is PushFailure.BUSY:
+                        yield from pause(_WRITTEN_AFTER_S)
+        except LinkLost:
+            failure = PushFailure.UNCERTAIN
+        return PushResult(failure)
+
+    def pull(self) -> Procedure[tuple[WpRecord, ...] | None]:
+        """Read the list that is there."""
+        return (yield from self._read(self._known or ()))
+
+    def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
+        """Harakiri knows the parameter by another name and scale; it is not set from here."""
+        yield from pause(0.0)
+        return None
+
+    def _write(self, items: Sequence[Message], progress: PushProgress) -> Procedure[None]:
+        """Send the list up to its MISSION_ACK."""
+        answer = yield from self._ask(m.MAVLink_mission_count_message(*_TARGET, len(items)), 0)
+        for seq, item in enumerate(items):
+            if answer.msgid == _ACK or self._seq_of(answer) != seq:
+                raise _Failed(PushFailure.NO_ANSWER)
+            answer = yield from self._ask(item, seq + 1)
+            if answer.msgid == _ACK and self._result_of(answer) == m.MAV_MISSION_ACCEPTED:
+                if len(items) - seq > 1 and items is not _NOTHING:
+                    raise _Failed(PushFailure.NO_ANSWER)
+                return
+            progress(seq + 1)
+        raise _Failed(PushFailure.NO_ANSWER)
+
+    def _ask(self, message: Message, expected: int) -> Procedure[MavlinkFrame]:
+        """Send, and wait for the request for item `expected` or a MISSION_ACK. A refusal raises."""
+        for _ in range(_TRIES):
+            is_safe: bool = yield Transmit(pack(message))
+            if not is_safe:
+                # The pilot may move the waypoint by a metre.
+                raise _Failed(PushFailure.UNSAFE, is_final=True)
+            while True:
+                answer: MavlinkFrame | None = yield Await(frozenset((_REQUEST, _ACK)), _PATIENCE_S)
+                if answer is None:
+                    break
+                if answer.msgid == _ACK:
+                    result = self._result_of(answer)
+                    if result == m.MAV_MISSION_ACCEPTED:
+                        return answer
+                    failure = _FAILURES.get(result, PushFailure.NO_ANSWER)
+                    raise _Failed(failure, is_final=failure in (PushFailure.NO_SPACE, PushFailure.REFUSED))
+                if self._seq_of(answer) == expected:
+                    return answer
+        raise _Failed(PushFailure.NO_ANSWER)
+
+    def _restore(self) -> Procedure[bool]:
+        """Have the old list loaded again; tell whether it said so."""
+        nowhere = replace(items_from_records([_HOME])[0], seq=_NO_SEQ)
+        for _ in range(3):
+            yield Transmit(pack(_message(_NO_SEQ, nowhere)))
+            answer: MavlinkFrame | None = yield Await(frozenset((_ACK,)), _PATIENCE_S)
+            if answer is not None and self._result_of(answer) != m.MAV_MISSION_ACCEPTED:
+                return True
+        return False
+
+    def _read(self, likely: tuple[WpRecord, ...]) -> Procedure[tuple[WpRecord, ...] | None]:
+        """Read the list; as `likely` if it reads as that one would. An empty one is not answered at all."""
+        for _ in range(_MAX_BEGINS):
+            count = yield from self._question(m.MAVLink_mission_request_list_message(*_TARGET), _COUNT)
+            if count is None:
+                continue
+            items = yield from self._read_items(self._field(count, "count"))
+            if items is None:
+                continue
+            if items == [_as_read(seq, item) for seq, item in enumerate(items_from_records(likely))]:
+                return likely
+            return tuple(_record(item) for item in items)
+        # As many questions stay unanswered by an empty store; a line that is gone ends the procedure.
+        return () if count is None else None
+
+    def _read_items(self, count: int) -> Procedure[list[MissionItem] | None]:
+        items: list[MissionItem] = []
+        for seq in range(count):
+            message = m.MAVLink_mission_request_message(*_TARGET, seq)
+            answer = yield from self._question(message, _ITEM, seq)
+            decoded = None if answer is None else self._decoder.decode(answer)
+            if decoded is None:
+                return None
+            params = (decoded.param1, decoded.param2, decoded.param3, decoded.param4)
+            lat_e7, lon_e7 = _as_int(decoded.x), _as_int(decoded.y)
+            items.append(MissionItem(seq, decoded.command, decoded.frame, *params, lat_e7, lon_e7, decoded.z))
+        return items
+
+    def _question(self, message: Message, answer_id: int, seq: int | None = None) -> Procedure[MavlinkFrame | None]:
+        for _ in range(_TRIES):
+            is_safe: bool = yield Transmit(pack(message))
+            if not is_safe:
+                return None
+            answer: MavlinkFrame | None = yield Await(frozenset((answer_id,)), _PATIENCE_S)
+            if answer is not None and (seq is None or self._seq_of(answer) == seq):
+                return answer
+        return None
+
+    def _seq_of(self, frame: MavlinkFrame) -> int:
+        return self._field(frame, "seq")
+
+    def _result_of(self, frame: MavlinkFrame) -> int:
+        return self._field(frame, "type")
+
+    def _field(self, frame: MavlinkFrame, name: str) -> int:
+        message = self._decoder.decode(frame)
+        return _NO_SEQ if message is None else int(getattr(message, name))
+
+
+def as_stored(record: WpRecord) -> WpRecord:
+    """Return what Harakiri makes of a record that is sent to it in single precision."""
+    return replace(record, lat_e7=_as_int(_single_e7(record.lat_e7)), lon_e7=_as_int(_single_e7(record.lon_e7)))
+
+
+def _as_int(degrees: float) -> int:
+    """Do as the firmware: (int32_t)(x * 1.0e7f)."""
+    return math.trunc(single(degrees * _E7))
+
+
+def _single_e7(value_e7: int) -> float:
+    """Return the degrees that the firmware stores as near to `value_e7` as it can."""
+    if value_e7 == 0:
+        return 0.0
+    return min(neighbours(single(value_e7 / 1e7)), key=lambda degrees: abs(_as_int(degrees) - value_e7))
+
+
+def _message(seq: int, item: MissionItem) -> Message:
+    """Make MISSION_ITEM. Harakiri reads neither frame nor autocontinue."""
+    params = (item.p1, item.p2, 0.0, item.p4)
+    place = (_single_e7(item.lat_e7 or 0), _single_e7(item.lon_e7 or 0), item.alt_m)
+    command = Command.NAV_ROI if item.command not in _COMMANDS else item.command
+    return m.MAVLink_mission_item_message(*_TARGET, seq, Frame.GLOBAL_RELATIVE_ALT, command, 0, 1, *params, *place)
+
+
+def _as_read(seq: int, item: MissionItem) -> MissionItem:
+    """Return what is read of an item that was stored."""
+    lat_e7, lon_e7 = (_as_int(single(single(value or 0) / _E7)) for value in (item.lat_e7, item.lon_e7))
+    return replace(item, seq=seq, frame=int(Frame.GLOBAL_RELATIVE_ALT), lat_e7=lat_e7, lon_e7=lon_e7)
+
+
+def _record(item: MissionItem) -> WpRecord:
+    """Return the record that is read as `item`."""
+    is_turns = item.command == Command.NAV_LOITER_TURNS
+    return WpRecord(
+        lat_e7=item.lat_e7 or 0,
+        lon_e7=item.lon_e7 or 0,
+        height_m=int(item.alt_m),
+        roi_heading=int(item.p4),
+        time=0 if is_turns else int(item.p1),
+        radius_m=int(item.p2),
+        turns=int(item.p1) if is_turns else 0,
+        command=_COMMANDS.get(item.command, 0),
+    )
+
+
+_HOME = WpRecord(0, 0, 0, 0, 0, 0, 0, 0)
+#: Two items of which the first is good for nothing are accepted, and clear the store.
+_NOTHING = [_message(seq, replace(items_from_records([_HOME])[0], seq=seq)) for seq in (0, 1)]

@@ -1,0 +1,31 @@
+"""Sends MAVLink to a Harakiri without setting off its traps. Sans-IO."""
+
+from protocols.mavlink.codec import FrameWriter, Packed
+from protocols.msp.hazards import HAZARDS, RUN_LENGTH
+
+#: Who speaks: any ground station's ids; Harakiri answers to whoever asks.
+_SYSID, _COMPID = 255, 190
+_RUNS = tuple(bytes((hazard,)) * RUN_LENGTH for hazard in sorted(HAZARDS))
+
+
+class HarakiriSender:
+    """Makes frames in which no trap's byte stands three times in a row, nor across the border to the frame before.
+
+    Three 0x0D enter the CLI in any protocol; '#' and 'R' count only in AUTOSENSE, but it can fall back to that at any
+    moment. MAVLink has no masking as our MSP extension has: only the sequence number may be chosen, and with it
+    changes the CRC. A run within the payload cannot be helped.
+    """
+
+    def __init__(self) -> None:
+        self._writer = FrameWriter(_SYSID, _COMPID)
+        self._tail = b""
+
+    def frame(self, packed: Packed) -> bytes | None:
+        """Return a frame that is safe to send now; None if there is none."""
+        for _ in range(256):
+            frame = self._writer.frame(packed, 1)
+            on_wire = self._tail + frame
+            if not any(run in on_wire for run in _RUNS):
+                self._tail = on_wire[1 - RUN_LENGTH :]
+                return frame
+        return None

@@ -1,0 +1,19 @@
+"""Single precision as a flight controller computes with it."""
+
+import struct
+
+_FLOAT = struct.Struct("<f")
+_BITS = struct.Struct("<i")
+
+
+def single(value: float) -> float:
+    """Return the nearest single-precision number."""
+    (rounded,) = _FLOAT.unpack(_FLOAT.pack(value))
+    return float(rounded)
+
+
+def neighbours(value: float) -> tuple[float, float, float]:
+    """Return a single-precision number other than 0, and the ones beside it."""
+    (bits,) = _BITS.unpack(_FLOAT.pack(value))
+    low, mid, high = (_FLOAT.unpack(_BITS.pack(bits + step))[0] for step in (-1, 0, 1))
+    return low, mid, high

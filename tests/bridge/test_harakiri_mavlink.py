@@ -1,0 +1,145 @@
+"""Missions for a Harakiri that answers nothing but MAVLink, by its own mission messages."""
+
+import struct
+from dataclasses import replace
+
+import pytest
+from conversations import Download, Upload, waypoints
+from world import GroundStation, World
+
+from bridge.flight_controller import Kind
+from bridge.harakiri_mavlink import as_stored
+from bridge.mission_check import RuleProfile, check_list
+from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.wp_record import WpRecord
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+A = MissionResult
+
+
+def mavlink_only(faults: Faults | None = None, seed: int = 0) -> tuple[World, GroundStation]:
+    """A Harakiri without the extension that does not answer MSP, found by its MAVLink."""
+    faults = faults or Faults()
+    faults.extension = faults.msp = False
+    world = World(SimOptions(seed=seed), faults, speeds=(115200,), seed=seed)
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 8)
+    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 8)
+    return world, GroundStation(world)
+
+
+def mixed() -> list[MissionItem]:
+    """One of each that Harakiri knows."""
+    items = waypoints(10)
+    items[1] = replace(items[1], command=Command.NAV_TAKEOFF, lat_e7=0, lon_e7=0, alt_m=10.0)
+    items[2] = replace(items[2], command=Command.DO_SET_ROI)
+    items[3] = replace(items[3], p1=1.0, p4=1.0)
+    items[4] = replace(items[4], command=Command.NAV_LOITER_TURNS, p1=-3.0)
+    items[5] = replace(items[5], command=Command.NAV_LOITER_TIME, p1=30.0, p2=12.0, alt_m=-7.0)
+    items[6] = replace(items[6], command=Command.NAV_RETURN_TO_LAUNCH, lat_e7=0, lon_e7=0)
+    items[9] = replace(items[9], command=Command.NAV_LAND, lat_e7=0, lon_e7=0, alt_m=0.0)
+    return items
+
+
+def held(items: list[MissionItem]) -> tuple[WpRecord, ...]:
+    """What it can hold of a list: coordinates go through single precision."""
+    return tuple(as_stored(record) for record in check_list(items, RuleProfile()).records)
+
+
+def near(one: int | None, other: int | None) -> bool:
+    return abs((one or 0) - (other or 0)) <= 40
+
+
+@pytest.mark.parametrize("items", [waypoints(2), mixed(), waypoints(146)], ids=["2", "mixed", "146"])
+def test_a_list_is_written_read_back_and_accepted(items: list[MissionItem]) -> None:
+    world, station = mavlink_only()
+    assert Upload(station, items).run() is A.ACCEPTED
+    assert world.stored == held(items)
+    read = Download(station).run()
+    assert read is not None
+    for sent, got in zip(check_list(items, RuleProfile()).items, read, strict=True):
+        assert near(sent.lat_e7, got.lat_e7)
+        assert near(sent.lon_e7, got.lon_e7)
+        assert replace(got, lat_e7=sent.lat_e7, lon_e7=sent.lon_e7) == sent
+    assert any("0.4 m" in text for text in station.texts())
+    world.assert_line_was_clean()
+
+
+def test_a_list_that_was_there_is_read() -> None:
+    world, station = mavlink_only()
+    assert Upload(station, mixed()).run() is A.ACCEPTED
+    world.unplug()
+    world.plug()
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 8)
+    world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 8)
+    read = Download(station).run()
+    assert read is not None
+    assert [item.command for item in read] == [
+        Command.NAV_ROI if item.command == Command.DO_SET_ROI else item.command for item in mixed()
+    ]
+
+
+def test_clearing() -> None:
+    world, station = mavlink_only()
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+    assert Upload(station, []).run() is A.ACCEPTED
+    assert world.stored == ()
+    assert Download(station).run() == []
+
+
+def test_armed_is_denied() -> None:
+    world, station = mavlink_only()
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+    world.faults.armed = True
+    world.run(4)
+    assert Upload(station, waypoints(6)).run() is A.DENIED
+    assert world.stored == held(waypoints(5))
+
+
+@pytest.mark.parametrize("hazard", [0x0D, 0x23, 0x52])
+def test_a_list_that_would_set_off_a_trap_is_refused(hazard: int) -> None:
+    world, station = mavlink_only()
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+    degrees = trapped_degrees(hazard)
+    items = waypoints(6)
+    items[3] = replace(items[3], lat_e7=round(degrees * 1e7))
+    assert Upload(station, items).run() is A.DENIED
+    assert any("trap" in text for text in station.texts())
+    assert world.stored == held(waypoints(5))
+    world.assert_line_was_clean()
+
+
+def trapped_degrees(hazard: int) -> float:
+    """Return a latitude whose single-precision bytes hold three hazard bytes in a row."""
+
+    for high in range(256):
+        (degrees,) = struct.unpack("<f", bytes((hazard, hazard, hazard, high)))
+        if 1 <= abs(degrees) <= 89:
+            return float(degrees)
+    # The exponent's bytes do not allow it: the run begins in the field before.
+    raise AssertionError(hazard)
+
+
+@pytest.mark.parametrize("rate", [3e-4, 1e-3])
+def test_a_bad_line_costs_time_and_never_the_truth(rate: float) -> None:
+    outcomes = set()
+    for seed in range(6):
+        world, station = mavlink_only(seed=seed)
+        assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+        world.faults.lost_byte_rate = rate
+        result = Upload(station, waypoints(30, 1), tries=40).run()
+        world.faults.lost_byte_rate = 0.0
+        outcomes.add(result)
+        world.run(3)
+        if result is A.ACCEPTED:
+            assert world.stored == held(waypoints(30, 1))
+        elif not any("read the mission back" in text for text in station.texts()):
+            assert world.stored == held(waypoints(5))
+    assert A.ACCEPTED in outcomes
+
+
+def test_an_unpatched_harakiri_that_answers_msp_is_told_what_it_lacks() -> None:
+    faults = Faults(extension=False)
+    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=(115200,))
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI, 8)
+    station = GroundStation(world)
+    assert Upload(station, waypoints(5)).run() is A.UNSUPPORTED
