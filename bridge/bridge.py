@@ -4,14 +4,15 @@ The service feeds bytes, time and the store's answers in, and afterwards takes w
 A byte's way from the UART:
     fc_received -> FcSession -> MspLink -> VehicleState -> OwnVehicle -> Ground -> take_datagrams
 A mission item's way to the flight controller, and back for the proof:
-    gcs_received -> Ground -> Inbox -> MissionUploads -> MissionCheck
+    gcs_received -> Ground -> Guard -> Inbox -> MissionUploads -> MissionCheck
         -> MissionDesk.deliver -> HarakiriMissions.push -> MspLink
 An autopilot that speaks MAVLink for itself is not represented but passed through, both ways:
     FcSession <-> PassThrough <-> Ground
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 
 from bridge.commands import Commands
@@ -19,6 +20,7 @@ from bridge.fc_actions import FcActions
 from bridge.fc_session import Autopilot, FcSession
 from bridge.flight_controller import FlightController, Kind
 from bridge.ground import Ground, Tap
+from bridge.guard import Guard, LinkAccess, Refused, denial
 from bridge.harakiri import HarakiriMissions
 from bridge.harakiri_mavlink import HarakiriMavlinkMissions
 from bridge.harakiri_relay import HarakiriRelay
@@ -38,20 +40,27 @@ from bridge.procedure import Procedure, StoreEffect
 from bridge.runner import Runner
 from bridge.station import Peer, Severity, Station
 from protocols.mavlink.codec import MavlinkDecoder
-from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame
+from protocols.mavlink.target import target_of
 from protocols.mission_item import MissionItem
+
+_AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
 
 
 @dataclass(frozen=True, slots=True)
 class BridgeConfig:
-    """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed."""
+    """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed.
+
+    `links`: who may write over which link, by its name; over others everyone may.
+    """
 
     speeds: Sequence[int | None]
     sysid: int = 1
     compid: int = 1
     takeoff_max_m: int = 15
     autopilot: Autopilot = Autopilot.AUTO
+    links: Mapping[str, LinkAccess] = field(default_factory=dict)
 
 
 class Bridge:
@@ -68,7 +77,13 @@ class Bridge:
         self._relay: HarakiriRelay | None = None
         self._presence = Presence()
 
-        self.ground = Ground(config.sysid, config.compid, journal, lambda: self._vehicle.newcomer(), tap)
+        signers = {
+            name: partial(access.signing.signature, link_id=access.link_id)
+            for name, access in config.links.items()
+            if access.signing is not None
+        }
+        self.guard = Guard(config.links, journal)
+        self.ground = Ground(config.sysid, config.compid, journal, lambda: self._vehicle.newcomer(), tap, signers)
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(
             config.speeds,
@@ -134,7 +149,10 @@ class Bridge:
         """Take bytes from a ground station. A datagram holds whole frames only."""
         self._now = now
         for frame in self.ground.received(peer, data, now, datagram=datagram):
-            if self._pass_through is not None:
+            refused = self.guard.refusal(peer, frame)
+            if refused is not None:
+                self._answer_refused(refused, Station(peer, frame.sysid, frame.compid), frame)
+            elif self._pass_through is not None:
                 if self._pass_through.from_station(peer, frame):
                     self.session.send_mavlink(frame.raw)
             elif self._inbox.understands(frame.msgid):
@@ -233,13 +251,34 @@ class Bridge:
         if news is not None and self._pass_through is None:
             self.ground.say(*news)
 
+    def _answer_refused(self, refused: Refused, station: Station, frame: MavlinkFrame) -> None:
+        """Answer what the guard did not let in, in the name of who was asked, if that is the vehicle."""
+        system, component = target_of(frame)
+        if self._pass_through is None:
+            answers, is_vehicle = partial(self.ground.to, station), self._is_ours(system, component)
+        else:
+            answers = partial(self.ground.to_as, system, component or _AUTOPILOT, station)
+            is_vehicle = self._pass_through.is_aboard(system)
+        if not (refused.is_told and is_vehicle):
+            return
+        message = self._decoder.decode(frame)
+        answer = None if message is None else denial(message, station)
+        if answer is not None:
+            answers(answer)
+        if refused.is_first:
+            answers(messages.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
+
     def _left(self, peer: Peer) -> None:
+        self.guard.forget(peer)
         if self._pass_through is not None:
             self._pass_through.forget(peer)
 
     def _is_for_us(self, message: Message) -> bool:
         system = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
+        return self._is_ours(system, component)
+
+    def _is_ours(self, system: int, component: int) -> bool:
         return system in (0, self._config.sysid) and component in (0, self._config.compid)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:

@@ -1,6 +1,6 @@
 """The ground stations' side: who is there, what they sent, and what is on its way to them. Sans-IO."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from bridge.journal import Journal
 from bridge.recent_texts import RecentTexts
@@ -12,19 +12,33 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
 _TEXT_SIZE = 50
 
+#: Returns the signature of a MAVLink 2 frame.
+Signer = Callable[[bytes], bytes]
 #: Is shown the frames that are sent to ground stations or taken from them, each once.
 Tap = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
-    """All ground stations together. Implements `Post`. `on_newcomer`: somebody was heard for the first time."""
+    """All ground stations together. Implements `Post`. `on_newcomer`: somebody was heard for the first time.
 
-    def __init__(self, sysid: int, compid: int, journal: Journal, on_newcomer: Callable[[], None], tap: Tap) -> None:
+    On a link that has a signer, by its name, all that we say is signed, and so MAVLink 2.
+    """
+
+    def __init__(
+        self,
+        sysid: int,
+        compid: int,
+        journal: Journal,
+        on_newcomer: Callable[[], None],
+        tap: Tap,
+        signers: Mapping[str, Signer],
+    ) -> None:
         self._sysid = sysid
         self._compid = compid
         self._journal = journal
         self._on_newcomer = on_newcomer
         self.tap = tap
+        self._signers = signers
         self._stations = Stations()
         self._default_peers: dict[Peer, bool] = {}
         self._splitters: dict[Peer, MavlinkSplitter] = {}
@@ -128,7 +142,14 @@ class Ground:
     def to(self, station: Station, message: Message) -> None:
         """Send a message to one ground station."""
         peer = station.peer
-        self.tap([self._write(peer, message, self._stations.version(peer))])
+        self.tap([self._write(peer, message, self._version(peer))])
+
+    def to_as(self, sysid: int, compid: int, station: Station, message: Message) -> None:
+        """Send a message to one ground station in the name of who was asked."""
+        peer = station.peer
+        frame = FrameWriter(sysid, compid, self._signers.get(peer.link)).frame(pack(message), self._version(peer))
+        self._datagrams.append((peer, frame))
+        self.tap([frame])
 
     def broadcast(self, message: Message) -> None:
         """Send a message to everyone."""
@@ -138,7 +159,7 @@ class Ground:
         """Send a packed message to some."""
         frame = None
         for peer in peers:
-            frame = self._writer(peer).frame(packed, self._stations.version(peer))
+            frame = self._writer(peer).frame(packed, self._version(peer))
             self._datagrams.append((peer, frame))
         if frame is not None:
             self.tap([frame])
@@ -147,9 +168,11 @@ class Ground:
         """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.
 
         A ground station of MAVLink 1 only would not see the vehicle otherwise; Mission Planner speaks MAVLink 1
-        until it has seen MAVLink 2.
+        until it has seen MAVLink 2, which it reads from the start. So where all is signed it needs no MAVLink 1.
         """
         for peer in self.everyone():
+            if peer.link in self._signers:
+                continue
             other = 1 if self._stations.is_unknown(peer) else 2
             if self._stations.version(peer) != other:
                 self._write(peer, heartbeat, other)
@@ -178,8 +201,11 @@ class Ground:
     def _writer(self, peer: Peer) -> FrameWriter:
         writer = self._writers.get(peer)
         if writer is None:
-            writer = self._writers[peer] = FrameWriter(self._sysid, self._compid)
+            writer = self._writers[peer] = FrameWriter(self._sysid, self._compid, self._signers.get(peer.link))
         return writer
+
+    def _version(self, peer: Peer) -> int:
+        return 2 if peer.link in self._signers else self._stations.version(peer)
 
 
 def split_text(text: str) -> list[str]:

@@ -15,7 +15,7 @@ from protocols.mavlink.target import is_for_all, target_of
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
-#: Carries a signing key in the clear: it is nobody's but the two ends of a cable.
+#: Carries a signing key in the clear. From ground stations the guard does not let it in.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
 
 
@@ -42,11 +42,13 @@ class PassThrough:
             self._send_addressed(frame)
         self._send(for_all)
 
+    def is_aboard(self, system: int) -> bool:
+        """Tell whether a system was heard on the autopilot's side."""
+        return system in self._aboard
+
     def from_station(self, peer: Peer, frame: MavlinkFrame) -> bool:
-        """Send a ground station's frame on to others; tell whether it is for the autopilot, too."""
+        """Send a frame that the guard has let in on to other stations; tell whether it is for the autopilot, too."""
         self._heard.setdefault((frame.sysid, frame.compid), set()).add(peer)
-        if frame.msgid == _NEVER_FORWARDED:
-            return False
         system, component = target_of(frame)
         if system == 0:
             self._ground.forward([frame.raw], [other for other in self._ground.everyone() if other != peer])

@@ -60,13 +60,13 @@ class Timestamps:
 
 
 class Check(Enum):
-    """What a frame's signature is worth. The value is how the log says it."""
+    """What a frame's signature is worth. The value is how the pilot is told."""
 
     VALID = "signed"
     UNSIGNED = "not signed"
     WRONG = "signed with another key"
-    REPLAYED = "signed with a timestamp that was used before"
-    LATE = "signed with a timestamp more than a minute behind ours"
+    REPLAYED = "its timestamp was used before"
+    LATE = "signed over a minute behind our clock"
 
 
 class Signing:

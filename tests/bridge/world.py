@@ -16,6 +16,7 @@ from bridge.autosense import SPEEDS
 from bridge.bridge import Bridge, BridgeConfig
 from bridge.fc_session import State
 from bridge.flight_controller import Kind
+from bridge.guard import LinkAccess
 from bridge.journal import Level
 from bridge.mission_log import ArrivedMission, Conclusion, Outcome
 from bridge.pass_through import MAX_DATAGRAM_SIZE
@@ -93,7 +94,7 @@ class World:
     """The board has power and has booted at time 0, and the port opens then, unless told otherwise.
 
     `flash`: what its flash holds. `peer`: what is on the line instead of a simulated Naze (fake_controllers).
-    `late_s`: how much later than it asked for a busy machine may wake the bridge.
+    `late_s`: how much later than it asked for a busy machine may wake the bridge. `links`: who may write over which.
     """
 
     def __init__(
@@ -108,6 +109,7 @@ class World:
         flash: bytes | None = None,
         peer: Any = None,
         late_s: float = 0.0,
+        links: Mapping[str, LinkAccess] | None = None,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
@@ -125,7 +127,7 @@ class World:
         self._plugged = False
         self._late_s = late_s
         self._lateness_s = 0.0
-        self.bridge = Bridge(BridgeConfig(speeds), self._note, self.now)
+        self.bridge = Bridge(BridgeConfig(speeds, links=links or {}), self._note, self.now)
         if powered:
             self.naze.power_on_booted(self.now)
         if plugged:
@@ -336,6 +338,11 @@ class GroundStation:
         """Send a message on its way to the bridge."""
         data = self.pack(message)
         self._through_the_air(lambda: self.world.spoken_by(self, data))
+
+    def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
+        """Sign what is sent from now on."""
+        signing = self._mavlink.signing
+        signing.secret_key, signing.timestamp, signing.link_id, signing.sign_outgoing = key, timestamp, link_id, True
 
     def pack(self, message: Message) -> bytes:
         data = bytes(message.pack(self._mavlink, force_mavlink1=self.version == 1))
