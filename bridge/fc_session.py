@@ -177,7 +177,13 @@ class FcSession:
 
     @property
     def _patience_s(self) -> float:
-        return _GARBLED_SILENCE_S if self._foreign.size >= _GARBLE_SIZE else MSP_SILENCE_S
+        return _GARBLED_SILENCE_S if self._is_garbled else MSP_SILENCE_S
+
+    @property
+    def _is_garbled(self) -> bool:
+        """Whether more came than the damaged answers to what was asked."""
+        asked = self.link.outstanding_bytes if self.link is not None else 0
+        return self._foreign.size >= asked + _GARBLE_SIZE
 
     def _notice_silence(self, link: MspLink, now: float) -> None:
         """Leave MSP when it is not answered any more: for MAVLink if that is what came instead, else to search."""
@@ -187,7 +193,7 @@ class FcSession:
         if heard is not None:
             self._drop(now)
             self._take_up_mavlink(Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard), now)
-        elif self._foreign.size >= _GARBLE_SIZE:
+        elif self._is_garbled:
             first = [speed for speed in _ARMED_SPEEDS if speed in self._speeds and speed != self.speed]
             self._begin_search(now, "what comes is no MSP any more", first)
         else:

@@ -93,8 +93,10 @@ class MspLink:
         return self._parser.bad_checksums
 
     def awaits(self, commands: frozenset[int]) -> bool:
-        """Tell whether a reply to one of `commands` is waited for."""
-        return any(sent.awaited and sent.command in commands for sent in self._sent)
+        """Tell whether a reply to one of `commands` is waited for, or will be when there is room to ask."""
+        return any(sent.awaited and sent.command in commands for sent in self._sent) or any(
+            message.command in commands for message in self._waiting
+        )
 
     def may_send(self, reply_size: int) -> bool:
         """Tell whether a request with such a reply may go out now."""

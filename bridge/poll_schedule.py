@@ -91,6 +91,15 @@ class _Slot:
         """When it is to be asked next."""
         return inf if self.interval_s == inf else self.asked_at + self.interval_s
 
+    def may_be_asked_at(self, link: MspLink) -> float:
+        """Return when, if the link does not change before; infinity: not before it does."""
+        if self.is_asked and link.awaits(self.commands):
+            return inf
+        if link.may_send(self.size):
+            return self.due
+        # The link has a queue: a STATUS that is late is put into it, before what a mission has still to say.
+        return self.due + self.interval_s if self.poll.command is Msp.STATUS else inf
+
 
 class PollSchedule:
     """The schedule of one line: `begin` when a flight controller is found, then `ask` whenever time has passed."""
@@ -136,7 +145,7 @@ class PollSchedule:
         self._look_at(link, beside_missions)
         limit = now
         while now >= self._free_at:
-            ready = [slot for slot in self._slots.values() if slot.due <= limit and _may_ask(slot, link)]
+            ready = [slot for slot in self._slots.values() if slot.may_be_asked_at(link) <= limit]
             if not ready:
                 return
             slot = max(ready, key=lambda slot: (now - slot.asked_at) / slot.interval_s)
@@ -170,7 +179,7 @@ class PollSchedule:
 
     def next_deadline(self, link: MspLink) -> float | None:
         """Return when `ask` has something to send; None: not before a reply."""
-        due = min((slot.due for slot in self._slots.values() if _may_ask(slot, link)), default=inf)
+        due = min((slot.may_be_asked_at(link) for slot in self._slots.values()), default=inf)
         return None if due == inf else max(due, self._free_at)
 
     def _look_at(self, link: MspLink, beside_missions: bool) -> None:
@@ -208,7 +217,3 @@ class PollSchedule:
         slowest = slot.cost / (self._budget * _STATUS_SHARE) if is_status else _SLOWEST_S
         patience = 2.0 ** min(max(slot.misses - _PATIENCE, 0), _MAX_DOUBLINGS)
         return min(slot.wanted_s / scale * patience, max(slot.wanted_s, slowest))
-
-
-def _may_ask(slot: _Slot, link: MspLink) -> bool:
-    return link.may_send(slot.size) and not (slot.is_asked and link.awaits(slot.commands))

@@ -280,10 +280,10 @@ def home_position(vehicle: VehicleState, _boot_ms: int) -> Message | None:
     home, altitude_m = vehicle.home_or_position(), vehicle.home_altitude_m
     if home is None or altitude_m is None:
         return None
-    lat_e7, lon_e7 = home
-    unknown_attitude = [math.nan] * 4
+    altitude_mm = _fit(round(altitude_m * 1000), 32)
+    unknown_attitude, unknown_approach = [math.nan] * 4, [math.nan] * 3
     return messages.MAVLink_home_position_message(
-        lat_e7, lon_e7, _fit(round(altitude_m * 1000), 32), 0.0, 0.0, 0.0, unknown_attitude, math.nan, math.nan, math.nan
+        *home, altitude_mm, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach
     )
 
 
