@@ -121,8 +121,8 @@ class Bridge:
         self._now = now
         self.session.opened(now)
 
-    def fc_closed(self, now: float, why: str) -> None:
-        """Take note that the port is gone."""
+    def fc_closed(self, now: float, why: str | None) -> None:
+        """Take note that the port is gone; `why` is None if we closed it ourselves."""
         self._now = now
         self.session.closed(now, why)
 

@@ -100,14 +100,15 @@ class FcSession:
         """The port is there."""
         self._begin_search(now, "port opened")
 
-    def closed(self, now: float, why: str) -> None:
-        """The port is gone."""
+    def closed(self, now: float, why: str | None) -> None:
+        """The port is gone; `why` is None if we closed it ourselves, which is no loss."""
         if self.state is State.NO_PORT:
             return
         self._enter(State.NO_PORT)
         self._drop(now)
         self._search = None
-        self._journal("warning", "fc.port_lost", why=why)
+        if why is not None:
+            self._journal("warning", "fc.port_lost", why=why)
 
     def take_output(self) -> list[bytes]:
         """Return what is to be written to the port at the present `speed`."""

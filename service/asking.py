@@ -1,6 +1,7 @@
 """How a command of the command line reaches a bridge: the running daemon's, or one of its own with `--fc`."""
 
 import asyncio
+import logging
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -20,7 +21,12 @@ from storage.store_error import StoreError
 
 #: An unknown speed is found within 8 s.
 _SEARCH_PATIENCE_S = 12.0
-_SEARCH_INTERVAL_S = 0.05
+#: A round of telemetry takes a second; at 9600 baud two.
+_TELEMETRY_PATIENCE_S = 3.0
+_INTERVAL_S = 0.05
+_TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
+#: The request for how the bridge stands.
+STATUS = {"do": "status"}
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -72,18 +78,29 @@ def fail(text: str) -> NoReturn:
 
 
 async def _ask_directly(fc: str, request: Json, progress: Callable[[int], None]) -> Json:
-    set_up_logging(verbose=False)
+    set_up_logging(logging.ERROR)
     daemon = Daemon(Settings(parse_fc(fc)))
+    jobs = MissionJobs(daemon)
     running = asyncio.create_task(daemon.run())
     try:
-        for _ in range(int(_SEARCH_PATIENCE_S / _SEARCH_INTERVAL_S)):
-            if daemon.bridge.session.controller is not None:
-                break
-            await asyncio.sleep(_SEARCH_INTERVAL_S)
-        else:
+        await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.controller), _SEARCH_PATIENCE_S)
+        if daemon.fc_trouble:
+            raise ControlError(daemon.fc_trouble)
+        if daemon.bridge.session.controller is None:
             raise ControlError(f"no flight controller answers on {fc}: check its power, the wiring and the speed")
-        return await MissionJobs(daemon).do(request, lambda answer: progress(answer["progress"]))
+        # Who it is comes before what it tells of itself, and some controllers never tell all of it.
+        if request == STATUS:
+            await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
+        return await jobs.do(request, lambda answer: progress(answer["progress"]))
     finally:
         running.cancel()
         with suppress(asyncio.CancelledError):
             await running
+
+
+async def _wait(condition: Callable[[], bool], seconds: float) -> None:
+    """Wait until something is so, but not longer than that."""
+    for _ in range(int(seconds / _INTERVAL_S)):
+        if condition():
+            return
+        await asyncio.sleep(_INTERVAL_S)

@@ -1,6 +1,10 @@
 """The `naze-bridge` command: each subcommand lives in a file of its own and is imported only when it is used."""
 
+import errno
 import importlib
+import os
+import sys
+from typing import Any
 
 import click
 
@@ -17,8 +21,25 @@ _COMMANDS = {
     "demo": "service.demo:demo",
 }
 
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
 
 class _LazyGroup(click.Group):
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run to the end of the program. A full disk behind standard output is one sentence and status 74 (EX_IOERR).
+
+        Click itself is silent about a reader who has seen enough (`| head`).
+        """
+        try:
+            return super().main(*args, **kwargs)
+        except OSError as error:
+            if error.errno not in _UNWRITABLE:
+                raise
+            click.echo(f"naze-bridge: the output cannot be written: {error.strerror}", err=True)
+            # What is still in the buffer would fail once more at the interpreter's end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(os.EX_IOERR)
+
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
 

@@ -14,6 +14,9 @@ class SerialFc:
     path: str
     baud: int | None
 
+    def __str__(self) -> str:
+        return self.path if self.baud is None else f"{self.path},{self.baud}"
+
 
 @dataclass(frozen=True, slots=True)
 class TcpFc:
@@ -22,10 +25,16 @@ class TcpFc:
     host: str
     port: int
 
+    def __str__(self) -> str:
+        return f"tcp:{self.host}:{self.port}"
+
 
 @dataclass(frozen=True, slots=True)
 class SimulatedFc:
     """The simulated Naze within the daemon."""
+
+    def __str__(self) -> str:
+        return "sim:"
 
 
 FcAddress = SerialFc | TcpFc | SimulatedFc

@@ -13,10 +13,15 @@ from bridge.journal import Level
 from bridge.procedure import StoreEffect
 from bridge.station import Peer
 from service.connection import FcAddress, SerialFc
+from service.fc_port import STOPPED
 from service.gcs_links import GcsLink, open_link
 from service.recording import Recording
 from service.settings import Settings
 from service.store_worker import StoreWorker
+from service.version import version
+
+#: How often it is said that nobody is found: a log that says nothing looks like a program that hangs.
+_SEARCH_REPORT_S = 60.0
 
 _log = structlog.get_logger()
 
@@ -38,6 +43,12 @@ class Daemon:
         self._port = self._recording.port(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
         self._links: dict[str, GcsLink] = {}
         self._timer: asyncio.TimerHandle | None = None
+        self._search_report: asyncio.TimerHandle | None = None
+
+    @property
+    def fc_trouble(self) -> str:
+        """Why the flight controller's port cannot be opened; empty if it could be."""
+        return self._port.trouble
 
     async def run(self) -> None:
         """Run until cancelled. LinkError if a ground station link cannot be set up."""
@@ -46,6 +57,12 @@ class Daemon:
             for address in self.settings.gcs:
                 link = open_link(address, self)
                 self._links[link.name] = link
+            _log.info(
+                "daemon.started",
+                version=version(),
+                fc=str(self.settings.fc),
+                gcs=[str(address) for address in self.settings.gcs],
+            )
             port = self._loop.create_task(self._port.run())
             self._tick()
             await port
@@ -54,8 +71,9 @@ class Daemon:
                 port.cancel()
                 with suppress(asyncio.CancelledError):
                     await port
-            if self._timer is not None:
-                self._timer.cancel()
+            for timer in (self._timer, self._search_report):
+                if timer is not None:
+                    timer.cancel()
             for link in self._links.values():
                 link.close()
             self.store.close()
@@ -105,14 +123,22 @@ class Daemon:
     def _fc_opened(self) -> None:
         self.bridge.fc_opened(self._loop.time())
         self.flush()
+        self._report_search()
 
     def _fc_data(self, data: bytes) -> None:
         self.bridge.fc_received(data, self._loop.time())
         self.flush()
 
     def _fc_closed(self, why: str) -> None:
-        self.bridge.fc_closed(self._loop.time(), why)
+        self.bridge.fc_closed(self._loop.time(), None if why == STOPPED else why)
         self.flush()
+
+    def _report_search(self) -> None:
+        if self._search_report is not None:
+            self._search_report.cancel()
+        if self.bridge.session.is_searching:
+            _log.info("fc.searching", fc=str(self.settings.fc))
+        self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)
 
     def _tick(self) -> None:
         self._timer = None
@@ -131,8 +157,13 @@ async def run_until_signal(daemon: Daemon) -> None:
     """Run the daemon until SIGINT or SIGTERM."""
     loop = asyncio.get_running_loop()
     running = loop.create_task(daemon.run())
+
+    def stop(number: signal.Signals) -> None:
+        _log.info("daemon.stopping", signal=number.name)
+        running.cancel()
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, running.cancel)
+        loop.add_signal_handler(number, stop, number)
     with suppress(asyncio.CancelledError):
         await running
 

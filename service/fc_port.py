@@ -11,6 +11,9 @@ import structlog
 from service.connection import FcAddress
 from service.fc_device import Device, PortError, device_opener
 
+#: What `on_close` is told when the port is closed because it is needed no more.
+STOPPED = "the daemon stops"
+
 _READ_SIZE = 4096
 _RETRY_S = 0.25
 #: What the port does not take in time is dropped beyond this: ground stations can send faster than a UART.
@@ -45,7 +48,8 @@ class FcPort:
         self._speed: int | None = None
         self._unsent = bytearray()
         self._closed = asyncio.Event()
-        self._last_complaint = ""
+        #: Why it cannot be opened; empty if it could be.
+        self.trouble = ""
         self.dropped_bytes = 0
         #: Reading may be put off by a few ms at high rates, because nobody waits for an answer.
         self.may_gather = False
@@ -64,13 +68,13 @@ class FcPort:
                     self._complain(str(error))
                     await asyncio.sleep(_RETRY_S)
                     continue
-                self._last_complaint = ""
+                self.trouble = ""
                 self._closed.clear()
                 self._loop.add_reader(self._device.fileno(), self._readable)
                 self._on_open()
                 await self._closed.wait()
         finally:
-            self._shut("the daemon stops")
+            self._shut(STOPPED)
 
     def set_speed(self, baud: int | None) -> None:
         """Run the port at another speed, baud."""
@@ -182,6 +186,6 @@ class FcPort:
         self._on_close(why)
 
     def _complain(self, why: str) -> None:
-        level = _log.debug if why == self._last_complaint else _log.warning
+        level = _log.debug if why == self.trouble else _log.warning
         level("fc.port_unavailable", why=why)
-        self._last_complaint = why
+        self.trouble = why

@@ -7,7 +7,7 @@ import click
 
 from bridge.finding import Finding
 from protocols.mission_file import MissionFileError, write_qgc_wpl
-from service.asking import ask, ask_with_progress, bridge_options, fail
+from service.asking import STATUS, ask, ask_with_progress, bridge_options, fail
 from service.mission_data import Json, mission_items
 from service.mission_source import load_mission, save_mission
 from service.mission_table import mission_table
@@ -77,7 +77,7 @@ def clear(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
 @bridge_options
 def status(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Show how the bridge stands: flight controller, link, ground stations."""
-    facts = ask(state_dir, fc, {"do": "status"})
+    facts = ask(state_dir, fc, STATUS)
     if as_json:
         print_json(facts)
         return

@@ -1,6 +1,7 @@
 """`naze-bridge run`: the daemon in the foreground."""
 
 import asyncio
+import logging
 import sys
 from pathlib import Path
 
@@ -33,7 +34,7 @@ def run(
     verbose: bool,
 ) -> None:
     """Run the bridge between a flight controller and ground stations."""
-    set_up_logging(verbose=verbose)
+    set_up_logging(logging.DEBUG if verbose else logging.INFO)
     try:
         settings = load_settings(config, fc, gcs, state_dir, record_uart)
     except (AddressError, SettingsError) as error:

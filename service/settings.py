@@ -56,11 +56,14 @@ _KEYS: dict[str, tuple[type, str]] = {
 
 
 def default_state_dir() -> Path:
-    """Return systemd's StateDirectory, else the user's own folder for state."""
+    """Return systemd's StateDirectory, else the user's own folder for state; SettingsError if there is no such user."""
     given = os.environ.get("STATE_DIRECTORY")
     if given:
         return Path(given.split(":")[0])
-    base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    try:
+        base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    except RuntimeError:
+        raise SettingsError("this user has no home folder: name a folder for missions with --state-dir") from None
     return Path(base) / "naze-bridge"
 
 

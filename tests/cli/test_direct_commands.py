@@ -1,0 +1,104 @@
+"""Commands that talk to a flight controller themselves, with `--fc`; and what goes wrong outside of naze-bridge."""
+
+import json
+import os
+import pwd
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from click.testing import CliRunner
+from plan import judge, plain_plan, records_of
+from programs import Board, run_naze_bridge
+
+from protocols.mission_file import write_qgc_wpl
+from service.cli import main
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture
+def board(tmp_path: Path) -> Iterator[Board]:
+    with ExitStack() as stack:
+        yield Starter(tmp_path, stack).board()
+
+
+def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *parts: str) -> None:
+    assert ended.returncode == code, ended
+    (sentence,) = ended.stderr.splitlines()
+    assert sentence.startswith("naze-bridge: ")
+    assert not [part for part in parts if part not in sentence], sentence
+
+
+def test_a_mission_there_and_back(board: Board, tmp_path: Path) -> None:
+    plan = plain_plan(5)
+    file = tmp_path / "plan"
+    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
+    assert run_naze_bridge("push", file, "--fc", board.link).returncode == 0
+    assert board.records() == records_of(judge(plan))
+    assert run_naze_bridge("pull", tmp_path / "held", "--fc", board.link).returncode == 0
+    assert (tmp_path / "held").read_text() == write_qgc_wpl(judge(plan).items)
+    status = json.loads(run_naze_bridge("status", "--json", "--fc", board.link).stdout)
+    # Telemetry is waited for.
+    assert (status["armed"], status["mission_records"], status["speed_baud"]) == (False, 5, 115200)
+    assert status["battery_v"] > 9
+    assert status["satellites"] > 4
+    board.assert_was_treated_well()
+
+
+def test_a_port_that_is_missing(tmp_path: Path) -> None:
+    assert_one_sentence(run_naze_bridge("status", "--fc", tmp_path / "naze"), 1, "is missing", str(tmp_path))
+
+
+def test_a_port_that_another_program_has(board: Board) -> None:
+    script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", script, str(board.link)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "open\n"
+        assert_one_sentence(run_naze_bridge("pull", "--fc", board.link), 1, "is busy", "has it open")
+        other.kill()
+
+
+def test_a_tcp_port_that_nobody_listens_on() -> None:
+    assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"), 1, "tcp:127.0.0.1:9 cannot be reached")
+
+
+# -- the machine ---------------------------------------------------------------------------------------------
+
+
+def test_a_full_disk_behind_standard_output(tmp_path: Path) -> None:
+    def leave_100_bytes() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+
+    with (tmp_path / "output").open("w") as output:
+        ended = run_naze_bridge("check", EXAMPLES / "long-146.waypoints", stdout=output, preexec_fn=leave_100_bytes)
+    assert_one_sentence(ended, os.EX_IOERR, "cannot be written", "File too large")
+
+
+def test_a_reader_who_has_seen_enough() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    ended = run_naze_bridge("check", EXAMPLES / "long-146.waypoints", stdout=writing)
+    os.close(writing)
+    assert ended.stderr == ""
+
+
+@pytest.mark.parametrize("command", [["status"], ["missions", "list"], ["run", "--fc", "sim:"]])
+def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, command: list[str]) -> None:
+    def nobody(uid: int) -> None:
+        raise KeyError(uid)
+
+    monkeypatch.setattr(pwd, "getpwuid", nobody)
+    for name in ("HOME", "XDG_STATE_HOME", "STATE_DIRECTORY"):
+        monkeypatch.delenv(name, raising=False)
+    ended = CliRunner().invoke(main, command)
+    assert ended.exit_code == 2
+    assert ended.stderr.splitlines()[-1].startswith("Error: this user has no home folder")
+    assert "--state-dir" in ended.stderr

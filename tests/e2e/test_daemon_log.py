@@ -1,0 +1,61 @@
+"""What the daemon's log tells of its life."""
+
+import asyncio
+import os
+import signal
+import tty
+from contextlib import suppress
+
+import pytest
+from benches import Starter
+from programs import until
+from structlog.testing import capture_logs
+
+from service import daemon as daemon_module
+from service.connection import SerialFc
+from service.daemon import Daemon
+from service.settings import Settings
+
+LOSSES = {"fc.lost", "fc.port_lost"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_start_search_and_stop(start: Starter, number: signal.Signals) -> None:
+    bench = start.bench()
+    assert bench.daemon.end(number) == 0
+    events = bench.daemon.events()
+    assert [event["event"] for event in events if event["event"] in ("daemon.started", "fc.searching")] == [
+        "daemon.started",
+        "fc.searching",
+    ]
+    started, stopping = events[0], bench.daemon.has_logged("daemon.stopping")
+    assert started["fc"] == str(bench.board.link)
+    assert started["gcs"] == [f"udpin:127.0.0.1:{bench.daemon.port}"]
+    assert started["version"]
+    assert stopping is not None
+    assert stopping["signal"] == number.name
+    # A stop is no loss.
+    assert not [event for event in events if event["event"] in LOSSES or event["level"] in ("warning", "error")]
+
+
+def test_a_port_that_is_pulled_is_a_loss(start: Starter) -> None:
+    bench = start.bench()
+    bench.board.set("unplug")
+    lost = until(lambda: bench.daemon.has_logged("fc.port_lost"), "the loss")
+    assert lost["level"] == "warning"
+
+
+async def test_a_search_that_finds_nobody_says_so_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(daemon_module, "_SEARCH_REPORT_S", 0.01)
+    near, far = os.openpty()
+    tty.setraw(far)
+    with capture_logs() as events:
+        running = asyncio.create_task(Daemon(Settings(SerialFc(os.ttyname(far), None))).run())
+        async with asyncio.timeout(20):
+            while len([event for event in events if event["event"] == "fc.searching"]) < 3:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        running.cancel()
+        with suppress(asyncio.CancelledError):
+            await running
+    os.close(near)
+    os.close(far)
