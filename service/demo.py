@@ -23,8 +23,10 @@ from service.mission_client import ClientError, connect
 from service.mission_data import Json, mission_items
 from service.mission_source import load_mission
 from service.mission_table import mission_table
+from service.printing import print_table
 
-_EXAMPLE = Path(__file__).parent.parent / "examples" / "naze-field.waypoints"
+#: A link to examples/ in the repository, a file in what is installed.
+_EXAMPLE = Path(__file__).with_name("naze-field.waypoints")
 _PATIENCE_S = 15.0
 
 
@@ -35,8 +37,9 @@ _PATIENCE_S = 15.0
 def demo(file: Path, once: bool, port: int) -> None:
     """Start the daemon on a simulated Naze, write a mission FILE into it over UDP, show what became of it."""
     console = Console(highlight=False)
-    # The daemon is a child of this program: whoever ends the one ends the other.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    # The daemon is a child of this program: whoever ends the one ends the other, also by closing its terminal.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda number, _frame: sys.exit(128 + number))
     try:
         items = load_mission(file)
         state_dir = Path(tempfile.mkdtemp(prefix="naze-bridge-demo-"))
@@ -62,7 +65,7 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, cons
         received = _latest_mission(state_dir)
         held = client.read()
     findings = [Finding(**finding) for finding in received["findings"]]
-    console.print(mission_table(items, held, findings))
+    print_table(mission_table(items, held, findings))
     if result is not MissionResult.ACCEPTED:
         raise ClientError(f"the mission was not accepted: {'; '.join(client.texts)}")
     if held != mission_items(received["stored_items"]):

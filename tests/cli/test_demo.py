@@ -1,0 +1,62 @@
+"""`naze-bridge demo`: the first thing that anybody sees of it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from programs import Program, free_port, run_naze_bridge, until
+
+REPOSITORY = Path(__file__).parents[2]
+TEMPORARY = "naze-bridge-demo-"
+
+
+@pytest.fixture
+def demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Program]:
+    """A demonstration that stays up, with its temporary files in `tmp_path`."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with ExitStack() as stack:
+        program = Program(tmp_path / "printed", "demo", "--port", str(free_port()))
+        stack.callback(program.end, signal.SIGKILL)
+        until(lambda: "The bridge stays up" in program.printed or not program.is_alive, "the end of the demonstration")
+        yield program
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_it_takes_its_daemon_and_its_files_with_it(demo: Program, tmp_path: Path, number: signal.Signals) -> None:
+    (folder,) = tmp_path.glob(f"{TEMPORARY}*")
+    daemon = int((folder / "lock").read_text())
+    os.kill(daemon, 0)
+    assert demo.end(number) == (0 if number is signal.SIGINT else 128 + number)
+    assert not list(tmp_path.glob(f"{TEMPORARY}*"))
+    with pytest.raises(ProcessLookupError):
+        os.kill(daemon, 0)
+    assert "Traceback" not in demo.printed
+
+
+def test_what_is_installed_has_its_example(tmp_path: Path) -> None:
+    """The packages of the wheel, without the rest of the repository."""
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())
+    for package in project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
+        shutil.copytree(REPOSITORY / package, tmp_path / package)
+    ended = subprocess.run(
+        [sys.executable, "-c", "from service.cli import main; main()", "demo", "--once", "--port", str(free_port())],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended
+    assert "Sent 14 items; the flight controller holds 13" in ended.stdout
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    ended = run_naze_bridge("demo", "--once", tmp_path / "none")
+    assert ended.returncode == 1
+    assert ended.stderr.startswith(f"naze-bridge: {tmp_path / 'none'}: no such file")
