@@ -52,7 +52,9 @@ async def _open_serial(path: str) -> serial.Serial:
             " and take console=... for it out of cmdline.txt"
         )
     try:
-        port = serial.Serial(path, 115200, timeout=0, write_timeout=0, exclusive=True)
+        # VMIN 1, for which pyserial's word is inter_byte_timeout: with 0 a read that finds nothing returns as if the
+        # other end had hung up.
+        port = serial.Serial(path, 115200, timeout=0, write_timeout=0, inter_byte_timeout=0, exclusive=True)
     except (serial.SerialException, OSError) as error:
         raise PortError(explain_port_error(path, error)) from error
     except termios.error as error:

@@ -1,0 +1,204 @@
+"""The flight controller's port on a pty: gathered reading at high rates, and writing faster than a UART takes."""
+
+import asyncio
+import os
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkSplitter
+from service.connection import SerialFc
+from service.fc_port import FcPort
+
+PATIENCE_S = 20.0
+_writer = FrameWriter(1, 1)
+
+
+def attitude(number: int) -> bytes:
+    return _writer.frame(pack(m.MAVLink_attitude_message(number, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)), 2)
+
+
+async def until(condition: Callable[[], object], what: str) -> None:
+    for _ in range(int(PATIENCE_S / 0.005)):
+        if condition():
+            return
+        await asyncio.sleep(0.005)
+    raise AssertionError(f"{what} did not come")
+
+
+class Line:
+    """A pty with the port at one end, and the test at the other, `wire`."""
+
+    def __init__(self, directory: Path) -> None:
+        self.wire, self._terminal = os.openpty()
+        tty.setraw(self._terminal)
+        os.set_blocking(self.wire, False)
+        self.path = directory / "port"
+        self.path.symlink_to(os.ttyname(self._terminal))
+        self.heard = bytearray()
+        self.opened = 0
+        self.lost: list[str] = []
+        #: In how many reads it came.
+        self.reads = 0
+
+    def start(self) -> FcPort:
+        self.port = FcPort(SerialFc(str(self.path), None), self._on_open, self._on_data, self.lost.append)
+        self._task = asyncio.get_running_loop().create_task(self.port.run())
+        return self.port
+
+    async def stop(self) -> None:
+        self._task.cancel()
+        await asyncio.wait([self._task])
+
+    def close(self) -> None:
+        os.close(self.wire)
+        os.close(self._terminal)
+
+    def take(self, size: int = 65536) -> bytes:
+        """Return what came over the wire, so many bytes at most."""
+        try:
+            return os.read(self.wire, size)
+        except BlockingIOError:
+            return b""
+
+    def numbers(self) -> list[int]:
+        """Return the numbers of the frames that came; nothing else may have come."""
+        frames = MavlinkSplitter().feed(bytes(self.heard))
+        assert b"".join(frame.raw for frame in frames) == self.heard
+        return [int.from_bytes(frame.payload[:4].ljust(4, b"\0"), "little") for frame in frames]
+
+    async def has_come(self, count: int) -> None:
+        """Wait until so many frames have come since the beginning."""
+        await until(lambda: len(self.numbers()) == count, "what was sent")
+
+    async def feed(self, first: int, count: int, rate_hz: int) -> int:
+        """Send frames one by one, evenly; return the number after the last."""
+        loop = asyncio.get_running_loop()
+        began_at = loop.time()
+        for index in range(count):
+            due = began_at + index / rate_hz
+            while loop.time() < due:  # noqa: ASYNC110 (a timer is rounded up to whole ms)
+                await asyncio.sleep(0)
+            os.write(self.wire, attitude(first + index))
+            await asyncio.sleep(0)
+        return first + count
+
+    def _on_open(self) -> None:
+        self.opened += 1
+
+    def _on_data(self, data: bytes) -> None:
+        self.reads += 1
+        self.heard += data
+
+
+@pytest.fixture
+def line(tmp_path: Path) -> Iterator[Line]:
+    line = Line(tmp_path)
+    yield line
+    line.close()
+
+
+async def test_many_frames_a_second_are_gathered_and_few_are_not(line: Line) -> None:
+    port = line.start()
+    await until(lambda: line.opened, "the port")
+    port.may_gather = True
+    sent = 0
+    for _ in range(3):
+        before = line.reads
+        sent = await line.feed(sent, 1500, 3000)
+        await line.has_come(sent)
+        assert line.reads - before < 1000, "nothing was gathered"
+        # The rate falls: each frame is read when it comes.
+        sent = await line.feed(sent, 25, 50)
+        before = line.reads
+        sent = await line.feed(sent, 25, 50)
+        await line.has_come(sent)
+        assert line.reads - before > 15
+        assert port._gathering is None
+    assert line.numbers() == list(range(sent))
+    assert line.lost == []
+    assert line.opened == 1
+    await line.stop()
+
+
+async def test_a_port_that_falls_silent_while_it_is_gathered_is_not_lost(line: Line) -> None:
+    port = line.start()
+    await until(lambda: line.opened, "the port")
+    port.may_gather = True
+    sent = await line.feed(0, 1500, 3000)
+    await line.has_come(sent)
+    await until(lambda: port._gathering is None, "the end of gathering")
+    await line.feed(sent, 1, 50)
+    await line.has_come(sent + 1)
+    assert (line.lost, line.opened) == ([], 1)
+    await line.stop()
+
+
+async def test_a_port_that_hangs_up_while_it_is_gathered_is_opened_again(line: Line, tmp_path: Path) -> None:
+    port = line.start()
+    await until(lambda: line.opened, "the port")
+    port.may_gather = True
+    await line.feed(0, 1500, 3000)
+    line.path.unlink()
+    line.close()
+    await until(lambda: line.lost, "the loss")
+    again = Line(tmp_path)
+    line.wire, line._terminal = again.wire, again._terminal
+    await until(lambda: line.opened == 2, "the port")
+    line.heard.clear()
+    await line.feed(7, 1, 50)
+    await until(lambda: line.numbers() == [7], "a frame")
+    await line.stop()
+
+
+async def test_what_a_uart_does_not_take_is_dropped_by_whole_frames(line: Line) -> None:
+    port = line.start()
+    await until(lambda: line.opened, "the port")
+    sent = [attitude(number) for number in range(2000)]
+    for frame in sent:
+        port.write(frame)
+    assert port.dropped_bytes
+    taken = bytearray()
+
+    def take_whole() -> bool:
+        taken.extend(line.take())
+        return len(taken) == sum(map(len, sent)) - port.dropped_bytes
+
+    await until(take_whole, "all that was not dropped")
+    frames = [frame.raw for frame in MavlinkSplitter().feed(bytes(taken))]
+    assert b"".join(frames) == taken
+    assert frames == sent[: len(frames)]
+    # Who reads again gets what is written then.
+    port.write(sent[-1])
+    taken.clear()
+    await until(lambda: take_whole() or bytes(taken) == sent[-1], "a frame")
+    await line.stop()
+
+
+async def test_a_stuck_uart_goes_on_with_whole_frames_as_it_takes_them(line: Line) -> None:
+    """The wire is read a little at a time, so that frames are cut everywhere by what the terminal takes."""
+    port = line.start()
+    await until(lambda: line.opened, "the port")
+    sent = [attitude(number) for number in range(4000)]
+    taken = bytearray()
+    for number, frame in enumerate(sent):
+        port.write(frame)
+        if number % 40 == 0:
+            taken += line.take(701)
+            await asyncio.sleep(0)
+
+    def take_whole() -> bool:
+        taken.extend(line.take())
+        return len(taken) == sum(map(len, sent)) - port.dropped_bytes
+
+    await until(take_whole, "all that was not dropped")
+    assert port.dropped_bytes
+    frames = [frame.raw for frame in MavlinkSplitter().feed(bytes(taken))]
+    assert b"".join(frames) == taken
+    numbers = [sent.index(frame) for frame in frames]
+    assert numbers == sorted(numbers)
+    await line.stop()
