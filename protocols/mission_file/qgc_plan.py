@@ -10,8 +10,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from protocols.mission_file.coordinate import file_degrees_to_e7
 from protocols.mission_file.error import MissionFileError, shown
-from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
+from protocols.mission_item import Command, Frame, MissionItem
 
 _PARAM_COUNT = 7
 _SAVE_AGAIN = "save it again from QGroundControl"
@@ -62,8 +63,8 @@ def _home(position: Any, name: str) -> MissionItem:
         p2=0.0,
         p3=0.0,
         p4=0.0,
-        lat_e7=degrees_to_e7(lat),
-        lon_e7=degrees_to_e7(lon),
+        lat_e7=file_degrees_to_e7(lat, "the latitude", name, where),
+        lon_e7=file_degrees_to_e7(lon, "the longitude", name, where),
         alt_m=0.0 if math.isnan(alt_m) else alt_m,
     )
 
@@ -91,7 +92,9 @@ def _item(entry: dict[str, Any], seq: int, name: str, where: str) -> MissionItem
     command = _integer(entry, "command", 65535, name, where)
     frame = _integer(entry, "frame", 255, name, where)
     p1, p2, p3, p4, lat, lon, alt_m = (_number(param, name, where) for param in params)
-    return MissionItem(seq, command, frame, p1, p2, p3, p4, degrees_to_e7(lat), degrees_to_e7(lon), alt_m)
+    lat_e7 = file_degrees_to_e7(lat, "params[4], the latitude,", name, where)
+    lon_e7 = file_degrees_to_e7(lon, "params[5], the longitude,", name, where)
+    return MissionItem(seq, command, frame, p1, p2, p3, p4, lat_e7, lon_e7, alt_m)
 
 
 def _integer(entry: dict[str, Any], key: str, highest: int, name: str, where: str) -> int:

@@ -8,8 +8,9 @@ import math
 import re
 from collections.abc import Sequence
 
+from protocols.mission_file.coordinate import file_degrees_to_e7
 from protocols.mission_file.error import MissionFileError, shown
-from protocols.mission_item import MissionItem, degrees_to_e7
+from protocols.mission_item import MissionItem
 
 _HEADER = ["QGC", "WPL", "110"]
 _INTEGER_FIELDS = {"seq": 65535, "current": 1, "frame": 255, "command": 65535}
@@ -70,7 +71,9 @@ def _item(fields: list[str], seq: int, name: str, where: str) -> MissionItem:
         what = f"item {found} where item {seq} must be"
         raise MissionFileError(name, where, what, "number the items from 0 (home) without gaps")
     p1, p2, p3, p4, lat, lon, alt_m, _ = map(float, fields[len(integers) :])
-    return MissionItem(seq, command, frame, p1, p2, p3, p4, degrees_to_e7(lat), degrees_to_e7(lon), alt_m)
+    lat_e7 = file_degrees_to_e7(lat, "latitude", name, where)
+    lon_e7 = file_degrees_to_e7(lon, "longitude", name, where)
+    return MissionItem(seq, command, frame, p1, p2, p3, p4, lat_e7, lon_e7, alt_m)
 
 
 def _line(item: MissionItem) -> str:

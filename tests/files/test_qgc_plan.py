@@ -122,6 +122,9 @@ def test_a_plan_is_known_by_what_is_in_it() -> None:
         (plan(simple(command=-1)), ["item 1", "command", "65535"]),
         (plan(simple(frame=3.5)), ["item 1", "frame", "3.5"]),
         (plan(simple(frame=None)), ["item 1", "frame"]),
+        (plan(simple(params=[0, 0, 0, 0, math.inf, 8, 1])), ["item 1", "params[4], the latitude, is inf"]),
+        (plan(simple(params=[0, 0, 0, 0, 45, -1e305, 1])), ["item 1", "params[5], the longitude, is -1e+305"]),
+        (plan(home=[math.inf, 2, 3]), ["plannedHomePosition", "latitude is inf"]),
         (plan(home="here"), ["plannedHomePosition", "'here'"]),
         (plan(home=[1, "2", 3]), ["plannedHomePosition", "'2'"]),
         (plan(home=[1, 2, 3, 4]), ["plannedHomePosition"]),
@@ -170,4 +173,5 @@ def test_any_json_is_read_or_refused(items: list[Any]) -> None:
 @given(st.lists(st.none() | st.floats() | st.integers(), min_size=7, max_size=7), json_values)
 def test_any_seven_numbers_make_an_item(params: list[float | None], home: Any) -> None:
     refused = refusal(plan(simple(params=params), home=home))
-    assert refused is None or "plannedHomePosition" in refused
+    beyond = any(value is not None and math.isinf(value * 1e7) for value in params[4:6])
+    assert refused is None or "plannedHomePosition" in refused or (beyond and "item 1" in refused)

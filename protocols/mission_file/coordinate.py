@@ -1,0 +1,17 @@
+"""A latitude or longitude in a mission file: degrees, or not given."""
+
+import math
+
+from protocols.mission_file.error import MissionFileError, shown
+from protocols.mission_item import degrees_to_e7
+
+
+def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int | None:
+    """Return degrees * 1e7, None for NaN (not given); MissionFileError if no such number of degrees can be.
+
+    The rules take an infinite coordinate for a missing one. A ground station may send it; in a file it is damage.
+    """
+    e7 = degrees_to_e7(degrees)
+    if e7 is None and not math.isnan(degrees):
+        raise MissionFileError(name, where, f"{field} is {shown(degrees)}", "give it in degrees")
+    return e7
