@@ -15,6 +15,7 @@ from bridge.vehicle_state import VehicleState
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspFrame
+from protocols.msp.telemetry import HomePoint
 
 #: A flight controller that answers nothing for so long is gone: unplugged, reset, or switched to another protocol.
 MSP_SILENCE_S = 2.0
@@ -215,8 +216,10 @@ class FcSession:
         self._mavlink = None
         self._frsky = None
         self._foreign = _Foreign()
-        # Its frame stays the same whatever it speaks: an armed hexacopter is none the less one.
-        self.vehicle = VehicleState(mixer=self.vehicle.mixer)
+        # These stay the same whatever it speaks now.
+        before = self.vehicle
+        home = before.home_or_position()
+        self.vehicle = VehicleState(mixer=before.mixer, home=None if home is None else HomePoint(*home))
         self._runner.link_down(now)
         if self.controller is not None:
             self.controller = None

@@ -168,6 +168,8 @@ class MissionDesk:
         except LinkLost:
             return _NO_LINK
         identity = identify(records)
+        if self.held is not None and self.held.identity == identity:
+            return self.held
         roi_commands: Mapping[int, int] = yield from recall(identity)
         held = HeldMission(identity, records, tuple(items_from_records(records, roi_commands)))
         if dialect is self._dialect:

@@ -102,7 +102,11 @@ class MissionDownloads:
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):
-                self._refuse(question.station, held)
+                if question.seq == 0 and self._home() is not None:
+                    # Mission Planner asks for it on arming, which may have changed the protocol just now.
+                    self._answer(question, ())
+                else:
+                    self._refuse(question.station, held)
                 continue
             self._snapshots.pop(question.station, None)
             self._snapshots[question.station] = _Snapshot(held.items, now + _READING_S)

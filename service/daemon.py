@@ -34,7 +34,12 @@ class Daemon:
         self.settings = settings
         self._recording = Recording(settings)
         self.bridge = Bridge(
-            BridgeConfig(_speeds(settings.fc), sysid=settings.sysid, takeoff_max_m=settings.takeoff_max_m),
+            BridgeConfig(
+                _speeds(settings.fc),
+                sysid=settings.sysid,
+                takeoff_max_m=settings.takeoff_max_m,
+                autopilot=settings.autopilot,
+            ),
             _journal,
             self._loop.time(),
             self._recording.tap,

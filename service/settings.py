@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bridge.fc_session import Autopilot
 from service.connection import FcAddress, GcsAddress, parse_fc, parse_gcs
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
@@ -38,6 +39,7 @@ class Settings:
     takeoff_max_m: int = DEFAULT_TAKEOFF_MAX_M
     tlog: TlogLimits | None = None
     record_uart: Path | None = None
+    autopilot: Autopilot = Autopilot.AUTO
 
 
 #: Keys of the configuration file: name -> (type, what it is).
@@ -52,6 +54,7 @@ _KEYS: dict[str, tuple[type, str]] = {
     "tlog_total_mb": (int, "size of all telemetry logs, at least twice tlog_file_mb"),
     "tlog_days": (int, "how many days a telemetry log is kept, 1..3650"),
     "record_uart": (str, "file to record the UART into"),
+    "autopilot": (str, "whose MAVLink is heard on the port: auto, harakiri or other"),
 }
 
 
@@ -90,6 +93,7 @@ def load_settings(
         takeoff_max_m=_in_range(values, "takeoff_max_m", 2, 255, DEFAULT_TAKEOFF_MAX_M),
         tlog=_tlog_limits(values) if values.get("record_tlog", True) else None,
         record_uart=record_uart or _path(values.get("record_uart")),
+        autopilot=_autopilot(values.get("autopilot", Autopilot.AUTO.value)),
     )
 
 
@@ -99,6 +103,14 @@ def _tlog_limits(values: dict[str, object]) -> TlogLimits:
     total_mb = _in_range(values, "tlog_total_mb", 2 * file_mb, 1 << 20, max(default.total_size >> 20, 2 * file_mb))
     days = _in_range(values, "tlog_days", 1, 3650, default.days)
     return TlogLimits(file_mb << 20, total_mb << 20, days)
+
+
+def _autopilot(text: object) -> Autopilot:
+    try:
+        return Autopilot(text)
+    except ValueError as error:
+        choices = ", ".join(each.value for each in Autopilot)
+        raise SettingsError(f"autopilot is {text!r}, but must be one of {choices}") from error
 
 
 def _path(text: object) -> Path | None:

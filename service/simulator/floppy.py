@@ -44,8 +44,10 @@ class Floppy:
         self._send = send
         self._decoder = MavlinkDecoder()
         self._partner = (0, 0)
-        self._load()
-        self._reset()
+        self._list = list(unpack_records(self.stored))
+        self._receiving = self._sending = self._knows_roi = False
+        self._total = self._expected = 0
+        self._touched = 0.0
 
     @property
     def stored(self) -> bytes:
@@ -83,13 +85,9 @@ class Floppy:
                     if message.seq == len(self._list) - 1:
                         self._reset()
 
-    def _load(self) -> None:
-        self._list = list(unpack_records(self.stored))
-
     def _reset(self) -> None:
         self._receiving = self._sending = self._knows_roi = False
         self._expected = 0
-        self._touched = 0.0
 
     def _is_free(self) -> bool:
         busy = self._receiving or self._sending or self._board.write_pending
@@ -98,7 +96,7 @@ class Floppy:
     def _ack(self, result: int) -> None:
         if self._board.config_write_due is not None and result != m.MAV_MISSION_ACCEPTED:
             self._board.config_write_due = None
-            self._load()
+            self._list = list(unpack_records(self.stored))
         self._send(pack(m.MAVLink_mission_ack_message(*self._partner, result)))
         self._reset()
 

@@ -280,13 +280,20 @@ def test_without_a_link_and_without_a_store_the_reason_is_told() -> None:
     assert any("stores no missions" in text for text in station.texts())
 
 
-def test_in_mavlink_mode_the_reason_is_told() -> None:
+def test_armed_in_mavlink_mode_home_is_served_and_no_more() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
+    world.run(6)
+    home = world.bridge.session.vehicle.home_or_position()
+    assert home is not None
     world.faults.armed = True
     world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 8)
-    (ack,) = ask(station, request_message(0))
-    assert ack.type == A.DENIED
-    assert any("MAVLink mode" in text for text in station.texts())
+    world.run(1.5)
+    (item,) = ask(station, request_message(0))
+    assert (item.x, item.y) == home
+    for message in (request_message(1), list_message()):
+        (ack,) = ask(station, message)
+        assert ack.type == A.DENIED
+    assert any("Armed" in text for text in station.texts())
 
 
 def test_reading_goes_on_beside_an_upload_by_another() -> None:

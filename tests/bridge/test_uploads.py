@@ -142,7 +142,7 @@ def test_armed_in_mavlink_mode_is_denied() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.faults.armed = True
     world.run(5)
-    refused(world, station, 5, A.DENIED, "MAVLink")
+    refused(world, station, 5, A.DENIED, "Armed")
 
 
 def test_armed_while_items_come_in_is_denied() -> None:
