@@ -17,11 +17,13 @@ from service.fc_port import STOPPED
 from service.gcs_links import GcsLink, open_link
 from service.recording import Recording
 from service.settings import Settings
+from service.signing_state import SigningState
 from service.store_worker import StoreWorker
 from service.version import version
 
 #: How often it is said that nobody is found: a log that says nothing looks like a program that hangs.
 _SEARCH_REPORT_S = 60.0
+_WHO_MAY_WRITE = "whoever reaches it may write missions and parameters; docs/signing.md tells how to limit that"
 
 _log = structlog.get_logger()
 
@@ -33,12 +35,13 @@ class Daemon:
         self._loop = asyncio.get_running_loop()
         self.settings = settings
         self._recording = Recording(settings)
+        self._signing = SigningState(settings)
         self.bridge = Bridge(
             BridgeConfig(
                 _speeds(settings.fc),
                 sysid=settings.sysid,
                 takeoff_max_m=settings.takeoff_max_m,
-                autopilot=settings.autopilot,
+                links=self._signing.links,
             ),
             _journal,
             self._loop.time(),
@@ -68,6 +71,10 @@ class Daemon:
                 fc=str(self.settings.fc),
                 gcs=[str(address) for address in self.settings.gcs],
             )
+            for name in self._links:
+                if name not in self.settings.access:
+                    _log.warning("gcs.open", link=name, what=_WHO_MAY_WRITE)
+            self._signing.start()
             port = self._loop.create_task(self._port.run())
             self._tick()
             await port
@@ -82,6 +89,7 @@ class Daemon:
             for link in self._links.values():
                 link.close()
             self.store.close()
+            self._signing.close()
             self._recording.close()
 
     def flush(self) -> None:

@@ -3,12 +3,13 @@
 import difflib
 import os
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge.fc_session import Autopilot
 from service.connection import FcAddress, GcsAddress, parse_fc, parse_gcs
+from service.write_access import WriteAccess, parse_link
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
 DEFAULT_SYSID = 1
@@ -30,7 +31,10 @@ class TlogLimits:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded."""
+    """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
+
+    `access`: who may write over a link, by its address as text; over others everyone may.
+    """
 
     fc: FcAddress
     gcs: Sequence[GcsAddress] = ()
@@ -39,13 +43,13 @@ class Settings:
     takeoff_max_m: int = DEFAULT_TAKEOFF_MAX_M
     tlog: TlogLimits | None = None
     record_uart: Path | None = None
-    autopilot: Autopilot = Autopilot.AUTO
+    access: Mapping[str, WriteAccess] = field(default_factory=dict)
 
 
 #: Keys of the configuration file: name -> (type, what it is).
 _KEYS: dict[str, tuple[type, str]] = {
     "fc": (str, "flight controller connection"),
-    "gcs": (list, "list of ground station connections"),
+    "gcs": (list, "list of ground station connections, each text or a table"),
     "state_dir": (str, "folder for stored missions"),
     "sysid": (int, "MAVLink system id, 1..255"),
     "takeoff_max_m": (int, "greatest take-off height in metres, 2..255"),
@@ -82,19 +86,24 @@ def load_settings(
     chosen_fc = fc or values.get("fc")
     if not isinstance(chosen_fc, str):
         raise SettingsError("name the flight controller: --fc /dev/serial0, or --fc sim: to try it without one")
-    chosen_gcs = gcs or values.get("gcs") or [DEFAULT_GCS]
-    assert isinstance(chosen_gcs, Sequence)
+    links = _links(values.get("gcs"), Path() if config is None else config.parent)
     folder = state_dir or values.get("state_dir") or default_state_dir()
     return Settings(
         fc=parse_fc(chosen_fc),
-        gcs=[parse_gcs(str(text)) for text in chosen_gcs],
+        gcs=[parse_gcs(text) for text in gcs] or list(links) or [parse_gcs(DEFAULT_GCS)],
         state_dir=Path(str(folder)),
         sysid=_in_range(values, "sysid", 1, 255, DEFAULT_SYSID),
         takeoff_max_m=_in_range(values, "takeoff_max_m", 2, 255, DEFAULT_TAKEOFF_MAX_M),
         tlog=_tlog_limits(values) if values.get("record_tlog", True) else None,
         record_uart=record_uart or _path(values.get("record_uart")),
-        autopilot=_autopilot(values.get("autopilot", Autopilot.AUTO.value)),
+        # A link that is named by a flag, too, stays as safe as the file says.
+        access={str(address): access for address, access in links.items() if not access.is_open},
     )
+
+
+def _links(entries: object, folder: Path) -> dict[GcsAddress, WriteAccess]:
+    assert entries is None or isinstance(entries, list)
+    return dict(parse_link(entry, folder) for entry in entries or ())
 
 
 def _tlog_limits(values: dict[str, object]) -> TlogLimits:

@@ -1,0 +1,99 @@
+"""Who may write over a link to ground stations: what the table form of a `gcs` setting says.
+
+gcs = [
+    "udpin:127.0.0.1:14551",
+    {address = "udpin:0.0.0.0:14550", key_file = "/etc/naze-bridge/gcs.key", writers = ["192.168.4.0/24"]},
+]
+"""
+
+import os
+import stat
+from dataclasses import dataclass, field
+from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+from pathlib import Path
+
+from bridge.station import Peer
+from protocols.mavlink.signing import key_from_passphrase
+from service.connection import AddressError, GcsAddress, parse_gcs
+
+Network = IPv4Network | IPv6Network
+
+_KEYS = ("address", "key_file", "writers")
+_MAX_PASSPHRASE = 4096
+
+
+class WriteAccessError(AddressError):
+    """A table that cannot be used; the text is one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteAccess:
+    """`key` None: no signature is asked for. `writers` None: any address will do; none in it: nobody may write."""
+
+    key: bytes | None = field(default=None, repr=False)
+    writers: tuple[Network, ...] | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether anyone may write."""
+        return self.key is None and self.writers is None
+
+    def has_address(self, peer: Peer) -> bool:
+        """Tell whether a peer's address is among the writers'."""
+        assert self.writers is not None
+        assert isinstance(peer.key, tuple)
+        address = ip_address(peer.key[0])
+        if isinstance(address, IPv6Address) and address.ipv4_mapped is not None:
+            # How a socket for both protocols shows a peer of IPv4.
+            address = address.ipv4_mapped
+        return any(address in network for network in self.writers)
+
+
+def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
+    """Read one entry of `gcs`: a connection string or a table. `folder`: where a relative `key_file` is looked for."""
+    if isinstance(entry, str):
+        return parse_gcs(entry), WriteAccess()
+    if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
+        raise WriteAccessError(f'gcs: {entry!r} is neither text nor a table with address = "udpin:0.0.0.0:14550"')
+    address = parse_gcs(entry["address"])
+    for key in entry:
+        if key not in _KEYS:
+            raise WriteAccessError(f"gcs {address}: {key!r} is no setting of a link; known are {', '.join(_KEYS)}")
+    key_file, writers = entry.get("key_file"), entry.get("writers")
+    if key_file is not None and (not isinstance(key_file, str) or not key_file):
+        raise WriteAccessError(f"gcs {address}: key_file must be the name of a file that holds the passphrase")
+    if writers is not None and not isinstance(writers, list):
+        raise WriteAccessError(f'gcs {address}: writers must be a list of networks like ["192.168.4.0/24"]')
+    return address, WriteAccess(
+        None if key_file is None else read_key(folder / key_file),
+        None if writers is None else tuple(_network(address, writer) for writer in writers),
+    )
+
+
+def read_key(path: Path) -> bytes:
+    """Return the key of the passphrase that is the one line of a file that others cannot read."""
+    try:
+        # Not blocking: a FIFO that nobody writes to would hold the daemon up.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise WriteAccessError(f"key_file {path} is no file")
+            if status.st_mode & stat.S_IRWXO:
+                raise WriteAccessError(f"key_file {path} is open to every user of this machine: run chmod 600 {path}")
+            passphrase = file.read(_MAX_PASSPHRASE + 1).decode()
+    except OSError as error:
+        raise WriteAccessError(f"key_file {path} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError:
+        # Not "from" the error, which quotes the passphrase.
+        raise WriteAccessError(f"key_file {path} holds no text: write the passphrase into it, in one line") from None
+    passphrase = passphrase.removesuffix("\n").removesuffix("\r")
+    if not passphrase or "\n" in passphrase or len(passphrase) > _MAX_PASSPHRASE:
+        raise WriteAccessError(f"key_file {path} must hold the passphrase in one line, and nothing else")
+    return key_from_passphrase(passphrase)
+
+
+def _network(address: GcsAddress, text: object) -> Network:
+    try:
+        return ip_network(str(text))
+    except ValueError as error:
+        raise WriteAccessError(f"gcs {address}: writers: {error}; write 192.168.4.0/24 or 192.168.4.7") from error

@@ -1,0 +1,187 @@
+"""Timestamps that outlive the daemon, on a machine whose clock does not."""
+
+import asyncio
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from protocols.mavlink.frame import MavlinkFrame
+from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, key_from_passphrase, ticks
+from service.connection import GcsAddress, SimulatedFc
+from service.settings import Settings
+from service.signing_state import FILE_NAME, SigningState
+from service.write_access import WriteAccess
+
+KEY = key_from_passphrase("a passphrase")
+NOON = 1_795_262_400.0
+UDP, TCP = GcsAddress("udpin", "127.0.0.1", 14550), GcsAddress("tcpin", "127.0.0.1", 5760)
+
+
+class Pi:
+    """A machine: its clock, and the state directory of its daemon."""
+
+    def __init__(self, folder: Path, key: bytes | None = KEY) -> None:
+        self.unix_s = NOON
+        access = WriteAccess(key, () if key is None else None)
+        self._settings = Settings(SimulatedFc(), [UDP, TCP], folder, access={str(UDP): access, str(TCP): access})
+        self.path = folder / FILE_NAME
+
+    def boot(self) -> SigningState:
+        state = SigningState(self._settings, lambda: self.unix_s)
+        state.start()
+        return state
+
+    def stored(self) -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(self.path.read_bytes())
+        return found
+
+
+def signing(state: SigningState, link: GcsAddress = UDP) -> Signing:
+    found = state.links[str(link)].signing
+    assert found is not None
+    return found
+
+
+def frame(timestamp: int, link_id: int = 7) -> MavlinkFrame:
+    station = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    station.signing.secret_key, station.signing.sign_outgoing = KEY, True
+    station.signing.timestamp, station.signing.link_id = timestamp, link_id
+    return MavlinkFrame(bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(station)))
+
+
+def our_timestamp(state: SigningState) -> int:
+    return int.from_bytes(signing(state).signature(b"", 0)[1:7], "little")
+
+
+async def until_written(pi: Pi, least: int) -> None:
+    for _ in range(1000):
+        if pi.path.exists() and pi.stored()["timestamp"] >= least:
+            return
+        await asyncio.sleep(0.01)
+    raise AssertionError("it was not written")
+
+
+async def test_a_stop_and_a_start_without_a_clock(tmp_path: Path) -> None:
+    pi = Pi(tmp_path)
+    state = pi.boot()
+    heard = frame(ticks(NOON) + 5)
+    assert signing(state).check(heard) is Check.VALID
+    last = our_timestamp(state)
+    state.close()
+    assert pi.stored()["timestamp"] == last
+    pi.unix_s = 0.0
+    state = pi.boot()
+    assert our_timestamp(state) == last + 1
+    assert signing(state).check(heard) is Check.REPLAYED
+    assert signing(state).check(frame(last + 1)) is Check.VALID
+    state.close()
+
+
+async def test_a_power_cut(tmp_path: Path) -> None:
+    pi = Pi(tmp_path)
+    pi.boot()
+    await until_written(pi, ticks(NOON) + TOLERANCE)
+    # It is a minute ahead of the truth, so whatever was used before the power went is behind it.
+    pi.unix_s = 0.0
+    state = pi.boot()
+    assert our_timestamp(state) > ticks(NOON) + TOLERANCE
+    assert signing(state).check(frame(ticks(NOON) - 1)) is Check.LATE
+    state.close()
+
+
+async def test_a_ground_station_that_is_far_ahead_is_followed_and_not_forgotten(tmp_path: Path) -> None:
+    pi = Pi(tmp_path)
+    pi.unix_s = 0.0
+    state = pi.boot()
+    tomorrow = ticks(NOON) + 86400 * TICKS_PER_S
+    assert signing(state).check(frame(tomorrow)) is Check.VALID
+    await until_written(pi, tomorrow + TOLERANCE)
+    state = pi.boot()
+    assert our_timestamp(state) > tomorrow
+    state.close()
+
+
+async def test_it_is_written_once_a_minute_and_not_at_all_while_nothing_is_signed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.signing_state._LOOK_S", 0.001)
+    pi = Pi(tmp_path)
+    state = pi.boot()
+    await until_written(pi, 1)
+    written = pi.path.stat().st_ino
+    for second in range(59):
+        pi.unix_s = NOON + second
+        our_timestamp(state)
+        await asyncio.sleep(0.003)
+    assert pi.path.stat().st_ino == written
+    pi.unix_s = NOON + 600
+    await asyncio.sleep(0.05)
+    assert pi.path.stat().st_ino == written
+    our_timestamp(state)
+    await until_written(pi, ticks(pi.unix_s) + TOLERANCE)
+    state.close()
+
+
+async def test_one_key_on_two_links_is_one_key(tmp_path: Path) -> None:
+    state = Pi(tmp_path).boot()
+    recorded = frame(ticks(NOON))
+    assert signing(state, UDP).check(recorded) is Check.VALID
+    assert signing(state, TCP).check(recorded) is Check.REPLAYED
+    assert {access.link_id for access in state.links.values()} == {0, 1}
+    state.close()
+
+
+async def test_without_a_key_there_is_no_file(tmp_path: Path) -> None:
+    pi = Pi(tmp_path, key=None)
+    state = pi.boot()
+    assert all(access.signing is None and access.may_write is not None for access in state.links.values())
+    state.close()
+    assert not pi.path.exists()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[]",
+        "7",
+        '{"timestamp": 5}',
+        '{"timestamp": "x", "streams": {}}',
+        '{"timestamp": 1, "streams": []}',
+        '{"timestamp": 1, "streams": {"udpin:127.0.0.1:14550": [[1]]}}',
+        "\xff",
+    ],
+)
+async def test_a_damaged_file_is_told_and_replaced(
+    tmp_path: Path, content: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pi = Pi(tmp_path)
+    pi.path.write_bytes(content.encode("latin-1"))
+    state = pi.boot()
+    assert signing(state).check(frame(ticks(NOON))) is Check.VALID
+    state.close()
+    assert pi.stored()["timestamp"] == ticks(NOON)
+    assert "signing.state_lost" in capsys.readouterr().out
+
+
+async def test_a_disk_that_cannot_be_written_stops_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pi = Pi(tmp_path / "missing")
+    state = pi.boot()
+    assert signing(state).check(frame(ticks(NOON))) is Check.VALID
+    state.close()
+    assert "signing.state_not_stored" in capsys.readouterr().out
+
+
+async def test_the_file_is_nobody_elses_and_holds_no_key(tmp_path: Path) -> None:
+    pi = Pi(tmp_path)
+    state = pi.boot()
+    signing(state).check(frame(ticks(NOON)))
+    state.close()
+    assert pi.path.stat().st_mode & 0o777 == 0o600
+    assert KEY.hex() not in pi.path.read_text()
+    assert os.listdir(tmp_path) == [FILE_NAME]
