@@ -116,6 +116,7 @@ class MissionJobs:
             "battery_v": vehicle.analog.battery_dv / 10 if vehicle.analog else None,
             "satellites": vehicle.gps.satellites if vehicle.gps else None,
             "ground_stations": [str(peer) for peer in bridge.ground.peers()],
+            "refused": [f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()],
             "mission_records": None if held is None else held.identity.count,
             "mission_checksum": None if held is None else _hex(held.identity.checksum),
             "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),
