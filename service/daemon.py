@@ -41,6 +41,7 @@ class Daemon:
                 _speeds(settings.fc),
                 sysid=settings.sysid,
                 takeoff_max_m=settings.takeoff_max_m,
+                autopilot=settings.autopilot,
                 links=self._signing.links,
             ),
             _journal,

@@ -43,6 +43,7 @@ class Settings:
     takeoff_max_m: int = DEFAULT_TAKEOFF_MAX_M
     tlog: TlogLimits | None = None
     record_uart: Path | None = None
+    autopilot: Autopilot = Autopilot.AUTO
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
 
 
@@ -96,6 +97,7 @@ def load_settings(
         takeoff_max_m=_in_range(values, "takeoff_max_m", 2, 255, DEFAULT_TAKEOFF_MAX_M),
         tlog=_tlog_limits(values) if values.get("record_tlog", True) else None,
         record_uart=record_uart or _path(values.get("record_uart")),
+        autopilot=_autopilot(values.get("autopilot", Autopilot.AUTO.value)),
         # A link that is named by a flag, too, stays as safe as the file says.
         access={str(address): access for address, access in links.items() if not access.is_open},
     )
