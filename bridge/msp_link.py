@@ -25,6 +25,7 @@ _LONGEST_STALL_S = 1.0
 _FIRST_GUESS_S = 0.03
 #: After so long without a byte nothing more comes of a frame that has begun.
 _LINE_SILENCE_S = 0.05
+_ANY_SIZE = 1 << 16
 
 _REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: 4 + FRAME_OVERHEAD}
 #: Fills a parser that waits for the rest of a cut frame (64 payload bytes and a checksum on an unpatched Harakiri),
@@ -98,9 +99,18 @@ class MspLink:
             message.command in commands for message in self._waiting
         )
 
+    @property
+    def room(self) -> int:
+        """How long the reply to a request that goes out now may be."""
+        if not self._sent and not self._waiting:
+            return _ANY_SIZE
+        if self._waiting or self._is_exclusive():
+            return 0
+        return MAX_OUTSTANDING_BYTES - self.outstanding_bytes
+
     def may_send(self, reply_size: int) -> bool:
         """Tell whether a request with such a reply may go out now."""
-        return not self._waiting and not self._is_exclusive() and self._has_room(reply_size)
+        return reply_size <= self.room
 
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""

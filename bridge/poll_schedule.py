@@ -77,6 +77,7 @@ class _Slot:
     wanted_s: float = inf
     interval_s: float = inf
     asked_at: float = -inf
+    due: float = -inf
     is_asked: bool = False
     misses: int = 0
     refusals: int = 0
@@ -86,16 +87,22 @@ class _Slot:
         """Bytes of a question and its reply."""
         return len(self.poll.frame) + self.size
 
-    @property
-    def due(self) -> float:
-        """When it is to be asked next."""
-        return inf if self.interval_s == inf else self.asked_at + self.interval_s
+    def set_interval(self, interval_s: float) -> None:
+        """Ask it so often from now on."""
+        self.interval_s = interval_s
+        self.due = inf if interval_s == inf else self.asked_at + interval_s
 
-    def may_be_asked_at(self, link: MspLink) -> float:
+    def asked(self, now: float) -> None:
+        """Take note that it is asked. The next time counts from when it was due, unless that is long past."""
+        self.is_asked = True
+        self.asked_at = now if now >= self.due + self.interval_s else self.due
+        self.due = self.asked_at + self.interval_s
+
+    def may_be_asked_at(self, link: MspLink, room: int) -> float:
         """Return when, if the link does not change before; infinity: not before it does."""
         if self.is_asked and link.awaits(self.commands):
             return inf
-        if link.may_send(self.size):
+        if self.size <= room:
             return self.due
         # The link has a queue: a STATUS that is late is put into it, before what a mission has still to say.
         return self.due + self.interval_s if self.poll.command is Msp.STATUS else inf
@@ -145,15 +152,17 @@ class PollSchedule:
         self._look_at(link, beside_missions)
         limit = now
         while now >= self._free_at:
-            ready = [slot for slot in self._slots.values() if slot.may_be_asked_at(link) <= limit]
+            room = link.room
+            ready = [
+                slot for slot in self._slots.values() if slot.due <= limit and slot.may_be_asked_at(link, room) <= limit
+            ]
             if not ready:
                 return
             slot = max(ready, key=lambda slot: (now - slot.asked_at) / slot.interval_s)
             if slot.is_asked:
                 slot.misses += 1
                 self._bend()
-            slot.is_asked = True
-            slot.asked_at = now if now >= slot.due + slot.interval_s else slot.due
+            slot.asked(now)
             self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget
             link.send(Send(slot.poll.frame, slot.poll.command, slot.size), now)
             limit = now + _GATHER_S
@@ -179,8 +188,12 @@ class PollSchedule:
 
     def next_deadline(self, link: MspLink) -> float | None:
         """Return when `ask` has something to send; None: not before a reply."""
-        due = min((slot.may_be_asked_at(link) for slot in self._slots.values()), default=inf)
-        return None if due == inf else max(due, self._free_at)
+        room = link.room
+        earliest = inf
+        for slot in self._slots.values():
+            if slot.due < earliest:
+                earliest = min(earliest, slot.may_be_asked_at(link, room))
+        return None if earliest == inf else max(earliest, self._free_at)
 
     def _look_at(self, link: MspLink, beside_missions: bool) -> None:
         lost, self._lost_before = link.requests_lost - self._lost_before, link.requests_lost
@@ -210,7 +223,7 @@ class PollSchedule:
         """Set the intervals."""
         scale = self._line_scale * self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
         for slot in self._slots.values():
-            slot.interval_s = self._interval(slot, scale)
+            slot.set_interval(self._interval(slot, scale))
 
     def _interval(self, slot: _Slot, scale: float) -> float:
         is_status = slot.poll.command is Msp.STATUS
