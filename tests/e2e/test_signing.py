@@ -1,0 +1,149 @@
+"""A daemon whose link asks for a key or for an address, and pymavlink as a ground station that signs."""
+
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from benches import Starter
+from plain_station import PlainStation
+from plan import plain_plan
+from programs import Daemon, free_port, run_naze_bridge, until
+
+from protocols.mavlink.dialect import messages
+from protocols.mavlink.signing import key_from_passphrase, ticks
+from protocols.mission_item import MissionResult
+
+PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
+KEY = key_from_passphrase(PASSPHRASE)
+
+
+class Field:
+    """A board, its daemon with one guarded UDP link, and stations that come to it."""
+
+    def __init__(self, start: Starter, stack: ExitStack, guard: str) -> None:
+        self._stack = stack
+        port = free_port()
+        link = f"udpin:127.0.0.1:{port}"
+        self.address = "127.0.0.1", port
+        config = start.directory / "naze-bridge.toml"
+        config.write_text(f'gcs = [{{address = "{link}", {guard}}}]\n')
+        self.board = start.board()
+        self.daemon: Daemon = start.daemon(
+            str(self.board.link), (link,), options=("--config", str(config), "--verbose")
+        )
+        self.daemon.wait()
+
+    def station(self, key: bytes | None = None, host: str = "127.0.0.1", sysid: int = 250) -> PlainStation:
+        connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        connection.bind((host, 0))
+        connection.connect(self.address)
+        station = self._stack.enter_context(PlainStation(connection, sysid=sysid))
+        if key is not None:
+            signing = station._codec.signing
+            signing.secret_key, signing.sign_outgoing, signing.link_id = key, True, 5
+            signing.timestamp = ticks(time.time())
+        return station
+
+    def refused(self) -> list[str]:
+        found: list[str] = self.daemon.ask({"do": "status"})["refused"]
+        return sorted(found)
+
+
+@pytest.fixture
+def stack() -> Iterator[ExitStack]:
+    with ExitStack() as stack:
+        yield stack
+
+
+@pytest.fixture
+def keyed(start: Starter, stack: ExitStack, tmp_path: Path) -> Field:
+    key_file = tmp_path / "gcs.key"
+    key_file.write_text(PASSPHRASE + "\n")
+    key_file.chmod(0o600)
+    return Field(start, stack, f'key_file = "{key_file}"')
+
+
+def signed(station: PlainStation, message: Any) -> bytes:
+    return bytes(message.pack(station._codec))
+
+
+def assert_nowhere_is_the_key(field: Field) -> None:
+    """Neither in the log nor in anything that the daemon has stored."""
+    places = [path for path in field.daemon.state_dir.rglob("*") if path.is_file()]
+    assert any(path.suffix == ".tlog" and path.stat().st_size for path in places)
+    for content in [field.daemon.printed.encode(), *(path.read_bytes() for path in places)]:
+        for secret in (KEY, KEY.hex().encode(), repr(KEY).encode(), PASSPHRASE.encode()):
+            assert secret not in content
+
+
+def test_only_who_has_the_key_writes(keyed: Field) -> None:
+    thief, pilot, other = keyed.station(), keyed.station(KEY), keyed.station(key_from_passphrase("guessed"), sysid=251)
+    plan = plain_plan(9)
+    assert thief.upload(plan) is MissionResult.DENIED
+    # Only who does not look at signatures can hear who has another key.
+    other.announce(9)
+    until(lambda: any("another key" in line for line in keyed.refused()), "the refusal")
+    assert keyed.board.records() == []
+    assert pilot.upload(plan) is MissionResult.ACCEPTED
+    stored = keyed.board.records()
+    assert len(stored) == 9
+    # All that the pilot takes is signed; the thief still reads.
+    assert len(pilot.download()) == len(thief.download()) == 9
+    thief.send(messages.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+    assert thief.wait_for("COMMAND_ACK").result == messages.MAV_RESULT_DENIED
+    assert thief.clear() is MissionResult.DENIED
+    pilot.send(messages.MAVLink_setup_signing_message(1, 1, KEY, 1))
+    thief.send(messages.MAVLink_setup_signing_message(1, 1, KEY, 1))
+    until(lambda: any("set the key" in line for line in keyed.refused()), "the refusal of SETUP_SIGNING")
+    assert keyed.board.records() == stored
+    shown = run_naze_bridge("status", "--state-dir", keyed.daemon.state_dir).stdout
+    assert "not signed" in shown
+    assert keyed.daemon.end() == 0
+    refusals = [event for event in keyed.daemon.events() if event["event"] == "gcs.refused"]
+    assert sorted(event["why"] for event in refusals).count("not signed") == 1
+    assert {event["level"] for event in refusals} == {"warning"}
+    assert keyed.daemon.has_logged("gcs.open") is None
+    assert_nowhere_is_the_key(keyed)
+
+
+def test_a_recording_is_worth_nothing_even_after_a_restart(keyed: Field) -> None:
+    pilot = keyed.station(KEY)
+    assert pilot.upload(plain_plan(5)) is MissionResult.ACCEPTED
+    clear = signed(pilot, messages.MAVLink_mission_clear_all_message(1, 1))
+    pilot._socket.send(clear)
+    assert pilot.wait_for("MISSION_ACK").type == MissionResult.ACCEPTED
+    assert pilot.upload(plain_plan(7)) is MissionResult.ACCEPTED
+    stored = keyed.board.records()
+    for _ in range(2):
+        thief = keyed.station()
+        thief._socket.send(clear)
+        assert thief.wait_for("MISSION_ACK").type == MissionResult.DENIED
+        assert keyed.refused() == [f"1 x its timestamp was used before (udpin:127.0.0.1:{keyed.address[1]})"]
+        assert keyed.daemon.end() == 0
+        keyed.daemon.process = keyed.daemon._start()
+        keyed.daemon.wait()
+    assert keyed.board.records() == stored
+    # The pilot goes on where he was, and takes what the new daemon signs.
+    assert pilot.upload(plain_plan(4)) is MissionResult.ACCEPTED
+    assert_nowhere_is_the_key(keyed)
+
+
+def test_only_who_is_on_the_list_writes(start: Starter, stack: ExitStack) -> None:
+    field = Field(start, stack, 'writers = ["127.0.0.2/32"]')
+    guest, pilot = field.station(host="127.0.0.1"), field.station(host="127.0.0.2")
+    assert guest.upload(plain_plan(3)) is MissionResult.DENIED
+    assert pilot.upload(plain_plan(6)) is MissionResult.ACCEPTED
+    assert len(guest.download()) == 6
+    assert field.daemon.has_logged("gcs.open") is None
+
+
+def test_an_open_link_is_told_of_once(start: Starter) -> None:
+    board = start.board()
+    daemon = start.daemon(str(board.link))
+    daemon.wait()
+    opened = [event for event in daemon.events() if event["event"] == "gcs.open"]
+    assert [(event["link"], event["level"]) for event in opened] == [(f"udpin:127.0.0.1:{daemon.port}", "warning")]
