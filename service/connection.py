@@ -1,5 +1,6 @@
 """Connection strings, as pymavlink and MAVProxy users know them."""
 
+import socket
 from dataclasses import dataclass
 
 
@@ -49,7 +50,8 @@ class GcsAddress:
     port: int
 
     def __str__(self) -> str:
-        return f"{self.kind}:{self.host}:{self.port}"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.kind}:{host}:{self.port}"
 
 
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
@@ -83,8 +85,17 @@ def parse_gcs(text: str) -> GcsAddress:
     return GcsAddress(kind, *_host_port(text, rest, _GCS_FORMS))
 
 
+def family_of(host: str) -> socket.AddressFamily:
+    """Return IPv6 for such an address; a name stands for an IPv4 address."""
+    return socket.AF_INET6 if ":" in host else socket.AF_INET
+
+
 def _host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
     host, colon, port = rest.rpartition(":")
+    if host.startswith("[") and host.endswith("]"):
+        host = host[1:-1]
+    elif ":" in host:
+        raise AddressError(f"{text!r}: an IPv6 address stands in brackets, as in [::1]:5760")
     if not colon or not host:
         raise AddressError(f"{text!r} needs a host and a port: {forms}")
     if not port.isdecimal() or not 0 < int(port) < 65536:

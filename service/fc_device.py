@@ -9,7 +9,7 @@ from typing import Protocol
 
 import serial
 
-from service.connection import FcAddress, SerialFc, TcpFc
+from service.connection import FcAddress, SerialFc, TcpFc, family_of
 from service.port_holder import explain_port_error, find_console
 
 _TCP_PATIENCE_S = 3.0
@@ -64,12 +64,13 @@ async def _open_serial(path: str) -> serial.Serial:
 
 
 async def _open_tcp(host: str, port: int) -> socket.socket:
-    connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    family = family_of(host)
+    connection = socket.socket(family, socket.SOCK_STREAM)
     connection.setblocking(False)
     loop = asyncio.get_running_loop()
     try:
         async with asyncio.timeout(_TCP_PATIENCE_S):
-            found = await loop.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_STREAM)
+            found = await loop.getaddrinfo(host, port, family=family, type=socket.SOCK_STREAM)
             await loop.sock_connect(connection, found[0][4])
     except (OSError, TimeoutError) as error:
         connection.close()

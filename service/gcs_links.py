@@ -9,7 +9,7 @@ from typing import Protocol
 import structlog
 
 from bridge.station import Peer
-from service.connection import GcsAddress
+from service.connection import GcsAddress, family_of
 from service.send_queue import SendQueue
 
 _DATAGRAM_SIZE = 2048
@@ -18,6 +18,12 @@ _DATAGRAMS_AT_ONCE = 64
 #: What a stalled TCP client may leave unread; then telemetry for it is dropped, the oldest first.
 _MAX_UNSENT = 65536
 _KERNEL_BUFFER = 32768
+#: One that has taken nothing for so long is not there any more, though its Wi-Fi could not say so.
+_STALL_MS = 60000
+#: Each costs a copy of the telemetry.
+_MAX_CLIENTS = 32
+#: How often it is asked what a name stands for.
+_LOOK_UP_S = 10.0
 
 _log = structlog.get_logger()
 
@@ -70,20 +76,16 @@ class UdpLink:
 
     def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
         self.name = str(address)
+        self._address = address
+        self._family = family_of(address.host)
         self._events = events
         self._loop = asyncio.get_running_loop()
         self._complained = False
-        found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_DGRAM)
-        resolved: tuple[str, int] = (str(found[0][4][0]), address.port)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._lookup: asyncio.Task[None] | None = None
+        self._socket = socket.socket(self._family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
-            if address.kind == "udpin":
-                self._socket.bind(resolved)
-            else:
-                broadcast = address.kind == "udpbcast"
-                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, broadcast)
-                events.add_default_peer(Peer(self.name, resolved), until_answered=broadcast)
+            self._set_up()
         except OSError:
             self._socket.close()
             raise
@@ -103,8 +105,51 @@ class UdpLink:
 
     def close(self) -> None:
         """Close the socket."""
+        if self._lookup is not None:
+            self._lookup.cancel()
         self._loop.remove_reader(self._socket.fileno())
         self._socket.close()
+
+    def _set_up(self) -> None:
+        host, port = self._address.host, self._address.port
+        if self._family is socket.AF_INET6:
+            # Otherwise it would take the port away from udpin:0.0.0.0.
+            self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        if self._address.kind == "udpin":
+            self._socket.bind((host, port))
+            return
+        broadcast = self._address.kind == "udpbcast"
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, broadcast)
+        try:
+            found = socket.getaddrinfo(host, port, self._family, socket.SOCK_DGRAM, flags=socket.AI_NUMERICHOST)
+        except socket.gaierror:
+            self._lookup = self._loop.create_task(self._follow_name(until_answered=broadcast))
+        else:
+            self._events.add_default_peer(Peer(self.name, found[0][4]), until_answered=broadcast)
+
+    async def _follow_name(self, *, until_answered: bool) -> None:
+        """Speak to what the name stands for: a network comes up after us, and a laptop gets another address."""
+        known: Peer | None = None
+        complained = False
+        while True:
+            try:
+                found = await self._loop.getaddrinfo(
+                    self._address.host, self._address.port, family=self._family, type=socket.SOCK_DGRAM
+                )
+            except OSError as error:
+                level = _log.debug if complained else _log.warning
+                level("gcs.name_unknown", link=self.name, why=error.strerror or str(error))
+                complained = True
+            else:
+                peers = [Peer(self.name, entry[4]) for entry in found]
+                complained = False
+                if known not in peers:
+                    if known is not None:
+                        self._events.remove_default_peer(known)
+                    known = peers[0]
+                    self._events.add_default_peer(known, until_answered=until_answered)
+                    _log.info("gcs.name_found", peer=str(known))
+            await asyncio.sleep(_LOOK_UP_S)
 
     def _readable(self) -> None:
         for _ in range(_DATAGRAMS_AT_ONCE):
@@ -126,7 +171,8 @@ class TcpLink:
         self._events = events
         self._loop = asyncio.get_running_loop()
         self._clients: dict[Peer, _TcpClient] = {}
-        self._socket = socket.create_server((address.host, address.port), family=socket.AF_INET)
+        self._complained = False
+        self._socket = socket.create_server((address.host, address.port), family=family_of(address.host))
         self._socket.setblocking(False)
         self._loop.add_reader(self._socket.fileno(), self._acceptable)
 
@@ -140,16 +186,24 @@ class TcpLink:
         """Close the server and its clients."""
         self._loop.remove_reader(self._socket.fileno())
         self._socket.close()
-        for client in list(self._clients.values()):
+        for client in self._clients.values():
             client.close()
+        self._clients.clear()
 
     def _acceptable(self) -> None:
         try:
             connection, sender = self._socket.accept()
         except OSError:
             return
+        if len(self._clients) >= _MAX_CLIENTS:
+            connection.close()
+            level = _log.debug if self._complained else _log.warning
+            level("gcs.too_many_clients", link=self.name, refused=str(sender), limit=_MAX_CLIENTS)
+            self._complained = True
+            return
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)
         # The kernel would keep minutes of old telemetry for who does not read.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
         peer = Peer(self.name, sender)
@@ -168,7 +222,7 @@ class TcpLink:
 
 
 class _TcpClient:
-    """One connection with a bounded amount of unsent bytes."""
+    """One connection with a bounded amount of unsent bytes. `gone`: it was closed, but not by `close`."""
 
     def __init__(
         self,
@@ -182,35 +236,42 @@ class _TcpClient:
         self._received = received
         self._gone = gone
         self._unsent = SendQueue(_MAX_UNSENT)
+        self._hanging_up: asyncio.Handle | None = None
         loop.add_reader(connection.fileno(), self._readable)
 
     def send(self, data: bytes) -> None:
+        if self._hanging_up is not None:
+            return
         if self._unsent:
             if not self._unsent.add(data):
                 # It has not read so many answers that it can make no sense of the next one.
-                self.close()
+                self._hang_up()
             return
         sent = self._try_send(memoryview(data))
-        if sent < len(data) and self._socket.fileno() >= 0:
+        if sent < len(data):
             self._unsent.add(data)
             self._unsent.sent(sent)
             self._loop.add_writer(self._socket.fileno(), self._writable)
 
     def close(self) -> None:
-        if self._socket.fileno() < 0:
-            return
+        if self._hanging_up is not None:
+            self._hanging_up.cancel()
         self._loop.remove_reader(self._socket.fileno())
         self._loop.remove_writer(self._socket.fileno())
         self._socket.close()
-        self._unsent = SendQueue(_MAX_UNSENT)
+
+    def _hang_up(self) -> None:
+        """Close soon: whoever sends is in the middle of sending to others, too."""
+        if self._hanging_up is None:
+            self._hanging_up = self._loop.call_soon(self._end)
+
+    def _end(self) -> None:
+        self.close()
         self._gone()
 
     def _writable(self) -> None:
         while self._unsent:
-            first = self._unsent.first()
-            sent = self._try_send(first)
-            if self._socket.fileno() < 0:
-                return
+            sent = self._try_send(self._unsent.first())
             if sent == 0:
                 return
             self._unsent.sent(sent)
@@ -222,7 +283,7 @@ class _TcpClient:
         except (BlockingIOError, InterruptedError):
             return 0
         except OSError:
-            self.close()
+            self._hang_up()
             return 0
 
     def _readable(self) -> None:
@@ -235,4 +296,4 @@ class _TcpClient:
         if data:
             self._received(data)
         else:
-            self.close()
+            self._hang_up()
