@@ -1,0 +1,260 @@
+"""UDP and TCP links by themselves, on real sockets."""
+
+import asyncio
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from bridge.station import Peer
+from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.dialect import messages as m
+from service import gcs_links
+from service.connection import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs
+from service.fc_device import device_opener
+from service.gcs_links import GcsLink, open_link
+
+FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
+
+
+class Ears:
+    """Notes what a link tells, and who is to be spoken to."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[Peer, bytes]] = []
+        self.default_peers: dict[Peer, bool] = {}
+        self.gone: list[Peer] = []
+
+    def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
+        self.heard.append((peer, data))
+
+    def gcs_gone(self, peer: Peer) -> None:
+        self.gone.append(peer)
+
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
+        self.default_peers[peer] = until_answered
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        del self.default_peers[peer]
+
+
+class Links:
+    """Opens links and sockets that are closed after the test."""
+
+    def __init__(self) -> None:
+        self.ears = Ears()
+        self._stack = ExitStack()
+
+    def open(self, text: str) -> GcsLink:
+        link = open_link(parse_gcs(text), self.ears)
+        self._stack.callback(link.close)
+        return link
+
+    def udp(self, host: str = "127.0.0.1") -> socket.socket:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        client = self._stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))
+        client.bind((host, 0))
+        client.setblocking(False)
+        return client
+
+    def tcp(self, port: int, host: str = "127.0.0.1") -> socket.socket:
+        client = self._stack.enter_context(socket.create_connection((host, port)))
+        client.setblocking(False)
+        return client
+
+    def close(self) -> None:
+        self._stack.close()
+
+
+@pytest.fixture
+def links() -> Iterator[Links]:
+    links = Links()
+    yield links
+    links.close()
+
+
+def free_port(kind: socket.SocketKind, host: str = "127.0.0.1") -> int:
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind) as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])
+
+
+async def until(condition: Callable[[], object], what: str, seconds: float = 20.0) -> None:
+    for _ in range(int(seconds / 0.005)):
+        if condition():
+            return
+        await asyncio.sleep(0.005)
+    raise AssertionError(f"{what} did not come")
+
+
+async def received(end: socket.socket, size: int = 4096) -> bytes:
+    async with asyncio.timeout(20):
+        return await asyncio.get_running_loop().sock_recv(end, size)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+async def test_udpin_answers_where_it_was_spoken_to_from(links: Links, host: str) -> None:
+    port = free_port(socket.SOCK_DGRAM, host)
+    link = links.open(f"udpin:{f'[{host}]' if ':' in host else host}:{port}")
+    clients = [links.udp(host) for _ in range(2)]
+    for client in clients:
+        client.sendto(FRAME, (host, port))
+    await until(lambda: len(links.ears.heard) == 2, "both datagrams")
+    for (peer, data), client in zip(links.ears.heard, clients, strict=True):
+        assert data == FRAME
+        link.send(peer, str(peer).encode())
+        assert await received(client) == str(peer).encode()
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+async def test_tcpin_serves_each_client(links: Links, host: str) -> None:
+    port = free_port(socket.SOCK_STREAM, host)
+    link = links.open(f"tcpin:{f'[{host}]' if ':' in host else host}:{port}")
+    client = links.tcp(port, host)
+    await until(lambda: links.ears.default_peers, "the client")
+    (peer,) = links.ears.default_peers
+    link.send(peer, FRAME)
+    assert await received(client) == FRAME
+    client.close()
+    await until(lambda: links.ears.gone == [peer], "its end")
+    assert links.ears.default_peers == {}
+
+
+async def test_ipv4_and_ipv6_have_a_port_each(links: Links) -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    links.open(f"udpin:0.0.0.0:{port}")
+    links.open(f"udpin:[::]:{port}")
+
+
+async def test_a_name_is_spoken_to_when_it_is_known(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The network comes up later than the daemon, and what the name stands for changes."""
+    first, second = links.udp(), links.udp()
+    answers: list[list[tuple[str, int]]] = [[], [], [first.getsockname()], [first.getsockname(), ("127.0.0.9", 9)]]
+    answers += [[], [("127.0.0.9", 9), first.getsockname()], [second.getsockname()]]
+    asked = 0
+    monkeypatch.setattr(gcs_links, "_LOOK_UP_S", 0.01)
+
+    async def look_up(host: str, port: int, **_: object) -> list[tuple[object, ...]]:
+        nonlocal asked
+        assert (host, port) == ("laptop.local", 14550)
+        found = answers[min(asked, len(answers) - 1)]
+        asked += 1
+        if not found:
+            raise socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")
+        return [(socket.AF_INET, socket.SOCK_DGRAM, 17, "", address) for address in found]
+
+    monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", look_up)
+    link = links.open("udpout:laptop.local:14550")
+    seen: list[list[Peer]] = []
+    while not seen or asked <= len(answers):
+        if not seen or seen[-1] != list(links.ears.default_peers):
+            seen.append(list(links.ears.default_peers))
+        await asyncio.sleep(0)
+    assert [[peer.key for peer in peers] for peers in seen] == [[], [first.getsockname()], [second.getsockname()]]
+    link.send(seen[-1][0], FRAME)
+    assert await received(second) == FRAME
+
+
+async def test_a_real_name_is_looked_up(links: Links) -> None:
+    client = links.udp()
+    port = client.getsockname()[1]
+    link = links.open(f"udpout:localhost:{port}")
+    await until(lambda: links.ears.default_peers, "the address")
+    (peer,) = links.ears.default_peers
+    assert peer.key == ("127.0.0.1", port)
+    link.send(peer, FRAME)
+    assert await received(client) == FRAME
+
+
+async def test_a_network_that_is_down_costs_the_datagram_and_nothing_else(links: Links) -> None:
+    link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
+    client = links.udp()
+    for unreachable in (("192.0.2.1", 14550), ("255.255.255.255", 14550), ("127.0.0.1", 0)):
+        # From a socket that is bound to the loopback: ENETUNREACH or EINVAL; EACCES; EINVAL.
+        link.send(Peer(link.name, unreachable), FRAME)
+    link.send(Peer(link.name, client.getsockname()), bytes(70000))
+    link.send(Peer(link.name, client.getsockname()), FRAME)
+    assert await received(client) == FRAME
+
+
+async def test_datagrams_that_nobody_takes_block_nobody(links: Links) -> None:
+    link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
+    deaf, client = links.udp(), links.udp()
+    for _ in range(5000):
+        link.send(Peer(link.name, deaf.getsockname()), bytes(280))
+    link.send(Peer(link.name, client.getsockname()), FRAME)
+    assert await received(client) == FRAME
+
+
+async def test_a_client_too_many_is_hung_up_and_finds_room_later(links: Links) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    links.open(f"tcpin:127.0.0.1:{port}")
+    clients = [links.tcp(port) for _ in range(gcs_links._MAX_CLIENTS)]
+    await until(lambda: len(links.ears.default_peers) == len(clients), "all clients")
+    assert await received(links.tcp(port)) == b""
+    assert len(links.ears.default_peers) == len(clients)
+    clients[5].close()
+    await until(lambda: links.ears.gone, "the end of one")
+    links.tcp(port)
+    await until(lambda: len(links.ears.default_peers) == len(clients), "another one")
+
+
+async def test_who_takes_nothing_any_more_is_hung_up(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gcs_links, "_STALL_MS", 500)
+    port = free_port(socket.SOCK_STREAM)
+    link = links.open(f"tcpin:127.0.0.1:{port}")
+    links.tcp(port)
+    await until(lambda: links.ears.default_peers, "the client")
+    (peer,) = links.ears.default_peers
+
+    def sends_on() -> bool:
+        for _ in range(100):
+            link.send(peer, FRAME * 10)
+        return bool(links.ears.gone)
+
+    await until(sends_on, "the end")
+    assert links.ears.default_peers == {}
+
+
+async def test_who_does_not_read_answers_is_hung_up_after_all_were_sent_to(links: Links) -> None:
+    """Nobody is told in the middle of a round: what others are sent would get out of order."""
+    port = free_port(socket.SOCK_STREAM)
+    link = links.open(f"tcpin:127.0.0.1:{port}")
+    links.tcp(port)
+    await until(lambda: links.ears.default_peers, "the client")
+    (peer,) = links.ears.default_peers
+    ack = FrameWriter(1, 1).frame(pack(m.MAVLink_mission_ack_message(255, 190, 1, 0)), 2)
+    for _ in range(200000):
+        link.send(peer, ack)
+        assert not links.ears.gone
+    await until(lambda: links.ears.gone == [peer], "the end")
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "port"),
+    [
+        ("udpin:[::]:14550", "::", 14550),
+        ("tcpin:[::1]:5760", "::1", 5760),
+        ("udpout:pc.local:1", "pc.local", 1),
+    ],
+)
+def test_addresses_are_written_as_they_are_read(text: str, host: str, port: int) -> None:
+    address = parse_gcs(text)
+    assert (address.host, address.port, str(address)) == (host, port, text)
+    assert isinstance(address, GcsAddress)
+
+
+def test_ipv6_without_brackets_is_explained() -> None:
+    with pytest.raises(AddressError, match=r"brackets, as in \[::1\]:5760"):
+        parse_gcs("udpin:::1:14550")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost"])
+async def test_a_flight_controller_behind_tcp(host: str) -> None:
+    with socket.create_server((host, 0), family=socket.AF_INET6 if ":" in host else socket.AF_INET) as server:
+        address = parse_fc(f"tcp:{f'[{host}]' if ':' in host else host}:{server.getsockname()[1]}")
+        assert isinstance(address, TcpFc)
+        device = await device_opener(address)()
+        server.accept()[0].close()
+        device.close()
