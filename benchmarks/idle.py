@@ -34,10 +34,10 @@ def measure() -> list[Figure]:
 
 def _idle(folder: Path, board: Board) -> list[Figure]:
     with floor_program(folder, "poll", str(board.link)) as (pid, _):
-        bare_percent = _cpu_percent(pid)
-    with _listener() as ground, daemon(folder, board.link, _udpout(ground)) as process:
+        bare_percent = cpu_percent(pid)
+    with listener() as ground, daemon(folder, board.link, udpout(ground)) as process:
         process.wait_for_event("fc.found")
-        percent = _cpu_percent(process.pid)
+        percent = cpu_percent(process.pid)
         resident_mb = _resident_mb(process.pid)
     return [
         Figure(
@@ -68,7 +68,7 @@ def _starts(folder: Path, board: Board) -> list[Figure]:
 
 
 def _first_heartbeat_s(folder: Path, board: Board) -> float:
-    with _listener() as ground, daemon(folder, board.link, _udpout(ground)) as process:
+    with listener() as ground, daemon(folder, board.link, udpout(ground)) as process:
         while True:
             frames = MavlinkSplitter().feed(ground.recv(2048))
             if any(frame.msgid == messages.MAVLINK_MSG_ID_HEARTBEAT for frame in frames):
@@ -93,18 +93,20 @@ def _libraries_mb() -> float:
     return _rss_mb(result.stdout)
 
 
-def _listener() -> socket.socket:
+def listener() -> socket.socket:
+    """Return a socket at which a ground station listens."""
     ground = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     ground.bind(("127.0.0.1", 0))
     ground.settimeout(10)
     return ground
 
 
-def _udpout(ground: socket.socket) -> str:
+def udpout(ground: socket.socket) -> str:
+    """Return the daemon's connection to it."""
     return f"udpout:127.0.0.1:{ground.getsockname()[1]}"
 
 
-def _cpu_percent(pid: int) -> float:
+def cpu_percent(pid: int) -> float:
     """Watch a process for a while; return its user and system time in percent of one core."""
     time.sleep(_SETTLING_S)
     before, began_at = _cpu_s(pid), time.perf_counter()

@@ -1,0 +1,287 @@
+"""MSP polls become a living MAVLink vehicle: what is sent is what the craft does, and the line bears it."""
+
+import math
+from collections import Counter
+from itertools import pairwise
+
+import pytest
+from conversations import waypoints
+from world import GroundStation, World
+
+from bridge.poll_schedule import POLLS
+from bridge.telemetry_table import TELEMETRY
+from protocols.mavlink.dialect import Message, messages
+from protocols.msp.commands import Msp
+from protocols.msp.frame import MspParser
+from service.simulator.flight import FlightState
+from service.simulator.options import Faults, SimOptions
+
+m = messages
+ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)
+#: Question and reply of Harakiri's telemetry, bytes.
+ROUND_TRIPS = {101: 23, 102: 30, 105: 28, 106: 26, 107: 17, 108: 20, 109: 18, 110: 17, 118: 25}
+ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
+
+
+def flown(seconds: float, *, baud: int = 115200, faults: Faults | None = None) -> tuple[World, GroundStation]:
+    """A craft that was armed so long ago, and a ground station that listens."""
+    world = World(SimOptions(baud=baud), faults, speeds=(baud,))
+    world.wait_ready(30)
+    station = listening(world)
+    world.faults.armed = True
+    world.run(seconds)
+    return world, station
+
+
+def listening(world: World, name: str = "gcs") -> GroundStation:
+    station = GroundStation(world, name)
+    beat(station)
+    world.run(0.01)
+    return station
+
+
+def beat(station: GroundStation) -> None:
+    station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+
+
+def polls(world: World) -> Counter[int]:
+    """How often each question was asked since `world.written` was cleared."""
+    return Counter(frame.command for _, _, data in world.written for frame in MspParser().feed(data))
+
+
+def rate_hz(station: GroundStation, name: str, seconds: float) -> float:
+    return len(station.said(name)) / seconds
+
+
+# What is sent is what the craft does.
+
+
+def test_a_flown_circle_is_shown_as_it_was_flown() -> None:
+    world, station = flown(3)
+    truths: list[tuple[Message, FlightState]] = []
+
+    def note(message: Message) -> None:
+        truth = world.naze.truth(world.now)
+        truths.append((message, truth.flight))
+
+    station.on_message.append(note)
+    world.run(60)
+    seen: Counter[str] = Counter()
+    for message, truth in truths:
+        seen[message.get_type()] += 1
+        check_against(message, truth)
+    assert set(seen) >= {"ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "VFR_HUD", "SYS_STATUS", "BATTERY_STATUS"}
+
+
+def check_against(message: Message, truth: FlightState) -> None:
+    """MSP rounds to what it sends, and a message's other sources are up to 0.2 s old: at 2.5 m/s, 50 cm."""
+    match message.get_type():
+        case "ATTITUDE":
+            assert math.degrees(message.roll) == pytest.approx(truth.roll, abs=0.2)
+            assert math.degrees(message.pitch) == pytest.approx(-truth.pitch, abs=0.2)
+            assert angle_between(math.degrees(message.yaw), truth.heading) <= 1
+            assert math.isnan(message.rollspeed)
+        case "GPS_RAW_INT":
+            assert metres_between(message, truth) <= 0.1
+            assert message.alt == pytest.approx(truth.altitude_m * 1000, abs=600)
+            assert (message.vel, message.cog) == (pytest.approx(truth.speed_ms * 100, abs=1), 65535)
+            assert (message.fix_type, message.satellites_visible, message.eph, message.epv) == (3, 9, 65535, 65535)
+        case "GLOBAL_POSITION_INT":
+            assert metres_between(message, truth) <= 0.1
+            assert message.relative_alt == pytest.approx(truth.height_m * 1000, abs=500)
+            assert math.hypot(message.vx, message.vy) == pytest.approx(truth.speed_ms * 100, abs=2)
+            assert angle_between(math.degrees(math.atan2(message.vy, message.vx)), truth.course) <= 6
+            assert message.vz == pytest.approx(-truth.climb_ms * 100, abs=10)
+            assert angle_between(message.hdg / 100, truth.heading) <= 2
+        case "VFR_HUD":
+            assert message.groundspeed == message.airspeed == pytest.approx(truth.speed_ms, abs=0.01)
+            assert message.climb == pytest.approx(truth.climb_ms, abs=0.05)
+            assert message.alt == pytest.approx(truth.altitude_m, abs=0.9)
+            assert angle_between(message.heading, truth.heading) <= 2
+            assert message.throttle == 45
+        case "SYS_STATUS" | "BATTERY_STATUS":
+            millivolts = message.voltages[0] if message.get_type() == "BATTERY_STATUS" else message.voltage_battery
+            assert millivolts == pytest.approx(truth.volts * 1000, abs=60)
+            assert message.current_battery == message.battery_remaining == -1
+
+
+def metres_between(message: Message, truth: FlightState) -> float:
+    north = (message.lat - truth.lat_e7) * 0.01113
+    east = (message.lon - truth.lon_e7) * 0.01113 * math.cos(math.radians(45.4))
+    return math.hypot(north, east)
+
+
+def angle_between(degrees: float, others: float) -> float:
+    return abs((degrees - others + 180) % 360 - 180)
+
+
+def test_the_sticks_are_in_arducopters_order() -> None:
+    _, station = flown(5)
+    (channels,) = station.said("RC_CHANNELS")[-1:]
+    assert channels.chancount == 8
+    assert [getattr(channels, f"chan{number}_raw") for number in range(1, 9)] == [
+        1500,
+        1500,
+        1450,
+        1500,
+        2000,
+        *[1500] * 3,
+    ]
+    assert {getattr(channels, f"chan{number}_raw") for number in range(9, 19)} == {65535}
+    assert channels.rssi == 920 * 254 // 1020
+    (raw,) = station.said("RC_CHANNELS_RAW")[-1:]
+    assert (raw.port, raw.chan3_raw, raw.chan4_raw, raw.rssi) == (0, 1450, 1500, channels.rssi)
+
+
+def test_what_has_no_place_has_a_name() -> None:
+    _, station = flown(20)
+    named = {message.name: message.value for message in station.said("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
+    assert (named["cycle_us"], named["i2c_err"]) == (3000, 0)
+    assert named["home_m"] == pytest.approx(41, abs=3)  # after 20 s on the circle
+    assert 180 <= named["home_deg"] <= 270
+
+
+def test_no_ground_station_is_shown_an_alarm() -> None:
+    """MAVProxy says "fence breach" without the fence's bit, Mission Planner "SAFE" without the motors'."""
+    _, station = flown(3)
+    status = station.said("SYS_STATUS")[-1]
+    present, health = status.onboard_control_sensors_present, status.onboard_control_sensors_health
+    assert present == status.onboard_control_sensors_enabled
+    assert health & present == present
+    assert present & m.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    assert health & m.MAV_SYS_STATUS_GEOFENCE
+    assert not present & (
+        m.MAV_SYS_STATUS_GEOFENCE | m.MAV_SYS_STATUS_PREARM_CHECK | m.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    )
+    for bit in ("3D_GYRO", "3D_ACCEL", "3D_MAG", "ABSOLUTE_PRESSURE", "GPS"):
+        assert present & getattr(m, f"MAV_SYS_STATUS_SENSOR_{bit}")
+    assert status.errors_count1 == status.errors_count2 == 0  # Mission Planner: "InternalError"
+
+
+@pytest.mark.parametrize(
+    ("boxes", "custom_mode", "stabilized"),
+    [
+        (0, 1, False),
+        (ANGLE, 0, True),
+        (1 << 1, 0, True),
+        (ANGLE | BARO, 2, True),
+        (ANGLE | BARO | GPS_HOLD, 5, True),
+        (ANGLE | BARO | GPS_HOME, 6, True),
+        (ANGLE | BARO | GPS_AUTO | GPS_HOLD, 3, True),
+        (1 << 9 | 1 << 3, 1, False),
+    ],
+)
+def test_the_switches_make_the_mode(boxes: int, custom_mode: int, stabilized: bool) -> None:
+    _, station = flown(1.5, faults=Faults(boxes=boxes))
+    beat = station.said("HEARTBEAT")[-1]
+    assert beat.custom_mode == custom_mode
+    assert bool(beat.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED) is stabilized
+    assert beat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+@pytest.mark.parametrize(("switch", "position"), [("armed", False), ("boxes", 5)])
+def test_arming_and_modes_are_told_at_once(switch: str, position: int) -> None:
+    world, station = flown(5.2)
+    station.take()
+    setattr(world.faults, switch, position)
+    world.run(0.3)
+    told = station.said("HEARTBEAT")[-1]
+    assert told.custom_mode == (2 if switch == "boxes" else 0)
+    assert bool(told.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED) is (switch == "boxes")
+
+
+def test_the_ground_is_where_it_is_disarmed() -> None:
+    world, station = flown(3)
+    assert station.take("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_UNDEFINED
+    world.faults.armed = False
+    world.run(3)
+    assert station.said("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_ON_GROUND
+
+
+def test_home_is_where_it_was_armed_and_as_high() -> None:
+    _, station = flown(30)
+    home = station.said("HOME_POSITION")[-1]
+    assert (home.latitude, home.longitude) == (453838000, 84733000)
+    assert home.altitude == pytest.approx(131_000, abs=1000)
+
+
+# The line bears it.
+
+
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
+def test_telemetry_takes_its_share_of_the_line_and_no_more(baud: int) -> None:
+    world, station = flown(2, baud=baud)
+    for row in TELEMETRY:
+        station.send(m.MAVLink_command_long_message(1, 1, 511, 0, row.msgid, 10_000, 0, 0, 0, 0, 0))
+    world.run(10)
+    world.written.clear()
+    station.take()
+    world.run(30)
+    bytes_per_s = sum(count * ROUND_TRIPS[command] for command, count in polls(world).items()) / 30
+    assert 0.45 * baud / 10 < bytes_per_s <= 0.6 * baud / 10
+    world.assert_line_was_clean()
+    assert world.naze.counters.max_outstanding_reply_bytes <= 224
+    assert set(polls(world)) == {poll.command for poll in POLLS}
+
+
+@pytest.mark.parametrize(("baud", "attitude_hz", "position_hz", "status_hz"), [
+    (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
+    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 1.1, 0.2, 0.7),
+])  # fmt: skip
+def test_the_rates_without_a_wish(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
+    world, station = flown(5, baud=baud)
+    station.take()
+    world.written.clear()
+    world.run(30)
+    assert rate_hz(station, "ATTITUDE", 30) == pytest.approx(attitude_hz, rel=0.2)
+    assert rate_hz(station, "GPS_RAW_INT", 30) == pytest.approx(position_hz, rel=0.35)
+    assert polls(world)[Msp.STATUS] / 30 == pytest.approx(status_hz, rel=0.2)
+
+
+def test_a_bad_line_slows_the_polls_and_a_good_one_brings_them_back() -> None:
+    world, station = flown(5)
+    rates = []
+    for loss in (0.0, 0.01, 0.0):
+        world.faults.lost_byte_rate = loss
+        world.run(15)
+        beat(station)
+        world.written.clear()
+        world.run(10)
+        rates.append(polls(world)[Msp.ATTITUDE] / 10)
+        assert polls(world)[Msp.STATUS] / 10 > 2.5
+    assert rates[0] == pytest.approx(25, abs=1)
+    assert rates[1] < 0.6 * rates[0]
+    assert rates[2] == pytest.approx(25, abs=1)
+
+
+def test_a_slow_round_trip_slows_what_is_fast() -> None:
+    """A question is not asked again before it is answered: the board takes 120 ms for each of its loops here."""
+    world = World(SimOptions(looptime_ms=120.0), speeds=(115200,))
+    world.wait_ready(30)
+    station = listening(world)
+    world.run(20)
+    station.take()
+    world.run(20)
+    assert 3 < rate_hz(station, "ATTITUDE", 20) < 10
+    world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("baud", [19200, 9600])
+def test_telemetry_goes_on_beside_a_mission(baud: int) -> None:
+    """A STATUS that is due waits for the next one's time, and then for a long CHUNK."""
+    world = World(SimOptions(baud=baud), speeds=(baud,))
+    world.wait_ready(30)
+    station = listening(world)
+    world.run(3)
+    outcome = world.push(waypoints(140))
+    began = world.now
+    world.written.clear()
+    station.take()
+    world.wait_until(lambda _: bool(outcome), 60)
+    seconds = world.now - began
+    assert seconds > 1
+    assert outcome[0][0].text == "Mission verified: 140 records"
+    asked = [at for at, _, data in world.written for frame in MspParser().feed(data) if frame.command == Msp.STATUS]
+    assert max(later - earlier for earlier, later in pairwise([began, *asked, world.now])) <= 0.5 + 2530 / baud
+    assert 1 <= rate_hz(station, "ATTITUDE", seconds) <= 6
+    world.assert_line_was_clean()
