@@ -139,12 +139,12 @@ class MissionDesk:
                 result.held,
                 tuple(items_from_records(result.held, verdict.roi_commands)),
             )
-        if verdict.result is Result.CLEARED:
-            text = "Mission on the flight controller cleared"
+        if verdict.result is not Result.CLEARED:
+            text = f"Mission verified: {len(verdict.records)} records" + (", unchanged" if result.unchanged else "")
+        elif result.unchanged:
+            text = "The flight controller already held no mission"
         else:
-            text = f"Mission verified: {len(verdict.records)} records"
-        if result.unchanged:
-            text += ", unchanged"
+            text = "Mission on the flight controller cleared"
         if result.held is not None and result.held != verdict.records:
             text += ", places within 0.4 m"
         return (yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text))

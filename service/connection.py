@@ -3,6 +3,8 @@
 import socket
 from dataclasses import dataclass
 
+UNKNOWN_HOST_HINT = "check the name and the network, or give the address in numbers"
+
 
 class AddressError(ValueError):
     """A connection string that cannot be understood; the text says what to write instead."""
@@ -57,6 +59,7 @@ class GcsAddress:
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
 _FC_FORMS = "write /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:"
 _GCS_FORMS = "write udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT or tcpin:HOST:PORT"
+_PORT_NAMES = ("tty", "serial", "rfcomm")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
 
 
@@ -69,7 +72,8 @@ def parse_fc(text: str) -> FcAddress:
         return TcpFc(host, port)
     path, comma, baud = text.partition(",")
     if not path.startswith("/"):
-        raise AddressError(f"--fc {text!r} is no flight controller connection: {_FC_FORMS}")
+        hint = f"did you mean /dev/{text}? Else " if path.startswith(_PORT_NAMES) else ""
+        raise AddressError(f"--fc {text!r} is no flight controller connection: {hint}{_FC_FORMS}")
     if not comma:
         return SerialFc(path, None)
     if not baud.isdecimal() or not _MIN_BAUD <= int(baud) <= _MAX_BAUD:
@@ -100,4 +104,8 @@ def _host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
         raise AddressError(f"{text!r} needs a host and a port: {forms}")
     if not port.isdecimal() or not 0 < int(port) < 65536:
         raise AddressError(f"{text!r}: {port!r} is no port number (1..65535)")
+    try:
+        host.encode("idna")
+    except UnicodeError:
+        raise AddressError(f"{text!r}: {host!r} can be no host's name: {forms}") from None
     return host, int(port)

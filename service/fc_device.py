@@ -9,7 +9,7 @@ from typing import Protocol
 
 import serial
 
-from service.connection import FcAddress, SerialFc, TcpFc, family_of
+from service.connection import UNKNOWN_HOST_HINT, FcAddress, SerialFc, TcpFc, family_of
 from service.port_holder import explain_port_error, find_console
 
 _TCP_PATIENCE_S = 3.0
@@ -75,6 +75,7 @@ async def _open_tcp(host: str, port: int) -> socket.socket:
     except (OSError, TimeoutError) as error:
         connection.close()
         reason = error.strerror or str(error) or "no answer"
-        raise PortError(f"tcp:{host}:{port} cannot be reached: {reason}") from error
+        hint = f"; {UNKNOWN_HOST_HINT}" if isinstance(error, socket.gaierror) else ""
+        raise PortError(f"tcp:{host}:{port} cannot be reached: {reason}{hint}") from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return connection

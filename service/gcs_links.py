@@ -9,7 +9,7 @@ from typing import Protocol
 import structlog
 
 from bridge.station import Peer
-from service.connection import GcsAddress, family_of
+from service.connection import UNKNOWN_HOST_HINT, GcsAddress, family_of
 from service.send_queue import SendQueue
 
 _DATAGRAM_SIZE = 2048
@@ -24,6 +24,12 @@ _STALL_MS = 60000
 _MAX_CLIENTS = 32
 #: How often it is asked what a name stands for.
 _LOOK_UP_S = 10.0
+
+_HINTS = {
+    errno.EADDRINUSE: "stop the program that has it, or name another port",
+    errno.EADDRNOTAVAIL: "this machine has no such address; 0.0.0.0 is all that it has",
+    errno.EACCES: "ports below 1024 are for root; name another port",
+}
 
 _log = structlog.get_logger()
 
@@ -67,8 +73,10 @@ def open_link(address: GcsAddress, events: GcsEvents) -> GcsLink:
             return TcpLink(address, events)
         return UdpLink(address, events)
     except OSError as error:
-        hint = "; stop the program that has it, or name another port" if error.errno == errno.EADDRINUSE else ""
-        raise LinkError(f"{address} cannot be opened: {error.strerror or error}{hint}") from error
+        number = error.errno or 0  # below 0 it is one of getaddrinfo's
+        hint = UNKNOWN_HOST_HINT if number < 0 else _HINTS.get(number, "")
+        text = f"{address} cannot be opened: {error.strerror or error}"
+        raise LinkError(f"{text}; {hint}" if hint else text) from error
 
 
 class UdpLink:
@@ -138,7 +146,7 @@ class UdpLink:
                 )
             except OSError as error:
                 level = _log.debug if complained else _log.warning
-                level("gcs.name_unknown", link=self.name, why=error.strerror or str(error))
+                level("gcs.name_unknown", link=self.name, why=f"{error.strerror or error}; {UNKNOWN_HOST_HINT}")
                 complained = True
             else:
                 peers = [Peer(self.name, entry[4]) for entry in found]

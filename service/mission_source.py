@@ -7,6 +7,7 @@ import click
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
+from service.bounded_file import read_bounded
 
 _MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
 
@@ -15,14 +16,9 @@ def load_mission(path: Path) -> list[MissionItem]:
     """Read the mission file at `path`; MissionFileError also where the disk says no."""
     name = click.format_filename(path)
     try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_BYTES + 1)
+        return read_mission_file(read_bounded(path, _MAX_BYTES), name)
     except (OSError, ValueError) as error:
         raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
-    if len(data) > _MAX_BYTES:
-        what = f"larger than {_MAX_BYTES // 2**20} MB"
-        raise MissionFileError(name, "", what, "this is no mission file, check the path")
-    return read_mission_file(data, name)
 
 
 def save_mission(path: Path, text: str) -> None:

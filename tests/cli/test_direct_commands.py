@@ -70,6 +70,11 @@ def test_a_tcp_port_that_nobody_listens_on() -> None:
     assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"), 1, "tcp:127.0.0.1:9 cannot be reached")
 
 
+def test_a_host_that_is_not_known() -> None:
+    advice = "check the name and the network"
+    assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:[fe80::1%no-card]:9"), 1, advice)
+
+
 # -- the machine ---------------------------------------------------------------------------------------------
 
 

@@ -70,6 +70,7 @@ def test_a_mission_there_and_back(daemon: Daemon, tmp_path: Path) -> None:
     assert "45.3847523" in pulled.stdout
     assert ask(daemon, "clear").stdout == "ACCEPTED: Mission on the flight controller cleared\n"
     assert ask(daemon, "pull").stdout == "0 records, checksum 00000000\n"
+    assert ask(daemon, "clear").stdout == "ACCEPTED: The flight controller already held no mission\n"
 
 
 def test_a_refusal_is_told_and_ends_with_1(daemon: Daemon, tmp_path: Path) -> None:

@@ -16,7 +16,9 @@ from plan import judge, plain_plan, records_of
 from programs import PATIENCE, free_port, run_naze_bridge, until
 
 UNKNOWN = {
-    "no such device name": (["--fc", "ttyUSB0"], "/dev/serial0"),
+    "no such device name": (["--fc", "naze"], "/dev/serial0"),
+    "a device without its folder": (["--fc", "ttyUSB0,57600"], "did you mean /dev/ttyUSB0,57600?"),
+    "a host that cannot be": (["--fc", "tcp:naze..local:5760"], "no host's name"),
     "no speed": (["--fc", "/dev/ttyUSB0,fast"], "no speed in baud"),
     "tcp without a port": (["--fc", "tcp:naze.local"], "needs a host and a port"),
     "no such link": (["--fc", "sim:", "--gcs", "serial:/dev/ttyS0"], "udpin:0.0.0.0:14550"),
@@ -52,6 +54,19 @@ def test_two_daemons_on_one_port(start: Starter, tmp_path: Path) -> None:
     ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", str(tmp_path / "other"))
     assert_refused(ended, link, "in use")
     assert first.is_alive
+
+
+@pytest.mark.parametrize(
+    ("link", "advice"),
+    [
+        # No name server is needed to say that there is no such network card.
+        ("udpin:[fe80::1%no-card]:14550", "check the name and the network"),
+        ("tcpin:[fe80::1%no-card]:5760", "check the name and the network"),
+        ("udpin:203.0.113.1:14550", "this machine has no such address"),
+    ],
+)
+def test_a_ground_station_link_that_cannot_be(tmp_path: Path, link: str, advice: str) -> None:
+    assert_refused(run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", tmp_path), link, advice)
 
 
 def test_two_daemons_on_one_state_directory(start: Starter) -> None:

@@ -1,0 +1,13 @@
+"""Files that a person names: read to their end, but not for ever."""
+
+import errno
+from pathlib import Path
+
+
+def read_bounded(path: Path, most: int) -> bytes:
+    """Return what is in the file; OSError if it cannot be read, or is larger than `most` bytes (as /dev/zero is)."""
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MB", str(path))
+    return data
