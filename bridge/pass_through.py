@@ -11,7 +11,7 @@ from bridge.ground import Ground
 from bridge.station import Peer
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.target import is_for_all, target_of
+from protocols.mavlink.target import target_of, without_target
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
@@ -30,17 +30,12 @@ class PassThrough:
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
         """Send the autopilot's frames on."""
         self._aboard.add(frames[0].sysid)
-        for_all: list[bytes] = []
-        for frame in frames:
-            raw = frame.raw
-            if is_for_all(raw):
-                for_all.append(raw)
-                continue
-            # In order: what came before goes first.
+        for_all = without_target(frames)
+        if for_all is not None:
             self._send(for_all)
-            for_all = []
-            self._send_addressed(frame)
-        self._send(for_all)
+            return
+        for frame in frames:
+            self._send_alone(frame)
 
     def is_aboard(self, system: int) -> bool:
         """Tell whether a system was heard on the autopilot's side."""
@@ -59,8 +54,10 @@ class PassThrough:
 
     def forget(self, peer: Peer) -> None:
         """A ground station is gone."""
-        for peers in self._heard.values():
+        for who, peers in list(self._heard.items()):
             peers.discard(peer)
+            if not peers:
+                del self._heard[who]
 
     def _peers_of(self, system: int, component: int) -> list[Peer]:
         found: set[Peer] = set()
@@ -69,7 +66,7 @@ class PassThrough:
                 found |= peers
         return [peer for peer in self._ground.peers() if peer in found]
 
-    def _send_addressed(self, frame: MavlinkFrame) -> None:
+    def _send_alone(self, frame: MavlinkFrame) -> None:
         self._aboard.add(frame.sysid)
         if frame.msgid == _NEVER_FORWARDED:
             return
@@ -81,13 +78,15 @@ class PassThrough:
         self._ground.forward([frame.raw], self._peers_of(system, component))
 
     def _send(self, frames: list[bytes]) -> None:
-        if frames:
-            self._ground.tap(frames)
-            self._ground.forward(in_datagrams(frames), self._ground.everyone())
+        self._ground.tap(frames)
+        self._ground.forward(in_datagrams(frames), self._ground.everyone())
 
 
 def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
     """Join frames that came together into datagrams of at most 280 bytes: a datagram has its price, bytes have none."""
+    joined = b"".join(frames)
+    if len(joined) <= MAX_DATAGRAM_SIZE:
+        return [joined]
     datagrams: list[bytes] = []
     for frame in frames:
         if datagrams and len(datagrams[-1]) + len(frame) <= MAX_DATAGRAM_SIZE:

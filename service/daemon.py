@@ -100,8 +100,7 @@ class Daemon:
         self._port.may_gather = bridge.is_passing_through
         for data in bridge.take_fc_output():
             self._port.write(data)
-        for peer, frame in bridge.ground.take_datagrams():
-            self._links[peer.link].send(peer, frame)
+        self._send_datagrams()
         for effect in bridge.take_store_effects():
             self._carry_out(effect)
         deadline = bridge.next_deadline()
@@ -111,6 +110,10 @@ class Daemon:
                 return
             self._timer.cancel()
         self._timer = self._loop.call_at(deadline, self._tick)
+
+    def _send_datagrams(self) -> None:
+        for peer, data in self.bridge.ground.take_datagrams():
+            self._links[peer.link].send(peer, data)
 
     # What the ground station links tell (service.gcs_links.GcsEvents).
 
@@ -140,8 +143,13 @@ class Daemon:
         self._report_search()
 
     def _fc_data(self, data: bytes) -> None:
-        self.bridge.fc_received(data, self._loop.time())
-        self.flush()
+        bridge = self.bridge
+        bridge.fc_received(data, self._loop.time())
+        if bridge.is_passing_through:
+            # Then it makes datagrams and nothing else: no more is looked at, thousands of times a second.
+            self._send_datagrams()
+        else:
+            self.flush()
 
     def _fc_closed(self, why: str) -> None:
         self.bridge.fc_closed(self._loop.time(), None if why == STOPPED else why)

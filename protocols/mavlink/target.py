@@ -1,5 +1,7 @@
 """Whom a frame is meant for, read from its bytes without decoding it."""
 
+from collections.abc import Sequence
+
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 
@@ -16,9 +18,16 @@ _PLACES = {
 }
 
 
-def is_for_all(raw: bytes) -> bool:
-    """Tell of a whole frame's bytes whether its message has no target at all, as telemetry has none."""
-    return (raw[7:10] if raw[0] == MAGIC_V2 else raw[5:6]) not in _PLACES
+def without_target(frames: Sequence[MavlinkFrame]) -> list[bytes] | None:
+    """Return the bytes of frames none of whose messages has a target, as telemetry has none; else None.
+
+    One look at all that came together: this is done with every frame that is passed on.
+    """
+    raws = [frame.raw for frame in frames]
+    for raw in raws:
+        if (raw[7:10] if raw[0] == MAGIC_V2 else raw[5:6]) in _PLACES:
+            return None
+    return raws
 
 
 def target_of(frame: MavlinkFrame) -> tuple[int, int]:
