@@ -73,11 +73,11 @@ def parse_fc(text: str) -> FcAddress:
     path, comma, baud = text.partition(",")
     if not path.startswith("/"):
         hint = f"did you mean /dev/{text}? Else " if path.startswith(_PORT_NAMES) else ""
-        raise AddressError(f"--fc {text!r} is no flight controller connection: {hint}{_FC_FORMS}")
+        raise AddressError(f"{text!r} is no flight controller connection: {hint}{_FC_FORMS}")
     if not comma:
         return SerialFc(path, None)
     if not baud.isdecimal() or not _MIN_BAUD <= int(baud) <= _MAX_BAUD:
-        raise AddressError(f"--fc {text!r}: {baud!r} is no speed in baud; leave it out to have it sensed")
+        raise AddressError(f"{text!r}: {baud!r} is no speed in baud; leave it out to have it sensed")
     return SerialFc(path, int(baud))
 
 
@@ -85,7 +85,7 @@ def parse_gcs(text: str) -> GcsAddress:
     """Read one --gcs string; AddressError if it makes no sense."""
     kind, _, rest = text.partition(":")
     if kind not in _GCS_KINDS:
-        raise AddressError(f"--gcs {text!r} is no ground station connection: {_GCS_FORMS}")
+        raise AddressError(f"{text!r} is no ground station connection: {_GCS_FORMS}")
     return GcsAddress(kind, *_host_port(text, rest, _GCS_FORMS))
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge.fc_session import Autopilot
-from service.connection import FcAddress, GcsAddress, parse_fc, parse_gcs
+from service.bounded_file import read_bounded
+from service.connection import AddressError, FcAddress, GcsAddress, parse_fc, parse_gcs
 from service.write_access import WriteAccess, parse_link
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
@@ -47,6 +48,9 @@ class Settings:
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
 
 
+_MAX_CONFIG_BYTES = 1 << 20
+_IN_WORDS = {str: "text in quotes", int: "a whole number", bool: "true or false", list: "a list in brackets"}
+
 #: Keys of the configuration file: name -> (type, what it is).
 _KEYS: dict[str, tuple[type, str]] = {
     "fc": (str, "flight controller connection"),
@@ -83,20 +87,37 @@ def load_settings(
     record_uart: Path | None = None,
 ) -> Settings:
     """Put the settings of `run` together; SettingsError or AddressError if one cannot be used."""
-    values = {} if config is None else _read_config(config)
-    chosen_fc = fc or values.get("fc")
-    if not isinstance(chosen_fc, str):
+    flags = _Flags(parse_fc(fc) if fc else None, [parse_gcs(text) for text in gcs], state_dir, record_uart)
+    if config is None:
+        return _put_together(flags, {}, Path())
+    try:
+        return _put_together(flags, _read_config(config), config.parent)
+    except (AddressError, SettingsError) as error:
+        raise type(error)(f"{config}: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class _Flags:
+    fc: FcAddress | None
+    gcs: Sequence[GcsAddress]
+    state_dir: Path | None
+    record_uart: Path | None
+
+
+def _put_together(flags: _Flags, values: dict[str, object], folder: Path) -> Settings:
+    """Take from the flags, then from the file in `folder` whose `values` these are."""
+    fc = flags.fc or (parse_fc(str(values["fc"])) if "fc" in values else None)
+    if fc is None:
         raise SettingsError("name the flight controller: --fc /dev/serial0, or --fc sim: to try it without one")
-    links = _links(values.get("gcs"), Path() if config is None else config.parent)
-    folder = state_dir or values.get("state_dir") or default_state_dir()
+    links = _links(values.get("gcs"), folder)
     return Settings(
-        fc=parse_fc(chosen_fc),
-        gcs=[parse_gcs(text) for text in gcs] or list(links) or [parse_gcs(DEFAULT_GCS)],
-        state_dir=Path(str(folder)),
+        fc=fc,
+        gcs=flags.gcs or list(links) or [parse_gcs(DEFAULT_GCS)],
+        state_dir=flags.state_dir or _path(values.get("state_dir")) or default_state_dir(),
         sysid=_in_range(values, "sysid", 1, 255, DEFAULT_SYSID),
         takeoff_max_m=_in_range(values, "takeoff_max_m", 2, 255, DEFAULT_TAKEOFF_MAX_M),
         tlog=_tlog_limits(values) if values.get("record_tlog", True) else None,
-        record_uart=record_uart or _path(values.get("record_uart")),
+        record_uart=flags.record_uart or _path(values.get("record_uart")),
         autopilot=_autopilot(values.get("autopilot", Autopilot.AUTO.value)),
         # A link that is named by a flag, too, stays as safe as the file says.
         access={str(address): access for address, access in links.items() if not access.is_open},
@@ -104,8 +125,12 @@ def load_settings(
 
 
 def _links(entries: object, folder: Path) -> dict[GcsAddress, WriteAccess]:
-    assert entries is None or isinstance(entries, list)
-    return dict(parse_link(entry, folder) for entry in entries or ())
+    if entries is None:
+        return {}
+    assert isinstance(entries, list)
+    if not entries:
+        raise SettingsError(f'gcs is empty: name a link as in ["{DEFAULT_GCS}"], or leave gcs away')
+    return dict(parse_link(entry, folder) for entry in entries)
 
 
 def _tlog_limits(values: dict[str, object]) -> TlogLimits:
@@ -130,24 +155,24 @@ def _path(text: object) -> Path | None:
 
 def _read_config(path: Path) -> dict[str, object]:
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = tomllib.loads(read_bounded(path, _MAX_CONFIG_BYTES).decode("utf-8-sig"))
     except OSError as error:
-        raise SettingsError(f"{path} cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsError(f"{path} is no valid TOML: {error}") from error
+        raise SettingsError(f"this cannot be read: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise SettingsError(f"this is no valid TOML: {error}") from error
     for key, value in values.items():
         if key not in _KEYS:
             near = difflib.get_close_matches(key, _KEYS, n=1)
             hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_KEYS)}"
-            raise SettingsError(f"{path}: {key!r} is no setting; {hint}")
+            raise SettingsError(f"{key!r} is no setting; {hint}")
         kind, meaning = _KEYS[key]
         if type(value) is not kind:
-            raise SettingsError(f"{path}: {key} must be a {kind.__name__} ({meaning})")
+            raise SettingsError(f"{key} must be {_IN_WORDS[kind]} ({meaning})")
     return values
 
 
 def _in_range(values: dict[str, object], key: str, least: int, most: int, default: int) -> int:
     value = values.get(key, default)
     if not isinstance(value, int) or not least <= value <= most:
-        raise SettingsError(f"{key} is {value}, but must be {least}..{most}")
+        raise SettingsError(f"{key} is {value}, but must be {least}..{most} ({_KEYS[key][1]})")
     return value
