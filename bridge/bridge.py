@@ -99,10 +99,10 @@ class Bridge:
         home = self._vehicle.home
         self._uploads = MissionUploads(self.desk, self.runner, self.ground, journal, home)
         self._downloads = MissionDownloads(self.desk, self.runner, self.ground, self._is_armed, home)
-        parameters = Parameters(self.desk, self.runner, self.ground, config.sysid)
+        self._parameters = Parameters(self.desk, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.desk, self.runner)
         commands = Commands(self.ground, self._vehicle, actions, self._banner)
-        self._inbox = Inbox(self.ground, self._uploads, self._downloads, parameters, commands, self._vehicle)
+        self._inbox = Inbox(self.ground, self._uploads, self._downloads, self._parameters, commands, self._vehicle)
 
     # The flight controller's side.
 
@@ -265,6 +265,9 @@ class Bridge:
         answer = None if message is None else denial(message, station)
         if answer is not None:
             answers(answer)
+        elif message is not None and frame.msgid == messages.MAVLINK_MSG_ID_PARAM_SET and self._pass_through is None:
+            # The protocol's answer is the value that is in force.
+            self._parameters.send_one(station, message.param_id, -1)
         if refused.is_first:
             answers(messages.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
 
