@@ -97,7 +97,7 @@ class Bridge:
         self.desk = MissionDesk()
         self._vehicle = OwnVehicle(self.session, self.desk, self.ground, now)
         home = self._vehicle.home
-        self._uploads = MissionUploads(self.desk, self.runner, self.ground, journal, home)
+        self._uploads = MissionUploads(self.desk, self.runner, self.ground, journal, home, self.ground.moved_to)
         self._downloads = MissionDownloads(self.desk, self.runner, self.ground, self._is_armed, home)
         self._parameters = Parameters(self.desk, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.desk, self.runner)

@@ -81,6 +81,10 @@ class Ground:
         )
         return [*heard, *unheard]
 
+    def moved_to(self, station: Station, now: float) -> list[Station]:
+        """Return from where a station is heard that fell silent where it was: as a rule nowhere."""
+        return self._stations.moved_to(station, now)
+
     def gone(self, peer: Peer) -> None:
         """A ground station's connection is closed."""
         self._stations.gone(peer)
@@ -123,11 +127,12 @@ class Ground:
         if frame.sysid == self._sysid:
             # What we sent, come back: a broadcast, or a router that sends everything everywhere.
             return False
-        if not self._stations.heard(peer, frame.version, now):
-            if not self._stations.add(peer, frame.version, now):
+        station = Station(peer, frame.sysid, frame.compid)
+        if not self._stations.heard(station, frame.version, now):
+            if not self._stations.add(station, frame.version, now):
                 return False
             self._everyone = None
-            self._journal("info", "gcs.found", station=str(Station(peer, frame.sysid, frame.compid)))
+            self._journal("info", "gcs.found", station=str(station))
             self._on_newcomer()
         self.tap([frame.raw])
         return True

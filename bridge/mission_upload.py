@@ -76,12 +76,14 @@ class MissionUploads:
         post: Post,
         journal: Journal,
         fallback_home: Callable[[], tuple[int, int] | None],
+        moved_to: Callable[[Station, float], list[Station]],
     ) -> None:
         self._desk = desk
         self._runner = runner
         self._post = post
         self._journal = journal
         self._fallback_home = fallback_home
+        self._moved_to = moved_to
         self._transfer: _Transfer | None = None
         self._answered: dict[Station, _Answered] = {}
         self._queued: tuple[Station, int] | None = None
@@ -101,6 +103,7 @@ class MissionUploads:
         if mission_type != MISSION_TYPE_MISSION:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
+        self._follow(station, now)
         present = self._transfer
         if present is not None and present.station == station:
             if present.phase is Phase.DELIVERING:
@@ -137,6 +140,7 @@ class MissionUploads:
         if mission_type not in (MISSION_TYPE_MISSION, MISSION_TYPE_ALL):
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
+        self._follow(station, now)
         present = self._transfer
         if present is not None and present.station == station:
             if present.phase is Phase.DELIVERING:
@@ -151,6 +155,7 @@ class MissionUploads:
         if mission_type != MISSION_TYPE_MISSION:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
+        self._follow(station, now)
         transfer = self._transfer
         if transfer is None or transfer.station != station:
             self._late_item(station, item.seq, now)
@@ -199,6 +204,7 @@ class MissionUploads:
 
     def ack(self, station: Station, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels its transfer."""
+        self._follow(station, now)
         transfer = self._transfer
         if transfer is None or transfer.station != station or result == MissionResult.ACCEPTED:
             return
@@ -268,10 +274,27 @@ class MissionUploads:
         transfer.requested_at = now
         transfer.request_due = now + transfer.patience_s
         station = transfer.station
-        self._post.to(
-            station,
-            messages.MAVLink_mission_request_message(station.sysid, station.compid, seq, MISSION_TYPE_MISSION),
-        )
+        request = messages.MAVLink_mission_request_message(station.sysid, station.compid, seq, MISSION_TYPE_MISSION)
+        self._post.to(station, request)
+        if transfer.repeated:
+            for elsewhere in self._moved_to(station, now):
+                self._post.to(elsewhere, request)
+
+    def _follow(self, station: Station, now: float) -> None:
+        """Go on with the transfer of a ground station whose address has changed (Wi-Fi roaming), if this is it.
+
+        One that was answered here has announced a list of its own: two lists must never be mixed.
+        """
+        transfer = self._transfer
+        if transfer is None or transfer.station == station:
+            return
+        self._forget_old_answers(now)
+        if station in self._answered or station not in self._moved_to(transfer.station, now):
+            return
+        self._journal("info", "mission.station_moved", before=str(transfer.station), after=str(station))
+        self._desk.release(transfer.station)
+        self._desk.acquire(station)
+        transfer.station = station
 
     def _measure(self, transfer: _Transfer, seq: int, now: float) -> None:
         """Adapt the patience to the round trip.
@@ -298,11 +321,14 @@ class MissionUploads:
             self._ack(station, answered.ack)
 
     def _recent(self, station: Station, now: float) -> _Answered | None:
-        answered = self._answered.get(station)
-        if answered is not None and now > answered.until:
-            del self._answered[station]
-            return None
-        return answered
+        """Return the last answer to a ground station, wherever it was then."""
+        self._forget_old_answers(now)
+        if station in self._answered:
+            return self._answered[station]
+        return next((what for who, what in self._answered.items() if station in self._moved_to(who, now)), None)
+
+    def _forget_old_answers(self, now: float) -> None:
+        self._answered = {who: what for who, what in self._answered.items() if now <= what.until}
 
     def _reject(self, transfer: _Transfer, now: float) -> None:
         assert transfer.check is not None
@@ -364,9 +390,10 @@ class MissionUploads:
 
     def _answer(self, station: Station, count: int, ack: MissionResult, now: float) -> None:
         refused = ack is not MissionResult.ACCEPTED
-        self._answered = {who: what for who, what in self._answered.items() if now <= what.until}
-        self._answered[station] = _Answered(ack, count, now + _MEMORY_S, refused)
-        self._ack(station, ack)
+        self._forget_old_answers(now)
+        for where in (station, *self._moved_to(station, now)):
+            self._answered[where] = _Answered(ack, count, now + _MEMORY_S, refused)
+            self._ack(where, ack)
 
     def _ack(self, station: Station, ack: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
         self._post.to(

@@ -5,7 +5,8 @@ from collections import deque
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 
-#: Nobody sends these again unasked: a transfer, a command or a parameter would fail without them.
+#: Nobody sends these again unasked: a transfer, a command or a parameter would fail without them. Not files and logs:
+#: they fill the queue in a blink, and who downloads one asks again for what is missing.
 _KEPT = frozenset(
     {
         m.MAVLINK_MSG_ID_PARAM_VALUE,
@@ -25,9 +26,6 @@ _KEPT = frozenset(
         m.MAVLINK_MSG_ID_COMMAND_LONG,
         m.MAVLINK_MSG_ID_COMMAND_INT,
         m.MAVLINK_MSG_ID_COMMAND_ACK,
-        m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL,
-        m.MAVLINK_MSG_ID_LOG_ENTRY,
-        m.MAVLINK_MSG_ID_LOG_DATA,
         m.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
         m.MAVLINK_MSG_ID_MESSAGE_INTERVAL,
         m.MAVLINK_MSG_ID_STATUSTEXT,

@@ -166,8 +166,11 @@ def test_strangers_by_the_hundred_take_no_memory_and_leave_room() -> None:
     frame = GroundStation(world, "pack", sysid=9).pack(gcs_heartbeat())
     for number in range(500):
         world.bridge.gcs_received(Peer("udp", ("10.0.0.1", number)), frame, world.now, datagram=True)
+        if number % 50 == 49:
+            world.run(6)
     assert len(world.bridge.ground.peers()) <= MAX_PEERS
     world.run(6)
+    assert len(world.bridge.ground._writers) <= MAX_PEERS
     # They fell silent: a new one finds room.
     station.send(gcs_heartbeat())
     world.run(1.5)

@@ -1,0 +1,245 @@
+"""A ground station whose address changes under way (Wi-Fi roaming): the same ids from elsewhere, and silence there."""
+
+import random
+
+import pytest
+from conversations import Download, Upload, count_message, item_message, records_of, waypoints
+from world import Air, GroundStation, World
+
+from bridge.stations import EXPIRY_S, MOVED_S
+from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import MissionResult
+
+m = messages
+PLAN = waypoints(40)
+#: An upload takes a while.
+WIFI = Air(delay_s=0.02)
+
+
+def start() -> World:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    return world
+
+
+def beat(station: GroundStation, is_there: list[GroundStation]) -> None:
+    """Send a heartbeat a second as long as the station is the one in `is_there`."""
+
+    def send() -> None:
+        if station in is_there:
+            station.send(heartbeat())
+            station.world.after(1.0, send)
+
+    send()
+
+
+def heartbeat() -> Message:
+    return m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+class Roamer:
+    """One ground station that is at one address after the other."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.present: list[GroundStation] = []
+        self._number = 0
+        self.move()
+
+    @property
+    def station(self) -> GroundStation:
+        return self.present[0]
+
+    def move(self, upload: Upload | None = None, *, speaks: bool = True) -> GroundStation:
+        """Be elsewhere; an upload goes on there."""
+        left = self.present[:]
+        self._number += 1
+        station = GroundStation(self.world, f"roams {self._number}", air=WIFI)
+        self.present[:] = [station]
+        for former in left:
+            former.on_message.clear()
+        if upload is not None:
+            upload.station = station
+            station.on_message.append(upload._react)
+        if speaks:
+            beat(station, self.present)
+        self.world.run(0.03)
+        return station
+
+
+def test_it_is_served_at_once_and_the_old_address_soon_no_more() -> None:
+    world = start()
+    roamer = Roamer(world)
+    old = roamer.station
+    world.run(3)
+    new = roamer.move()
+    world.run(1.5)
+    assert new.said("HEARTBEAT", "ATTITUDE")
+    world.run(MOVED_S)
+    old.take()
+    world.run(3)
+    assert old.heard == []
+    assert world.bridge.ground.peers() == [new.peer]
+
+
+def test_there_and_back_again() -> None:
+    world = start()
+    roamer = Roamer(world)
+    home = roamer.station
+    for _ in range(3):
+        world.run(2)
+        away = roamer.move()
+        world.run(2)
+        roamer.present[:] = [home]
+        beat(home, roamer.present)
+    world.run(MOVED_S + 2)
+    away.take()
+    home.take()
+    world.run(3)
+    assert away.heard == []
+    assert home.said("HEARTBEAT")
+
+
+def test_two_with_the_same_ids_are_two() -> None:
+    """Two Mission Planners with their default ids."""
+    world = start()
+    both = [GroundStation(world, name) for name in ("one", "other")]
+    for station in both:
+        beat(station, both)
+        world.run(0.4)
+    world.run(EXPIRY_S + 10)
+    for station in both:
+        station.take()
+    world.run(3)
+    assert all(station.said("HEARTBEAT") for station in both)
+    assert world.events("gcs.silent") == []
+
+
+def test_one_that_falls_silent_beside_others_is_kept_for_a_minute() -> None:
+    world = start()
+    station, other = GroundStation(world), GroundStation(world, "other", sysid=250)
+    station.send(heartbeat())
+    beat(other, [other])
+    world.run(EXPIRY_S - 2)
+    assert station.peer in world.bridge.ground.peers()
+
+
+def test_behind_a_router_all_must_have_moved() -> None:
+    world = start()
+    router, away = GroundStation(world, "router"), GroundStation(world, "away")
+    behind = GroundStation(world, "router", sysid=250)
+    for station in (router, behind):
+        station.send(heartbeat())
+    world.run(1)
+    beat(away, [away])
+    world.run(MOVED_S + 3)
+    assert router.peer in world.bridge.ground.peers()
+    also_away = GroundStation(world, "away", sysid=250)
+    beat(also_away, [also_away])
+    world.run(MOVED_S + 3)
+    assert world.bridge.ground.peers() == [away.peer]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_upload_goes_on_from_elsewhere(seed: int) -> None:
+    """Moved at any moment, once or twice; while the list is written, and behind the last item, too."""
+    chance = random.Random(seed)
+    world = start()
+    roamer = Roamer(world)
+    upload = Upload(roamer.station, PLAN)
+    for _ in range(chance.choice((1, 1, 2))):
+        world.run(chance.random() * 2)
+        if not upload.is_over:
+            roamer.move(upload, speaks=chance.random() < 0.5)
+    assert upload.run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(PLAN)
+
+
+def test_one_that_answers_and_never_repeats_is_asked_where_it_is() -> None:
+    world = start()
+    roamer = Roamer(world)
+    upload = Upload(roamer.station, PLAN, repeat_s=100)
+    world.wait_until(lambda _: len(upload.requested) > 20, 5)
+    roamer.move(upload)
+    assert upload.run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(PLAN)
+
+
+def test_a_list_begun_anew_from_elsewhere_is_the_one_that_counts() -> None:
+    for count in (40, 30):
+        world = start()
+        roamer = Roamer(world)
+        old = Upload(roamer.station, PLAN)
+        world.wait_until(lambda _, old=old: len(old.requested) > 20, 5)  # type: ignore[misc]
+        old.stop()
+        roamer.move()
+        world.run(1.5)
+        plan = waypoints(count, seed=7)
+        assert Upload(roamer.station, plan).run() is MissionResult.ACCEPTED
+        assert world.stored == records_of(plan)
+
+
+def test_the_end_of_an_upload_is_told_where_it_is_now() -> None:
+    world = start()
+    roamer = Roamer(world)
+    upload = Upload(roamer.station, PLAN)
+    world.wait_until(lambda _: len(upload.requested) > 20, 5)
+    upload.stop()
+    new = roamer.move()
+    world.run(8)
+    assert [message.type for message in new.said("MISSION_ACK")] == [MissionResult.OPERATION_CANCELLED]
+    assert Upload(new, PLAN).run() is MissionResult.ACCEPTED
+
+
+def test_a_second_one_with_the_same_ids_gets_into_no_upload() -> None:
+    """It was there before, or the first one is still there: its list is refused, and its items get nowhere."""
+    world = start()
+    first, second = GroundStation(world, "first", air=WIFI), GroundStation(world, "second")
+    second.send(heartbeat())
+    world.run(0.5)
+    upload = Upload(first, PLAN)
+    world.wait_until(lambda _: len(upload.requested) > 10, 5)
+    newcomer = GroundStation(world, "newcomer")
+    for intruder in (second, newcomer):
+        other = waypoints(40, seed=9)
+        intruder.send(count_message(40))
+        for seq, item in enumerate(other):
+            intruder.send(item_message(seq, item))
+        world.run(0.05)
+        assert {message.type for message in intruder.said("MISSION_ACK")} == {MissionResult.DENIED}
+    assert upload.run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(PLAN)
+
+
+def test_one_that_was_refused_is_not_taken_for_one_that_moved() -> None:
+    """Mission Planner takes a refusal of its COUNT for "go on", and sends its items; the first is silent by then."""
+    world = start()
+    first = GroundStation(world, "first", air=WIFI)
+    upload = Upload(first, PLAN, repeat_s=100)
+    world.wait_until(lambda _: len(upload.requested) > 10, 5)
+    newcomer = GroundStation(world, "newcomer")
+    other = waypoints(40, seed=9)
+    newcomer.send(count_message(40))
+    world.run(0.01)
+    upload.stop()
+    for _ in range(6):
+        world.run(0.5)
+        for seq, item in enumerate(other):
+            newcomer.send(item_message(seq, item))
+    world.run(10)
+    assert MissionResult.ACCEPTED not in [message.type for message in newcomer.said("MISSION_ACK")]
+    assert world.stored == ()
+
+
+def test_a_download_goes_on_from_elsewhere() -> None:
+    world = start()
+    roamer = Roamer(world)
+    assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED
+    download = Download(roamer.station)
+    world.wait_until(lambda _: len(download.items) > 20, 5)
+    old = roamer.station
+    new = roamer.move()
+    old.on_message.clear()
+    download.station = new
+    new.on_message.append(download._react)
+    assert [item.lat_e7 for item in download.run()] == [item.lat_e7 for item in PLAN]
