@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import structlog
 
-from benchmarks import idle, push, search, upload
+from benchmarks import forward, idle, push, resync, search, upload
 from benchmarks.figure import Figure
 from benchmarks.report import keep_json, print_table
 
@@ -16,6 +16,8 @@ _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "upload": upload.measure,
     "idle": idle.measure,
     "search": search.measure,
+    "forward": forward.measure,
+    "resync": resync.measure,
 }
 
 

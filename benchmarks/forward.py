@@ -1,0 +1,117 @@
+"""MAVLink passed on from the flight controller to a ground station: CPU time a message, latency, losses.
+
+Each forwarder has a pseudo-terminal and a UDP port of its own; flight controller and ground station are this process.
+They take turns, round by round, so that each sees the same moods of the machine. Two placements: all on one CPU, where
+the promises are judged, and the forwarder on a CPU of its own, as it would run: there each wake-up costs more.
+"""
+
+import os
+import statistics
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.figure import Figure, Floor
+from benchmarks.forwarders import FLOOR, MAVP2P, MAVPROXY, OURS, Forwarder, cpu_s, forwarders
+from benchmarks.line import Line, on_cpu
+
+_ROUNDS = 3
+_RATES: dict[str, float | None] = {"500/s": 500.0, "3000/s": 3000.0, "unpaced": None}
+_JUDGED = "3000/s"
+_SETTLING_S = 0.5
+_WATCHED_S = 2.0
+#: What may be spent, as multiples of what others spend.
+_LIMITS = {FLOOR: 2.0, MAVP2P: 1 / 3, MAVPROXY: 1 / 20}
+_MAX_P99_MS = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """One forwarder at one rate: CPU time in microseconds a message, latency in ms."""
+
+    cpu_us: float
+    p99_ms: float
+    lost: int
+
+
+#: By forwarder and rate.
+_Runs = dict[tuple[str, str], list[_Run]]
+
+
+def measure() -> list[Figure]:
+    """Measure all forwarders that this machine has, on one CPU and, if there are two, apart."""
+    peers = forwarders()
+    for name in _LIMITS.keys() - {peer.name for peer in peers}:
+        print(f"  without {name}: it is not on this machine")
+    here, *others = sorted(os.sched_getaffinity(0))
+    with on_cpu(here):
+        figures = _judged(_rounds(peers, here, _ROUNDS))
+        if others:
+            figures += _apart(_rounds(peers, others[0], 1))
+    return figures
+
+
+def _judged(runs: _Runs) -> list[Figure]:
+    """Return our figures on one CPU, beside those of each other forwarder."""
+    return [figure for rate in _RATES for figure in _at(rate, runs)]
+
+
+def _at(rate: str, runs: _Runs) -> Iterator[Figure]:
+    ours, is_judged = runs[OURS, rate], rate == _JUDGED
+    others = {name: runs[name, rate] for name in _LIMITS if (name, rate) in runs}
+    for name, its_runs in others.items():
+        floor, limit = Floor(_cpu_us(its_runs), name), _LIMITS[name] if is_judged else None
+        yield Figure(f"forward at {rate}, CPU a message", _cpu_us(ours), "us", floor, limit, times_floor=True)
+    floors = [Floor(_p99_ms(its_runs), name) for name, its_runs in others.items() if name == FLOOR]
+    limit = _MAX_P99_MS if is_judged else None
+    yield Figure(f"forward at {rate}, latency, worst of 100", _p99_ms(ours), "ms", next(iter(floors), None), limit)
+    yield Figure(f"forward at {rate}, lost", _lost(ours), "", None, 0)
+    for name, its_runs in others.items():
+        yield Figure(f"forward at {rate}, lost by {name}", _lost(its_runs), "")
+
+
+def _apart(runs: _Runs) -> list[Figure]:
+    return [
+        Figure(f"forward at {rate} on a CPU of its own, CPU a message, {name}", _cpu_us(its_runs), "us")
+        for (name, rate), its_runs in runs.items()
+    ]
+
+
+def _cpu_us(runs: Sequence[_Run]) -> float:
+    return statistics.median(run.cpu_us for run in runs)
+
+
+def _p99_ms(runs: Sequence[_Run]) -> float:
+    return statistics.median(run.p99_ms for run in runs)
+
+
+def _lost(runs: Sequence[_Run]) -> int:
+    return sum(run.lost for run in runs)
+
+
+def _rounds(peers: Sequence[Forwarder], cpu: int, count: int) -> _Runs:
+    """Let all take turns, so many times, each on that CPU."""
+    runs: _Runs = defaultdict(list)
+    for _ in range(count):
+        for peer in peers:
+            with ExitStack() as stack:
+                folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+                line = stack.enter_context(closing(Line()))
+                with on_cpu(cpu):
+                    pid = stack.enter_context(peer.start(folder, line))
+                line.warm_up()
+                for name, rate in _RATES.items():
+                    runs[peer.name, name].append(_run(line, pid, rate))
+    return runs
+
+
+def _run(line: Line, pid: int, rate: float | None) -> _Run:
+    line.pass_on(rate, _SETTLING_S)
+    before = cpu_s(pid)
+    passage = line.pass_on(rate, _WATCHED_S)
+    spent_s = cpu_s(pid) - before
+    p99_s = statistics.quantiles(passage.latencies_s, n=100)[98]
+    return _Run(spent_s / passage.sent * 1e6, p99_s * 1000, passage.lost)

@@ -1,0 +1,73 @@
+"""Programs that pass MAVLink on from a terminal to UDP: ours, the floor, and what others use."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.line import Line
+from benchmarks.processes import ROOT, daemon, running
+
+OURS, FLOOR, MAVPROXY, MAVP2P = "naze-bridge", "C floor", "MAVProxy", "mavp2p"
+_SPEED = 57600
+#: Start in a folder, on a line; the process id.
+_Start = Callable[[Path, Line], AbstractContextManager[int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Forwarder:
+    """`start` runs it in a folder of its own, on a line; yields its process id."""
+
+    name: str
+    start: _Start
+
+
+def forwarders() -> list[Forwarder]:
+    """Return those that this machine has: the floor needs cc, mavp2p is looked for as $MAVP2P and on the path."""
+    found = [Forwarder(OURS, _naze_bridge), Forwarder(MAVPROXY, _mavproxy)]
+    if shutil.which("cc"):
+        found.insert(0, Forwarder(FLOOR, _floor))
+    if mavp2p := os.environ.get("MAVP2P") or shutil.which("mavp2p"):
+        found.append(Forwarder(MAVP2P, lambda folder, line: _mavp2p(mavp2p, folder, line)))
+    return found
+
+
+def cpu_s(pid: int) -> float:
+    """Return the CPU time that a process and its threads have had, user and system."""
+    tasks = [task for task in Path(f"/proc/{pid}/task").iterdir() if task.is_dir()]
+    return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e9
+
+
+@contextmanager
+def _floor(folder: Path, line: Line) -> Iterator[int]:
+    program = folder / "forward_floor"
+    source = ROOT / "benchmarks" / "forward_floor.c"
+    subprocess.run(["cc", "-std=c99", "-O2", "-o", program, source], check=True)  # noqa: S607
+    with running([str(program), line.tty, str(line.port)], folder / "floor.log") as process:
+        yield process.pid
+
+
+@contextmanager
+def _naze_bridge(folder: Path, line: Line) -> Iterator[int]:
+    with daemon(folder, Path(f"{line.tty},{_SPEED}"), f"udpout:127.0.0.1:{line.port}") as process:
+        yield process.pid
+
+
+@contextmanager
+def _mavproxy(folder: Path, line: Line) -> Iterator[int]:
+    """As it comes, with the modules that it loads by itself."""
+    program = [sys.executable, str(Path(sys.executable).parent / "mavproxy.py"), "--daemon"]
+    link = [f"--master={line.tty}", f"--baudrate={_SPEED}", f"--out=127.0.0.1:{line.port}", "--mav20"]
+    with running([*program, *link, f"--state-basedir={folder}"], folder / "mavproxy.log") as process:
+        yield process.pid
+
+
+@contextmanager
+def _mavp2p(program: str, folder: Path, line: Line) -> Iterator[int]:
+    command = [program, f"serial:{line.tty}:{_SPEED}", f"udpc:127.0.0.1:{line.port}"]
+    with running(command, folder / "mavp2p.log") as process:
+        yield process.pid
