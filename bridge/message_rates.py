@@ -43,11 +43,11 @@ class MessageRates:
         taken = []
         for peer in peers:
             interval_s = self.interval_s(peer, msgid)
-            due, early_s = self._due.get((peer, msgid), -inf), interval_s * _EARLY
-            if interval_s == inf or now < due - early_s:
+            due = self._due.get((peer, msgid), -inf)
+            if interval_s == inf or now < due - interval_s * _EARLY:
                 continue
             # On from when it was due, so that the rate is kept; but what was missed is not made up for.
-            self._due[peer, msgid] = (due if now <= due + early_s else now) + interval_s
+            self._due[peer, msgid] = (due if now < due + interval_s else now) + interval_s
             taken.append(peer)
         return taken
 

@@ -1,0 +1,204 @@
+"""Each ground station gets what it asked for, as often as it asked, and nobody else is the worse for it."""
+
+import math
+
+import pytest
+from world import GroundStation, World
+
+from bridge.stations import EXPIRY_S
+from bridge.telemetry_table import TELEMETRY
+from protocols.mavlink.dialect import Message, messages
+from protocols.msp.commands import Msp
+from protocols.msp.frame import MspParser
+
+m = messages
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+ATTITUDE, GPS_RAW_INT, RAW_IMU = m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_GPS_RAW_INT, m.MAVLINK_MSG_ID_RAW_IMU
+#: What Mission Planner asks for, twice, at the first heartbeat: stream, rate.
+MISSION_PLANNER = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
+
+
+@pytest.fixture
+def world() -> World:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    return world
+
+
+def station_of(world: World, name: str) -> GroundStation:
+    station = GroundStation(world, name)
+    beat(station)
+    world.run(1.1)
+    return station
+
+
+def beat(station: GroundStation) -> None:
+    station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+
+
+def ask(station: GroundStation, command: int, *params: float) -> int:
+    """Send a command; return its result."""
+    station.take()
+    station.send(m.MAVLink_command_long_message(1, 1, command, 0, *params, *[0.0] * (7 - len(params))))
+    station.world.run(0.05)
+    (ack,) = station.said("COMMAND_ACK")
+    assert ack.command == command
+    result: int = ack.result
+    return result
+
+
+def stream(number: int, rate_hz: int, *, start: int = 1) -> Message:
+    return m.MAVLink_request_data_stream_message(1, 1, number, rate_hz, start)
+
+
+def rates_hz(station: GroundStation, seconds: float = 20) -> dict[str, float]:
+    """Listen for a while; return how often each message came a second."""
+    station.take()
+    station.world.run(seconds)
+    names = [message.get_type() for message in station.said()]
+    return {name: names.count(name) / seconds for name in names}
+
+
+def polls_hz(world: World, command: Msp, seconds: float = 10) -> float:
+    world.written.clear()
+    world.run(seconds)
+    frames = (frame for _, _, data in world.written for frame in MspParser().feed(data))
+    return sum(frame.command == command for frame in frames) / seconds
+
+
+def test_mission_planner_gets_just_what_it_asks_for(world: World) -> None:
+    planner, other = station_of(world, "planner"), station_of(world, "other")
+    for _ in range(2):
+        for number, rate_hz in MISSION_PLANNER:
+            planner.send(stream(number, rate_hz))
+    world.run(1)
+    planner.take()
+    of_other = rates_hz(other)
+    names = [message.get_type() for message in planner.said()]
+    of_planner = {name: names.count(name) / 20 for name in names}
+    expected = {
+        "ATTITUDE": 4, "VFR_HUD": 4, "GPS_RAW_INT": 2, "GLOBAL_POSITION_INT": 2, "SYS_STATUS": 2, "RC_CHANNELS": 2,
+        "RC_CHANNELS_RAW": 2, "BATTERY_STATUS": 2, "RAW_IMU": 2, "EXTENDED_SYS_STATE": 2, "NAMED_VALUE_INT": 4,
+    }  # fmt: skip
+    assert {name: of_planner[name] for name in expected} == pytest.approx(expected, rel=0.1)
+    assert of_planner["MISSION_CURRENT"] == pytest.approx(1, rel=0.1)
+    assert (of_other["ATTITUDE"], of_other["GPS_RAW_INT"]) == (pytest.approx(25, rel=0.05), pytest.approx(5, rel=0.05))
+    assert "RAW_IMU" not in of_other
+    # Somebody else's wish brings nobody more than a quarter of an interval too early.
+    assert of_planner["ATTITUDE"] <= 4.1
+
+
+def test_all_streams_at_once_as_mavproxy_asks(world: World) -> None:
+    station = station_of(world, "mavproxy")
+    station.send(stream(0, 4))
+    world.run(1)
+    rates = rates_hz(station)
+    for name in ("ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "VFR_HUD", "SYS_STATUS", "RC_CHANNELS", "RAW_IMU"):
+        assert rates[name] == pytest.approx(4, rel=0.1)
+    station.send(stream(0, 0))
+    world.run(0.1)
+    assert set(rates_hz(station)) <= {"HEARTBEAT", "HOME_POSITION"}
+    station.send(stream(10, 5))
+    station.send(stream(6, 5, start=0))
+    assert set(rates_hz(station)) - {"HEARTBEAT", "HOME_POSITION"} == {"ATTITUDE"}
+
+
+def test_alone_it_sets_the_pace_of_the_polls_and_going_it_takes_its_wishes_along(world: World) -> None:
+    station = station_of(world, "gcs")
+    assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(25, rel=0.05)
+    assert ask(station, 511, ATTITUDE, 200_000) == ACCEPTED
+    assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(5, rel=0.1)
+    assert ask(station, 511, ATTITUDE, 20_000) == ACCEPTED
+    assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(50, rel=0.05)
+    world.run(EXPIRY_S + 2)
+    # Nobody is there: the bridge itself needs to know it once a second.
+    assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(1, rel=0.15)
+    back = station_of(world, "gcs")
+    assert rates_hz(back)["ATTITUDE"] == pytest.approx(25, rel=0.05)
+
+
+def test_one_message_at_an_interval(world: World) -> None:
+    station = station_of(world, "gcs")
+    for interval_us, expected_hz in ((100_000, 10), (-1, 0), (0, 25), (20_000, 50)):
+        beat(station)
+        assert ask(station, 511, ATTITUDE, interval_us) == ACCEPTED
+        assert rates_hz(station).get("ATTITUDE", 0) == pytest.approx(expected_hz, rel=0.05)
+
+
+def test_what_is_not_there_cannot_be_had(world: World) -> None:
+    station = station_of(world, "gcs")
+    for msgid in (271, 0, 30_000, -1, math.nan, math.inf):
+        assert ask(station, 511, msgid, 100_000) == UNSUPPORTED
+    for interval_us in (-2, math.nan, math.inf):
+        assert ask(station, 511, ATTITUDE, interval_us) == DENIED
+    assert rates_hz(station)["ATTITUDE"] == pytest.approx(25, rel=0.05)
+
+
+def interval_us(station: GroundStation, msgid: int) -> int:
+    result = ask(station, 510, msgid)
+    (told,) = station.said("MESSAGE_INTERVAL")
+    assert told.message_id == msgid
+    assert (result == UNSUPPORTED) == (told.interval_us == 0)
+    found: int = told.interval_us
+    return found
+
+
+def test_the_interval_that_is_told_is_the_one_that_is_kept(world: World) -> None:
+    station = station_of(world, "gcs")
+    assert interval_us(station, ATTITUDE) == 40_000
+    assert interval_us(station, m.MAVLINK_MSG_ID_HEARTBEAT) == 1_000_000
+    assert interval_us(station, RAW_IMU) == -1
+    assert interval_us(station, 271) == 0
+    ask(station, 511, ATTITUDE, 100_000)
+    assert interval_us(station, ATTITUDE) == 100_000
+    ask(station, 511, ATTITUDE, -1)
+    assert interval_us(station, ATTITUDE) == -1
+    ask(station, 511, ATTITUDE, 1e30)
+    assert interval_us(station, ATTITUDE) == 2**31 - 1
+
+
+def test_no_wish_takes_more_than_the_line_has(world: World) -> None:
+    stations = [station_of(world, f"gcs{number}") for number in range(3)]
+    for station in stations:
+        for row in TELEMETRY:
+            station.send(m.MAVLink_command_long_message(1, 1, 511, 0, row.msgid, 1, 0, 0, 0, 0, 0))
+    world.run(2)
+    assert 10_000 < interval_us(stations[0], ATTITUDE) < 60_000
+    rates = rates_hz(stations[1], 10)
+    assert 15 < rates["ATTITUDE"] < 100
+    world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("row", TELEMETRY, ids=lambda row: m.mavlink_map[row.msgid].msgname)
+def test_each_message_can_be_asked_for_once(world: World, row: object) -> None:
+    msgid = row.msgid  # type: ignore[attr-defined]
+    world.faults.armed = True
+    station = station_of(world, "gcs")
+    world.run(4)
+    if msgid == RAW_IMU:
+        # Nobody wanted to hear of it, so it is not polled.
+        assert ask(station, 512, msgid) == TEMPORARILY_REJECTED
+        ask(station, 511, msgid, 100_000)
+        world.run(0.5)
+    name = m.mavlink_map[msgid].msgname
+    ask(station, 511, msgid, -1)
+    assert ask(station, 512, msgid) == ACCEPTED
+    assert name in {message.get_type() for message in station.said()}
+
+
+def test_before_a_flight_controller_is_there_nothing_is_known() -> None:
+    world = World(powered=False)
+    station = station_of(world, "gcs")
+    for row in TELEMETRY:
+        assert ask(station, 512, row.msgid) == TEMPORARILY_REJECTED
+    assert ask(station, 512, m.MAVLINK_MSG_ID_MISSION_CURRENT) == ACCEPTED
+    assert set(rates_hz(station, 5)) == {"HEARTBEAT", "MISSION_CURRENT"}
+
+
+def test_wishes_that_are_made_before_it_is_there_count_then() -> None:
+    world = World(speeds=(115200,), powered=False)
+    station = station_of(world, "gcs")
+    assert ask(station, 511, ATTITUDE, 100_000) == ACCEPTED
+    world.power_on()
+    world.wait_ready()
+    assert rates_hz(station)["ATTITUDE"] == pytest.approx(10, rel=0.05)
