@@ -8,26 +8,11 @@ from fastcrc.crc16 import mcrf4xx
 
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame
+from protocols.mavlink.message_table import MESSAGE_FORMATS
 
 _SIGNED = 0x01
 _HEADER_V2 = 10
 _CRC_SIZE = 2
-#: MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them all the
-#: same. The sizes of those payloads that we send and that have extensions in MAVLink 2.
-_V1_PAYLOAD_SIZES = {
-    messages.MAVLINK_MSG_ID_SYS_STATUS: 31,
-    messages.MAVLINK_MSG_ID_GPS_RAW_INT: 30,
-    messages.MAVLINK_MSG_ID_MISSION_ITEM: 37,
-    messages.MAVLINK_MSG_ID_MISSION_REQUEST: 4,
-    messages.MAVLINK_MSG_ID_MISSION_CURRENT: 2,
-    messages.MAVLINK_MSG_ID_MISSION_COUNT: 4,
-    messages.MAVLINK_MSG_ID_MISSION_ACK: 3,
-    messages.MAVLINK_MSG_ID_MISSION_ITEM_INT: 37,
-    messages.MAVLINK_MSG_ID_COMMAND_ACK: 3,
-    messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION: 60,
-    messages.MAVLINK_MSG_ID_HOME_POSITION: 52,
-    messages.MAVLINK_MSG_ID_STATUSTEXT: 51,
-}
 
 
 class MavlinkDecoder:
@@ -59,11 +44,15 @@ _PACKER = messages.MAVLink(None)
 
 
 def pack(message: Message) -> Packed:
-    """Pack a message's fields, once for all who get it."""
+    """Pack a message's fields, once for all who get it.
+
+    MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them all the
+    same.
+    """
     msgid: int = message.get_msgId()
     whole_size: int = message.unpacker.size
     payload = bytes(message.pack(_PACKER)[_HEADER_V2:-_CRC_SIZE])
-    payload_v1 = payload.ljust(whole_size, b"\0")[: _V1_PAYLOAD_SIZES.get(msgid, whole_size)]
+    payload_v1 = payload.ljust(whole_size, b"\0")[: MESSAGE_FORMATS[msgid].base_size]
     return Packed(msgid, payload_v1, payload)
 
 

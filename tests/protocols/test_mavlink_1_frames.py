@@ -23,6 +23,7 @@ SENT = [
     messages.MAVLink_mission_ack_message(255, 190, 14, 0),
     messages.MAVLink_command_ack_message(400, 2, 0, 0, 255, 190),
     messages.MAVLink_autopilot_version_message(4, 65536, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0),
+    messages.MAVLink_battery_status_message(0, 0, 3, 32767, [11100] + [65535] * 9, -1, -1, -1, -1),
     messages.MAVLink_home_position_message(453838000, 84733000, 0, 0.0, 0.0, 0.0, _NAN4, 0.0, 0.0, 0.0),
     messages.MAVLink_statustext_message(6, b"Mission verified: 146 records and so on, to the end"[:50]),
     messages.MAVLink_file_transfer_protocol_message(0, 255, 190, [0] * 251),
