@@ -1,0 +1,291 @@
+"""Calibration and storage: done on the ground, once, acknowledged with what came of it, and never in the air."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from conversations import waypoints
+from world import GroundStation, World
+
+from bridge.commands import _REFUSED
+from bridge.fc_actions import Outcome
+from protocols.mavlink.dialect import Message, messages
+from protocols.msp.frame import MspParser
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+m = messages
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS = range(6)
+CALIBRATION, STORAGE = 241, 245
+ACTIONS = {205, 206, 250}
+ACCELEROMETER = (CALIBRATION, (0, 0, 0, 0, 1, 0, 0), 205)
+SIMPLE_ACCELEROMETER = (CALIBRATION, (0, 0, 0, 0, 4, 0, 0), 205)
+COMPASS = (CALIBRATION, (0, 1, 0, 0, 0, 0, 0), 206)
+SAVE = (STORAGE, (1, 0, 0, 0, 0, 0, 0), 250)
+ALL = (ACCELEROMETER, SIMPLE_ACCELEROMETER, COMPASS, SAVE)
+
+
+def a_world(options: SimOptions | None = None, faults: Faults | None = None) -> tuple[World, GroundStation]:
+    world = World(options, faults, speeds=(115200,))
+    world.wait_ready()
+    world.run(1)
+    station = GroundStation(world)
+    station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+    world.run(0.1)
+    world.written.clear()
+    return world, station
+
+
+def long(command: int, params: tuple[float, ...]) -> Message:
+    return m.MAVLink_command_long_message(1, 1, command, 0, *params)
+
+
+def integer(command: int, params: tuple[float, ...]) -> Message:
+    x, y = int(params[4]), int(params[5])
+    return m.MAVLink_command_int_message(1, 1, 3, command, 0, 0, *params[:4], x, y, params[6])
+
+
+def results(station: GroundStation) -> list[int]:
+    return [ack.result for ack in station.said("COMMAND_ACK") if station.is_meant(ack)]
+
+
+def done(world: World) -> list[int]:
+    """What was done to the flight controller."""
+    frames = [frame for _, _, data in world.written for frame in MspParser().feed(data)]
+    return [frame.command for frame in frames if frame.command in ACTIONS]
+
+
+@pytest.mark.parametrize("make", [long, integer])
+@pytest.mark.parametrize(("command", "params", "action"), ALL)
+def test_on_the_ground_it_is_done_once(
+    make: Callable[[int, tuple[float, ...]], Message], command: int, params: tuple[float, ...], action: int
+) -> None:
+    world, station = a_world()
+    station.send(make(command, params))
+    world.run(0.6)
+    assert results(station) == [ACCEPTED]
+    assert done(world) == [action]
+    (text,) = station.texts()
+    assert text == (Outcome.DONE if command == STORAGE else Outcome.FREEZES).value
+    world.run(20)
+    # A calibrated board restarts, and is found again.
+    assert world.naze.counters.resets == (action == 205)
+    assert action == 206 or world.is_found
+    assert done(world) == [action]
+
+
+def test_storing_is_done_before_it_is_acknowledged() -> None:
+    world, station = a_world(SimOptions(config_write_ms=150.0))
+    operations = world.naze.flash_operations
+    station.send(long(*SAVE[:2]))
+    world.run(0.1)
+    assert results(station) == []
+    assert world.naze.flash_operations > operations
+    world.run(0.2)
+    assert results(station) == [ACCEPTED]
+
+
+@pytest.mark.parametrize(("command", "params", "action"), ALL)
+def test_armed_nothing_is_done(command: int, params: tuple[float, ...], action: int) -> None:
+    world, station = a_world()
+    world.faults.armed = True
+    # Even if the bridge has not noticed yet that it is armed.
+    station.send(long(command, params))
+    world.run(0.5)
+    assert results(station) == [DENIED]
+    assert station.texts() == [Outcome.ARMED.value]
+    assert done(world) == []
+
+
+@pytest.mark.parametrize("tele_prot", [TelemetryProtocol.MAVLINK, TelemetryProtocol.FRSKY_9600])
+def test_where_it_cannot_be_asked_whether_it_is_armed_nothing_is_done(tele_prot: TelemetryProtocol) -> None:
+    world, station = a_world(SimOptions(tele_prot=tele_prot))
+    world.faults.armed = True
+    for seconds in (0.02, 0.3, 4.0):
+        world.run(seconds)
+        station.take()
+        station.send(long(*SAVE[:2]))
+        world.run(3)
+        assert len(results(station)) == 1
+        assert results(station)[0] in (DENIED, FAILED)
+    assert done(world) == []
+
+
+def test_without_a_flight_controller_it_is_denied() -> None:
+    world = World(powered=False)
+    station = GroundStation(world)
+    for command, params, _ in ALL:
+        station.send(long(command, params))
+        world.run(0.1)
+    assert results(station) == [DENIED] * len(ALL)
+    # The same refusal is not said over and over.
+    assert station.texts() == [Outcome.NO_LINK.value]
+
+
+def test_a_board_that_falls_silent_has_failed_and_is_not_told_again() -> None:
+    world, station = a_world()
+    station.on_message.append(lambda _: None)
+    hung: list[float] = []
+
+    def hang_when_told() -> None:
+        if not hung and done(world):
+            world.faults.hang = True
+            hung.append(world.now)
+        elif not hung:
+            world.after(0.0005, hang_when_told)
+
+    hang_when_told()
+    station.send(long(*ACCELEROMETER[:2]))
+    world.run(3)
+    assert hung
+    assert results(station) == [FAILED]
+    assert station.texts()[0] == Outcome.NO_ANSWER.value
+    world.faults.hang = False
+    world.run(30)
+    assert done(world) == [205]
+
+
+def test_lost_bytes_do_it_once_or_not_at_all() -> None:
+    for seed in range(12):
+        world, station = a_world(SimOptions(seed=seed))
+        world.faults.lost_byte_rate = 0.02
+        station.send(long(*SAVE[:2]))
+        world.run(4)
+        assert len(done(world)) <= 1
+        assert results(station) in ([ACCEPTED], [FAILED])
+
+
+def test_an_impatient_pilot_hears_that_it_is_being_done() -> None:
+    world, station = a_world()
+    for _ in range(3):
+        station.send(long(*SAVE[:2]))
+    world.run(0.01)
+    assert results(station) == [IN_PROGRESS, IN_PROGRESS]
+    station.send(long(*COMPASS[:2]))
+    world.run(0.6)
+    assert results(station) == [IN_PROGRESS, IN_PROGRESS, TEMPORARILY_REJECTED, ACCEPTED]
+    assert done(world) == [250]
+
+
+def test_never_beside_a_mission() -> None:
+    world, station = a_world()
+    outcome = world.push(waypoints(100))
+    station.send(long(*SAVE[:2]))
+    world.run(0.05)
+    assert results(station) == [TEMPORARILY_REJECTED]
+    assert station.texts() == [Outcome.OCCUPIED.value]
+    world.wait_until(lambda _: bool(outcome), 5)
+    assert outcome[0][0].text.startswith("Mission verified")
+    assert done(world) == []
+
+
+def test_a_mission_waits_for_it_to_end() -> None:
+    world, station = a_world()
+    station.send(long(*SAVE[:2]))
+    world.run(0.03)
+    station.send(m.MAVLink_mission_count_message(1, 1, 5, 0))
+    world.run(0.02)
+    assert [ack.type for ack in station.said("MISSION_ACK")] == [m.MAV_MISSION_DENIED]
+    world.run(1)
+    assert results(station) == [ACCEPTED]
+
+
+def test_a_sensor_that_is_not_there_is_not_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.simulator.msp_port._SENSORS", 0b1011)
+    world, station = a_world()
+    station.send(long(*COMPASS[:2]))
+    world.run(0.3)
+    assert results(station) == [DENIED]
+    assert station.texts() == [Outcome.NO_SENSOR.value]
+    assert done(world) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "params"),
+    [
+        (CALIBRATION, (1, 0, 0, 0, 0, 0, 0)),  # gyro
+        (CALIBRATION, (0, 0, 1, 0, 0, 0, 0)),  # pressure
+        (CALIBRATION, (0, 0, 0, 1, 0, 0, 0)),  # radio control
+        (CALIBRATION, (0, 0, 0, 0, 2, 0, 0)),  # board level
+        (CALIBRATION, (0, 1, 0, 0, 1, 0, 0)),  # two at once
+        (CALIBRATION, (0, 0, 0, 0, 0, 0, 0)),
+        (CALIBRATION, (math.nan, 0, 0, 0, 0, 0, 0)),
+        (STORAGE, (0, 0, 0, 0, 0, 0, 0)),  # read
+        (STORAGE, (2, 0, 0, 0, 0, 0, 0)),  # reset to defaults
+        (STORAGE, (math.nan, 0, 0, 0, 0, 0, 0)),
+        (STORAGE, (math.inf, 0, 0, 0, 0, 0, 0)),
+    ],
+)
+def test_what_it_cannot_do_is_unsupported(command: int, params: tuple[float, ...]) -> None:
+    world, station = a_world()
+    station.send(long(command, params))
+    world.run(0.3)
+    assert results(station) == [UNSUPPORTED]
+    assert done(world) == []
+
+
+def test_nothing_else_that_can_be_commanded_reaches_the_flight_controller() -> None:
+    world, station = a_world()
+    for command in (*range(CALIBRATION), *range(246, 700), *range(3000, 3010), *range(42400, 42800)):
+        station.send(long(command, (1, 1, 1, 1, 1, 1, 1)))
+    world.run(1)
+    frames = [frame for _, _, data in world.written for frame in MspParser().feed(data)]
+    assert all(frame.command < 190 for frame in frames)
+    assert not world.naze.armed
+
+
+# What is refused is said once.
+
+
+def test_every_text_fits_a_statustext() -> None:
+    texts = [*_REFUSED.values(), *(outcome.value for outcome in Outcome)]
+    assert max(map(len, texts)) <= 50
+    assert all(text.isascii() for text in texts)
+
+
+def test_a_refusal_is_said_once_in_ten_seconds_to_each_and_always_acknowledged() -> None:
+    world, first = a_world()
+    for _ in range(7):
+        first.send(long(400, (1, 0, 0, 0, 0, 0, 0)))
+        world.run(0.5)
+    assert results(first) == [DENIED] * 7
+    assert first.texts() == ["Arm and disarm with the transmitter sticks"]
+    second = GroundStation(world, "second")
+    second.send(long(400, (1, 0, 0, 0, 0, 0, 0)))
+    world.run(0.1)
+    assert second.texts() == ["Arm and disarm with the transmitter sticks"]
+    assert len(first.texts()) == 1
+    world.run(8)
+    first.send(long(400, (1, 0, 0, 0, 0, 0, 0)))
+    world.run(0.1)
+    assert len(first.texts()) == 2
+
+
+def test_seven_readings_while_armed_are_refused_with_one_text() -> None:
+    """Mission Planner asks for the list seven times, 0.7 s apart."""
+    world, station = a_world()
+    world.faults.armed = True
+    world.run(1)
+    station.take()
+    for _ in range(7):
+        station.send(m.MAVLink_mission_request_list_message(1, 1, 0))
+        world.run(0.7)
+    assert len(station.said("MISSION_ACK")) == 7
+    assert len(station.texts()) == 1
+
+
+@pytest.mark.parametrize("current", [2, 3])
+def test_a_guided_item_is_refused_at_once(current: int) -> None:
+    world, station = a_world()
+    here = (45.3838, 8.4733, 20.0)
+    station.send(m.MAVLink_mission_item_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *here))
+    world.run(0.1)
+    (ack,) = station.said("MISSION_ACK")
+    assert station.is_meant(ack)
+    assert ack.type == m.MAV_MISSION_DENIED
+    assert "transmitter" in station.texts()[0]
+    station.take()
+    e7 = (453838000, 84733000, 20.0)
+    station.send(m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *e7))
+    world.run(0.1)
+    assert [ack.type for ack in station.said("MISSION_ACK")] == [m.MAV_MISSION_DENIED]
+    assert station.texts() == []

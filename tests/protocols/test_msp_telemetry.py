@@ -1,0 +1,70 @@
+"""Telemetry replies: Harakiri's lengths are the least, other firmware's are longer, and nothing shorter is believed."""
+
+import struct
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocols.msp import telemetry as t
+
+#: Each decoder, and Harakiri's reply: the least that it accepts.
+LEAST: list[tuple[Callable[[bytes], object], bytes]] = [
+    (t.decode_status, struct.pack("<HHHIB", 3000, 7, 0b1011, 0x21, 0)),
+    (t.decode_raw_imu, struct.pack("<9h", *range(-4, 5))),
+    (t.decode_channels, struct.pack("<4H", 1500, 1501, 1502, 1003)),
+    (t.decode_raw_gps, struct.pack("<BBiihH", 1, 9, 453838000, -84733000, 131, 250)),
+    (t.decode_comp_gps, struct.pack("<Hh", 120, -152)),
+    (t.decode_attitude, struct.pack("<3h", 105, -32, -170)),
+    (t.decode_altitude, struct.pack("<ih", -150, 30)),
+    (t.decode_analog, struct.pack("<BHH", 124, 0, 920)),
+]
+
+
+@pytest.mark.parametrize(("decode", "payload"), LEAST)
+def test_shorter_is_unknown_and_longer_is_accepted(decode: Callable[[bytes], object], payload: bytes) -> None:
+    assert decode(payload) is not None
+    for size in range(len(payload)):
+        assert decode(payload[:size]) is None
+    for more in range(1, 60):
+        assert decode(payload + bytes(more)) is not None
+
+
+@given(st.binary(max_size=255))
+def test_any_payload_is_read_or_unknown(payload: bytes) -> None:
+    for decode, _ in LEAST:
+        decode(payload)
+
+
+def test_status_and_its_sensors() -> None:
+    status = t.decode_status(LEAST[0][1])
+    sensors = t.Sensor.ACCELEROMETER | t.Sensor.BAROMETER | t.Sensor.GPS
+    assert status == t.StatusReport(3000, 7, sensors, 0x21)
+
+
+@pytest.mark.parametrize(
+    ("more", "course_ddeg", "hdop_e2"),
+    [(b"", None, None), (struct.pack("<H", 2755), 2755, None), (struct.pack("<HH", 2755, 140), 2755, 140)],
+)
+def test_the_three_lengths_of_raw_gps(more: bytes, course_ddeg: int | None, hdop_e2: int | None) -> None:
+    gps = t.decode_raw_gps(LEAST[3][1] + more)
+    assert gps == t.RawGps(1, 9, 453838000, -84733000, 131, 250, course_ddeg, hdop_e2)
+
+
+def test_below_the_sea() -> None:
+    """Harakiri's altitude is an unsigned number of metres that a signed one was written into."""
+    gps = t.decode_raw_gps(struct.pack("<BBiiHH", 1, 9, 0, 0, 0xFFFF - 3, 0))
+    assert gps is not None
+    assert gps.altitude_m == -4
+
+
+def test_the_current_where_it_is_sent() -> None:
+    assert t.decode_analog(struct.pack("<BHH", 124, 0, 920)) == t.Analog(124, 920)
+    assert t.decode_analog(struct.pack("<BHHh", 124, 350, 920, 1234)) == t.Analog(124, 920, 350, 1234)
+    assert t.decode_analog(struct.pack("<BHHhH", 124, 350, 920, -5, 1240)) == t.Analog(124, 920, 350, -5)
+
+
+@pytest.mark.parametrize(("sent", "kept"), [(4, 4), (8, 8), (10, 10), (18, 18), (34, 18)])
+def test_as_many_channels_as_mavlink_has(sent: int, kept: int) -> None:
+    assert t.decode_channels(struct.pack(f"<{sent}H", *range(1000, 1000 + sent))) == tuple(range(1000, 1000 + kept))
