@@ -43,12 +43,17 @@ def test_a_mission_there_and_back(board: Board, tmp_path: Path) -> None:
     assert board.records() == records_of(judge(plan))
     assert run_naze_bridge("pull", tmp_path / "held", "--fc", board.link).returncode == 0
     assert (tmp_path / "held").read_text() == write_qgc_wpl(judge(plan).items)
-    status = json.loads(run_naze_bridge("status", "--json", "--fc", board.link).stdout)
-    # Telemetry is waited for.
-    assert (status["armed"], status["mission_records"], status["speed_baud"]) == (False, 5, 115200)
+    board.assert_was_treated_well()
+
+
+def test_status_waits_for_telemetry(tmp_path: Path) -> None:
+    """At 9600 baud a round of it takes longer than to find the flight controller's name."""
+    with ExitStack() as stack:
+        board = Starter(tmp_path, stack).board("--baud", "9600")
+        status = json.loads(run_naze_bridge("status", "--json", "--fc", f"{board.link},9600").stdout)
+    assert (status["armed"], status["mission_records"], status["speed_baud"]) == (False, 0, 9600)
     assert status["battery_v"] > 9
     assert status["satellites"] > 4
-    board.assert_was_treated_well()
 
 
 def test_a_port_that_is_missing(tmp_path: Path) -> None:
