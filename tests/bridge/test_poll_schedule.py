@@ -1,0 +1,149 @@
+"""The schedule alone: questions that are refused, never answered or lost, and what the line leaves of any wishes."""
+
+import random
+from collections import Counter
+from collections.abc import Callable, Mapping
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridge.msp_link import MAX_OUTSTANDING_BYTES, MspLink
+from bridge.poll_schedule import POLLS, PollSchedule
+from protocols.msp.commands import Msp
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
+
+REPLY_PAYLOADS = {101: 11, 102: 18, 105: 16, 106: 14, 107: 5, 108: 8, 109: 6, 110: 5, 118: 12}
+#: Answers a command with a payload's size; None: not at all, -1: an error.
+Answer = Callable[[int], int | None]
+
+
+def answer_all(command: int) -> int | None:
+    return REPLY_PAYLOADS[command]
+
+
+class Line:
+    """A flight controller that answers after `delay_s`, or does not."""
+
+    def __init__(self, baud: int | None = 115200, delay_s: float = 0.004, answer: Answer = answer_all) -> None:
+        self.now = 0.0
+        self.schedule = PollSchedule()
+        self.schedule.begin(baud)
+        self.link = MspLink(baud, 0.0)
+        self.asked: list[tuple[float, int]] = []
+        self.answer = answer
+        self.beside_missions = False
+        self._delay_s = delay_s
+        self._replies: list[tuple[float, bytes]] = []
+
+    def run(self, seconds: float) -> Counter[int]:
+        """Let time pass; return how often each question was asked."""
+        end, before = self.now + seconds, len(self.asked)
+        while self.now < end:
+            due = [self.schedule.next_deadline(self.link), self.link.next_deadline(), *(at for at, _ in self._replies)]
+            self.now = min(max(min(at for at in due if at is not None), self.now), end)
+            while self._replies and self._replies[0][0] <= self.now:
+                self._settle(self.link.receive(self._replies.pop(0)[1], self.now))
+            self._settle(self.link.tick(self.now))
+            self.schedule.ask(self.link, self.now, beside_missions=self.beside_missions)
+            assert self.link.outstanding_bytes <= MAX_OUTSTANDING_BYTES
+            for data in self.link.take_output():
+                for frame in MspParser().feed(data):
+                    self._take(frame.command)
+        return Counter(command for _, command in self.asked[before:])
+
+    def _settle(self, frames: list[MspFrame]) -> None:
+        for frame in frames:
+            self.schedule.answered(frame)
+
+    def _take(self, command: int) -> None:
+        if command not in REPLY_PAYLOADS:
+            return  # the link's own question
+        self.asked.append((self.now, command))
+        size = self.answer(command)
+        if size is not None:
+            direction = Direction.ERROR if size < 0 else Direction.REPLY
+            frame = MspFrame(direction, command, bytes(max(size, 0))).encode()
+            self._replies.append((self.now + self._delay_s, frame))
+
+
+def test_at_first_all_is_asked_at_once() -> None:
+    line = Line()
+    asked = line.run(0.2)
+    assert set(asked) == set(REPLY_PAYLOADS) - {Msp.RAW_IMU}
+
+
+def test_what_is_refused_is_asked_twice_and_never_again_until_another_is_there() -> None:
+    line = Line(answer=lambda command: -1 if command == Msp.WP else REPLY_PAYLOADS[command])
+    assert line.run(60)[Msp.WP] == 2
+    assert line.schedule.interval_s(Msp.WP) is None
+    line.schedule.want({Msp.WP: 0.1})
+    assert line.run(10)[Msp.WP] == 0
+    line.schedule.begin(115200)
+    assert line.run(60)[Msp.WP] == 2
+
+
+def test_one_error_may_be_noise() -> None:
+    noisy = [True]
+    line = Line(answer=lambda command: -1 if command == Msp.WP and noisy and noisy.pop() else REPLY_PAYLOADS[command])
+    assert line.run(60)[Msp.WP] >= 29
+
+
+def test_what_is_never_answered_is_asked_less_and_less_and_the_others_do_not_suffer() -> None:
+    line = Line(answer=lambda command: None if command == Msp.COMP_GPS else REPLY_PAYLOADS[command])
+    line.schedule.want({Msp.ATTITUDE: 0.04, Msp.COMP_GPS: 0.2})
+    line.run(30)
+    asked = line.run(60)
+    assert asked[Msp.COMP_GPS] <= 14
+    assert asked[Msp.ATTITUDE] / 60 == pytest.approx(25, rel=0.1)
+    line.answer = answer_all
+    line.run(20)
+    assert line.run(10)[Msp.COMP_GPS] == pytest.approx(50, abs=3)
+
+
+@pytest.mark.parametrize(
+    ("loss", "least", "most"), [(0.0, 1.0, 1.0), (0.01, 0.7, 1.0), (0.1, 0.2, 0.75), (0.5, 0.1, 0.2)]
+)
+def test_losses_bend_the_rates(loss: float, least: float, most: float) -> None:
+    chance = random.Random(1)
+    line = Line(answer=lambda command: None if chance.random() < loss else REPLY_PAYLOADS[command])
+    line.schedule.want({Msp.ATTITUDE: 0.04, Msp.RAW_GPS: 0.2})
+    line.run(30)
+    qualities = []
+    for _ in range(60):
+        line.run(1)
+        qualities.append(line.schedule.quality)
+    assert least <= sum(qualities) / len(qualities) <= most
+    line.answer = answer_all
+    line.run(60)
+    assert line.schedule.quality == 1.0
+
+
+@pytest.mark.parametrize("delay_s", [0.05, 0.1])
+def test_over_a_slow_line_a_question_waits_for_its_answer(delay_s: float) -> None:
+    line = Line(None, delay_s)
+    line.schedule.want({Msp.ATTITUDE: 0.04})
+    line.run(10)
+    asked = line.run(20)
+    assert 0.5 / delay_s <= asked[Msp.ATTITUDE] / 20 <= 1 / delay_s + 0.1
+    assert asked[Msp.STATUS] / 20 == pytest.approx(min(4, 1 / delay_s), rel=0.3)
+
+
+@given(
+    wishes=st.dictionaries(st.sampled_from([poll.command for poll in POLLS]), st.floats(0.01, 100.0)),
+    baud=st.sampled_from([1200, 2400, 9600, 57600, 115200, None]),
+    beside_missions=st.booleans(),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_wishes_fit_the_line(wishes: Mapping[Msp, float], baud: int | None, beside_missions: bool) -> None:
+    line = Line(baud)
+    line.beside_missions = beside_missions
+    line.schedule.want(wishes)
+    line.run(5)
+    asked = line.run(20)
+    used = sum(count * (REPLY_PAYLOADS[command] + 2 * FRAME_OVERHEAD) for command, count in asked.items()) / 20
+    assert used <= (baud or 115200) / 10 * 0.6 * 1.1
+    # Nothing that is wanted is forgotten, and arming is noticed.
+    wanted = {poll.command for poll in POLLS if poll.needed_s < 100} | {c for c, s in wishes.items() if s <= 5}
+    assert set(asked) >= {command for command in wanted if wishes.get(command, 0) <= 5}
+    assert asked[Msp.STATUS] / 20 >= (0.6 if baud == 1200 else 1.2)
