@@ -1,0 +1,41 @@
+"""docs/telemetry.md says what the table in the code says: every message, its poll, its rate and its fields."""
+
+import re
+from math import inf
+from pathlib import Path
+
+import pytest
+
+from bridge.telemetry_table import NO_STREAM, TELEMETRY, Row
+from protocols.mavlink.dialect import messages as m
+
+PAGE = (Path(__file__).parents[1] / "docs" / "telemetry.md").read_text()
+STREAMS = {number: name.removeprefix("MAV_DATA_STREAM_") for name, number in vars(m).items() if "DATA_STREAM_" in name}
+#: Fields that say what the message is about, and extensions that are left at MAVLink's "not given".
+UNTOLD = {"alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "hdg_acc", "yaw", "id", "temperature", "time_remaining",
+              "charge_state", "voltages_ext", "mode", "fault_bitmask", "battery_function", "type", "time_boot_ms",
+              "time_usec", "port", "chancount", "name", "value"}  # fmt: skip
+
+
+def name_of(row: Row) -> str:
+    name: str = m.mavlink_map[row.msgid].msgname
+    return name
+
+
+@pytest.mark.parametrize("row", TELEMETRY, ids=name_of)
+def test_each_message_is_on_the_page_as_it_is_in_the_code(row: Row) -> None:
+    (line,) = re.findall(rf"^\| {name_of(row)} \| (.*) \|$", PAGE, re.MULTILINE)
+    poll, rate, stream = line.split(" | ")
+    assert poll.startswith(f"{row.poll.name} {row.poll.value}")
+    if row.interval_s < inf:
+        assert rate == f"{1 / row.interval_s:g} Hz"
+    assert stream == ("none" if row.stream == NO_STREAM else STREAMS[row.stream])
+
+
+@pytest.mark.parametrize("row", [row for row in TELEMETRY if row.msgid != m.MAVLINK_MSG_ID_RAW_IMU], ids=name_of)
+def test_each_field_is_on_the_page(row: Row) -> None:
+    lines = "\n".join(line for line in PAGE.splitlines() if line.startswith("| ") and name_of(row) in line)
+    for field in m.mavlink_map[row.msgid].fieldnames:
+        known = re.sub(r"^chan\d+_raw$", "chan1", field.removesuffix("_extended"))
+        known = re.sub(r"^errors_count\d$", "errors_count1", known)
+        assert known in UNTOLD or known in lines, f"{name_of(row)}.{field}"
