@@ -21,6 +21,9 @@ _SIGNATURE_SIZE = 13
 _SIGNED = 0x01
 #: In a MAVLink 2 header.
 _MSGID = slice(7, 10)
+#: In a HEARTBEAT's payload, whose largest field comes first.
+_HEARTBEAT_SIZE = 9
+_HEARTBEAT_TYPE = 4
 _SETUP_SIGNING = messages.MAVLINK_MSG_ID_SETUP_SIGNING.to_bytes(3, "little")
 _HEADERS = {MAGIC_V1: 6, MAGIC_V2: 10}
 
@@ -55,6 +58,15 @@ def read_tlog(data: bytes) -> Iterator[TlogRecord]:
             continue
         yield TlogRecord(first_stamp_us(data[at:start]), frame)
         at = start + len(frame.raw)
+
+
+def heartbeat_type(frame: bytes) -> int | None:
+    """Return the MAV_TYPE that a whole frame announces; None if it is no HEARTBEAT."""
+    found = MavlinkFrame(frame)
+    if found.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
+        return None
+    # MAVLink 2 leaves trailing zeros out: what is not there is 0.
+    return found.payload.ljust(_HEARTBEAT_SIZE, b"\0")[_HEARTBEAT_TYPE]
 
 
 def first_stamp_us(records: bytes) -> int:

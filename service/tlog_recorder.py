@@ -4,7 +4,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from protocols.tlog import tlog_record
+from protocols.mavlink.dialect import messages
+from protocols.tlog import heartbeat_type, tlog_record
 from service.disk_writer import DiskWriter
 from service.settings import TlogLimits
 from service.tlog_folder import TlogFolder
@@ -16,6 +17,9 @@ _CLOCK_STEP_US = 10_000_000
 class TlogRecorder:
     """Offers `tap`. Within a file time runs on evenly; after a step of the clock a new file begins.
 
+    A file begins without ground stations' heartbeats: Mission Planner shows the craft whose HEARTBEAT comes first in a
+    log, and knows only the systems 255 and 253 for ground stations. They are left out until a vehicle's came.
+
     `read_clock`: nanoseconds since the Unix epoch, as far as the system knows.
     """
 
@@ -24,6 +28,7 @@ class TlogRecorder:
         self._read_clock = read_clock
         self._epoch_us = self._present_epoch_us()
         self._file_is_over = False
+        self._awaits_vehicle = True
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
 
     def tap(self, frames: Sequence[bytes]) -> None:
@@ -31,11 +36,24 @@ class TlogRecorder:
         now_us = time.monotonic_ns() // 1000
         with self._writer.lock:
             at_us = self._epoch_us + now_us
+            if self._awaits_vehicle:
+                frames = self._vehicle_first(frames)
             self._writer.put(b"".join([tlog_record(frame, at_us) for frame in frames]))
 
     def close(self) -> None:
         """Write what is left."""
         self._writer.close()
+
+    def _vehicle_first(self, frames: Sequence[bytes]) -> Sequence[bytes]:
+        found: list[bytes] = []
+        for frame in frames:
+            announced = heartbeat_type(frame)
+            if announced == messages.MAV_TYPE_GCS and self._awaits_vehicle:
+                continue
+            if announced is not None:
+                self._awaits_vehicle = False
+            found.append(frame)
+        return found
 
     def _taken(self) -> None:
         """Decide whether what comes from now on goes into a new file; only between two files time may jump."""
@@ -44,6 +62,7 @@ class TlogRecorder:
         self._file_is_over = stepped or self._folder.is_full
         if self._file_is_over:
             self._epoch_us = epoch_us
+            self._awaits_vehicle = True
 
     def _write(self, records: bytes) -> None:
         self._folder.write(records, time.monotonic())

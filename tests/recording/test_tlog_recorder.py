@@ -45,6 +45,39 @@ def test_a_step_of_the_clock_begins_a_new_file(tmp_path: Path, step_ns: int) -> 
         assert abs(stamps[path][-1] - shift - time.time_ns()) < 60e9
 
 
+def heartbeat(kind: int, sysid: int, *, version: int = 2) -> bytes:
+    codec = messages.MAVLink(None, srcSystem=sysid, srcComponent=1)
+    message = messages.MAVLink_heartbeat_message(kind, 3, 0, 0, 0, 3)
+    return bytes(message.pack(codec, force_mavlink1=version == 1))
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: int) -> None:
+    """Mission Planner shows the craft whose heartbeat comes first. Another file begins the same way."""
+    station = heartbeat(messages.MAV_TYPE_GCS, 245, version=version)
+    vehicle = heartbeat(messages.MAV_TYPE_QUADROTOR, 1, version=version)
+    ahead_ns = 0
+    recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + ahead_ns)
+    recorder.tap([station, frame(1)])
+    recorder.tap([frame(2), station, vehicle, station])
+    deadline = time.monotonic() + PATIENCE_S
+    while not (first := list(tmp_path.iterdir())):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    ahead_ns = HOUR_NS
+    while len(later := set(tmp_path.iterdir()) - set(first)) == 0:
+        recorder.tap([station])
+        recorder.tap([frame(3)])
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    recorder.tap([vehicle, station])
+    recorder.close()
+    begun = [record.frame.raw for record in read_tlog(first[0].read_bytes())]
+    assert begun[:4] == [frame(1), frame(2), vehicle, station]
+    heartbeats = [record.frame.raw for record in read_tlog(later.pop().read_bytes()) if record.frame.msgid == 0]
+    assert heartbeats == [vehicle, station]
+
+
 def test_a_clock_that_is_only_corrected_changes_nothing(tmp_path: Path) -> None:
     corrections = count(step=10**8)
     recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + next(corrections))
