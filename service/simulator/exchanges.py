@@ -44,14 +44,14 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
     exchanges: list[Exchange] = []
     unasked: list[Piece] = []
     waiting: list[Exchange] = []
-    unknown: list[Exchange] = []
+    unknown: set[Exchange] = set()
     answers = _answers(events, unasked)
     answered_by, frame, pieces = next(answers, _NO_MORE)
     requests = MspParser()
     for number, event in enumerate(events):
         if event.deed in (UartDeed.OPEN, UartDeed.CLOSE):
             requests = MspParser()
-            unknown += _cut_short(waiting, event.at)
+            unknown |= _cut_short(waiting, event.at)
             waiting = []
         elif event.deed is UartDeed.WRITE:
             asked = [
@@ -72,12 +72,12 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
                 # Requests are answered in their order.
                 del waiting[: waiting.index(asker) + 1]
             answered_by, frame, pieces = next(answers, _NO_MORE)
-    unknown += _cut_short(waiting, events[-1].at if events else 0.0)
+    unknown |= _cut_short(waiting, events[-1].at if events else 0.0)
     return Conversation([exchange for exchange in exchanges if exchange not in unknown], sorted(unasked))
 
 
-def _cut_short(waiting: Sequence[Exchange], at: float) -> list[Exchange]:
-    return [exchange for exchange in waiting if exchange.asked_at > at - _CUT_SHORT_S]
+def _cut_short(waiting: Sequence[Exchange], at: float) -> set[Exchange]:
+    return {exchange for exchange in waiting if exchange.asked_at > at - _CUT_SHORT_S}
 
 
 _Answer = tuple[int, MspFrame, Sequence[Piece]]
