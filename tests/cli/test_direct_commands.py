@@ -92,6 +92,26 @@ def test_a_full_disk_behind_standard_output(tmp_path: Path) -> None:
     assert_one_sentence(ended, os.EX_IOERR, "cannot be written", "File too large")
 
 
+def test_a_full_disk_behind_the_log_stops_nothing(tmp_path: Path) -> None:
+    def leave_nothing() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+    script = (
+        "import logging, structlog; from service.log_setup import set_up_logging; set_up_logging(logging.INFO);"
+        "[structlog.get_logger().warning('a.line') for _ in range(3)]; print('goes on')"
+    )
+    with (tmp_path / "log").open("w") as log:
+        ended = subprocess.run(
+            [sys.executable, "-c", script],
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            preexec_fn=leave_nothing,
+            check=False,
+        )
+    assert (ended.returncode, ended.stdout) == (0, "goes on\n")
+
+
 def test_a_reader_who_has_seen_enough() -> None:
     reading, writing = os.pipe()
     os.close(reading)
