@@ -6,6 +6,7 @@
 #   make test           run all tests (ARGS="tests/storage -x" runs some)
 #   make lint           check style, format and types
 #   make bench          measure speed and memory
+#   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
 #   make clean          remove everything that the above have made
@@ -16,7 +17,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench lock message-table clean
+.PHONY: demo test lint bench soak lock message-table clean
 
 demo: $(VENV)/.demo-ready
 	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
@@ -32,6 +33,9 @@ lint: $(VENV)/.test-ready
 
 bench: $(VENV)/.test-ready
 	$(BIN)/python -m benchmarks $(ARGS)
+
+soak: $(VENV)/.test-ready
+	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
 
 # The project itself is installed editable: what is edited is what runs. Its build backend comes from the lock, too;
 # --no-deps because pip would miss what the lock leaves out on purpose (pyproject.toml, tool.uv).

@@ -57,12 +57,15 @@ class PlainStation:
 
     def upload(self, plan: Sequence[PlanRow]) -> MissionResult:
         """Give a list, item by item as it is asked for; the final ack."""
-        self.announce(len(plan))
+        is_asked = False
         for _ in range(20 * len(plan)):
+            if not is_asked:
+                self.announce(len(plan))
             for message in self._messages(_RETRY_S):
                 if message.get_type() == "MISSION_ACK":
                     return MissionResult(message.type)
                 if message.get_type() in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+                    is_asked = True
                     self.give(plan, message.seq)
         raise AssertionError("no final MISSION_ACK came")
 

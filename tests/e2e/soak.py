@@ -1,0 +1,321 @@
+"""What a soak does to a daemon, and who watches it meanwhile. All that is drawn is drawn from a seed."""
+
+import os
+import random
+import select
+import socket
+import struct
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from plain_station import tcp_station, udp_station
+from plan import judge, plain_plan, records_of
+from programs import Board, Daemon
+
+from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mission_item import MissionResult
+
+m = messages
+VEHICLE = 1
+#: Linux; Python has no name for it.
+_SO_TIMESTAMPNS = 35
+_MAX_STALLED = 5
+
+
+class Stalls(threading.Thread):
+    """Watches how long the machine lets nobody run: what happens then is no fault of the daemon's."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self._over = threading.Event()
+        self._stalls: list[tuple[float, float]] = []
+
+    def run(self) -> None:
+        while not self._over.is_set():
+            before = time.time()
+            self._over.wait(0.02)
+            after = time.time()
+            if after - before > 0.1:
+                self._stalls.append((before, after))
+
+    def seconds(self, since: float, until: float) -> float:
+        """Return how much of that time was stalled."""
+        return sum(max(0.0, min(after, until) - max(before, since)) for before, after in self._stalls if after > since)
+
+    def end(self) -> None:
+        self._over.set()
+        self.join()
+
+
+class Witness(threading.Thread):
+    """A well-behaved ground station that wants all the telemetry there is, and checks what it gets."""
+
+    def __init__(self, address: tuple[str, int], stalls: Stalls) -> None:
+        super().__init__(daemon=True)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
+        # When it came, and not when this thread was woken for it.
+        self._socket.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        self._socket.connect(address)
+        self._stalls = stalls
+        self._over = threading.Event()
+        self._writer = FrameWriter(255, 190)
+        self._beat_at: float | None = None
+        self.damaged: list[bytes] = []
+        self.frames: Counter[int] = Counter()
+        #: Gaps between two heartbeats of the vehicle, without what the machine stalled.
+        self.gaps_s: list[float] = []
+
+    def run(self) -> None:
+        beat_due = time.monotonic()
+        while not self._over.is_set():
+            if time.monotonic() >= beat_due:
+                beat_due += 1.0
+                self._send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+                # The wish may have been lost with an earlier one's address.
+                self._send(m.MAVLink_command_long_message(VEHICLE, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
+            if select.select([self._socket], [], [], 0.1)[0]:
+                data, extra, _, _ = self._socket.recvmsg(2048, 64)
+                seconds, nanoseconds = struct.unpack("qq", extra[0][2])
+                self._check(data, seconds + nanoseconds / 1e9)
+
+    def end(self) -> None:
+        self._over.set()
+        self.join()
+        self._socket.close()
+
+    def _send(self, message: Message) -> None:
+        self._socket.send(self._writer.frame(pack(message), 2))
+
+    def _check(self, data: bytes, at: float) -> None:
+        frames = MavlinkSplitter().feed(data)
+        if b"".join(frame.raw for frame in frames) != data:
+            self.damaged.append(data)
+        for frame in frames:
+            self.frames[frame.msgid] += 1
+            if frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT and frame.sysid == VEHICLE:
+                if self._beat_at is not None:
+                    self.gaps_s.append(at - self._beat_at - self._stalls.seconds(self._beat_at, at))
+                self._beat_at = at
+
+
+class Weather(threading.Thread):
+    """What happens to the flight controller: of all kinds, drawn like cards, and each is over after a while."""
+
+    def __init__(self, board: Board, chance: random.Random) -> None:
+        super().__init__(daemon=True)
+        self._board = board
+        self._chance = chance
+        self._over = threading.Event()
+        self.happened: Counter[str] = Counter()
+        self._kinds: list[Callable[[], None]] = [self._unplug, self._move, self._cut_power, self._reset]
+        self._kinds += [self._arm, self._arm_shortly]
+
+    def run(self) -> None:
+        deck: list[Callable[[], None]] = []
+        while not self._over.is_set():
+            deck = deck or self._chance.sample(self._kinds, len(self._kinds))
+            kind = deck.pop()
+            kind()
+            self.happened[kind.__name__.strip("_")] += 1
+            self._pass(0.5, 8.0)
+
+    def end(self) -> None:
+        self._over.set()
+        self.join()
+
+    def _pass(self, least: float, most: float) -> None:
+        self._over.wait(self._chance.uniform(least, most))
+
+    def _unplug(self) -> None:
+        self._board.set("unplug")
+        self._pass(0.05, 3.0)
+        self._board.set("plug")
+
+    def _move(self) -> None:
+        """Plugged in again, it has another name behind the same link, because somebody else has its own."""
+        self._board.set("unplug")
+        taken = os.openpty()
+        self._board.set("plug")
+        for end in taken:
+            os.close(end)
+
+    def _cut_power(self) -> None:
+        self._board.set("power off")
+        self._pass(0.0, 3.0)
+        self._board.set("power on")
+
+    def _reset(self) -> None:
+        self._board.set("power off")
+        self._board.set("power on")
+
+    def _arm(self) -> None:
+        self._board.set("armed 1")
+        self._pass(3.0, 6.0)
+        self._board.set("armed 0")
+
+    def _arm_shortly(self) -> None:
+        self._board.set("armed 1")
+        self._pass(0.0, 0.5)
+        self._board.set("armed 0")
+
+
+class Crowd:
+    """Ground stations that come, go, stall, move, talk rubbish, and write missions."""
+
+    def __init__(self, daemon: Daemon, udp_port: int, tcp_port: int, chance: random.Random) -> None:
+        self._daemon = daemon
+        self._address = ("127.0.0.1", udp_port)
+        self._tcp_port = tcp_port
+        self._chance = chance
+        self._stalled: list[socket.socket] = []
+        self.happened: Counter[str] = Counter()
+        self.uploads: Counter[str] = Counter()
+        self._kinds: list[Callable[[Board], None]] = [self._upload, self._upload, self._upload, self._download]
+        self._kinds += [self._pass_by, self._move, self._babble, self._look_in, self._stall, self._stall, self._hammer]
+
+    def act(self, board: Board) -> None:
+        """Do one thing."""
+        kind = self._chance.choice(self._kinds)
+        kind(board)
+        self.happened[kind.__name__.strip("_")] += 1
+
+    def leave(self) -> None:
+        """All who hold a connection hang up."""
+        for client in self._stalled:
+            client.close()
+        self._stalled.clear()
+
+    def writes(self, board: Board) -> bool:
+        """Write a mission; if it is accepted (true), it is what the board holds."""
+        plan = plain_plan(self._chance.randrange(2, 80), start=self._chance.randrange(100))
+        by_tcp = self._chance.random() < 0.5
+        with tcp_station(self._tcp_port) if by_tcp else udp_station(self._address) as station:
+            station.say_hello()
+            result = station.upload(plan)
+        if result is MissionResult.ACCEPTED:
+            assert board.records() == records_of(judge(plan)), f"{len(plan)} items were accepted, and are not there"
+        else:
+            # Refused at once while there is no flight controller: not ten times a second.
+            self._rest()
+        self.uploads[result.name] += 1
+        return result is MissionResult.ACCEPTED
+
+    def _upload(self, board: Board) -> None:
+        self.writes(board)
+
+    def _download(self, board: Board) -> None:
+        """Ask for the list and some of its items, and never thank."""
+        with self._udp() as client:
+            self._say(client, m.MAVLink_mission_request_list_message(1, 1))
+            for seq in range(5):
+                self._say(client, m.MAVLink_mission_request_int_message(1, 1, seq))
+
+    def _pass_by(self, board: Board) -> None:
+        with self._udp() as client:
+            self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=self._chance.randrange(2, 255))
+            self._say(client, m.MAVLink_param_request_list_message(1, 1))
+            self._rest()
+
+    def _move(self, board: Board) -> None:
+        """One ground station at one address after the other; sometimes it leaves an upload behind."""
+        for _ in range(5):
+            with self._udp() as client:
+                self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=77)
+                if self._chance.random() < 0.02:
+                    self._say(client, m.MAVLink_mission_count_message(1, 1, 9), sysid=77)
+                self._rest()
+
+    def _babble(self, board: Board) -> None:
+        frame = FrameWriter(9, 9).frame(pack(m.MAVLink_mission_count_message(1, 1, 9)), 2)
+        with self._udp() as client:
+            for _ in range(20):
+                noise = self._chance.randbytes(self._chance.randrange(1, 300))
+                client.send(
+                    self._chance.choice((noise, frame[: self._chance.randrange(len(frame))], noise + frame[:9]))
+                )
+
+    def _look_in(self, board: Board) -> None:
+        """Come by TCP, read whole frames for a while, and leave in one of several ways."""
+        with self._tcp() as client:
+            self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+            self._rest()
+            self._read_whole_frames(client)
+            if self._chance.random() < 0.5:
+                # A reset instead of an end.
+                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+
+    def _stall(self, board: Board) -> None:
+        """Come by TCP, and read nothing; who did so earlier reads again, or leaves."""
+        client = self._tcp()
+        self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        self._stalled.append(client)
+        if len(self._stalled) > _MAX_STALLED:
+            earlier = self._stalled.pop(self._chance.randrange(_MAX_STALLED))
+            if self._chance.random() < 0.5:
+                self._read_whole_frames(earlier)
+            earlier.close()
+
+    def _hammer(self, board: Board) -> None:
+        """Ask for everything over TCP, and never read an answer."""
+        with self._tcp() as client:
+            client.settimeout(0.2)
+            for _ in range(300):
+                try:
+                    self._say(client, m.MAVLink_param_request_list_message(1, 1))
+                except OSError:
+                    # The daemon does not read on, or has hung up.
+                    return
+
+    def _rest(self) -> None:
+        time.sleep(self._chance.uniform(0.0, 0.5))
+
+    def _udp(self) -> socket.socket:
+        client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        client.connect(self._address)
+        return client
+
+    def _tcp(self) -> socket.socket:
+        client = socket.socket()
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 8192)
+        client.connect(("127.0.0.1", self._tcp_port))
+        return client
+
+    def _say(self, client: socket.socket, message: Message, sysid: int = 251) -> None:
+        client.send(FrameWriter(sysid, 190).frame(pack(message), 2))
+
+    def _read_whole_frames(self, client: socket.socket) -> None:
+        client.settimeout(0.1)
+        splitter, data, whole = MavlinkSplitter(), b"", b""
+        for _ in range(100):
+            try:
+                piece = client.recv(65536)
+            except OSError:
+                break
+            data += piece
+            whole += b"".join(frame.raw for frame in splitter.feed(piece))
+            if not piece:
+                break
+        assert data.startswith(whole), "a client that reads again gets a damaged frame"
+        assert len(data) - len(whole) < 280
+
+
+class Meter:
+    """Memory and file descriptors of a process."""
+
+    def __init__(self, pid: int) -> None:
+        self._folder = Path("/proc") / str(pid)
+
+    def memory_kb(self) -> int:
+        """Return what is resident."""
+        lines = (self._folder / "status").read_text().splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
+
+    def descriptors(self) -> list[str]:
+        """Return what is open."""
+        return sorted(os.readlink(entry) for entry in (self._folder / "fd").iterdir())

@@ -1,0 +1,86 @@
+"""A daemon at full rate through everything that may happen to it, for half a minute; `make soak` does it for longer."""
+
+import os
+import random
+import time
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from socket import SOCK_STREAM
+
+import pytest
+from benches import Starter
+from programs import free_port, until
+from soak import Crowd, Meter, Stalls, Weather, Witness
+
+MINUTES = float(os.environ.get("SOAK_MINUTES", "0.5"))
+SEED = int(os.environ.get("SOAK_SEED", "1"))
+#: What Python may keep of what it had: its pools are seldom given back.
+MEMORY_KB = 3000
+#: Each has its own way of arming.
+TELE_PROTS = (2, 0, 3, 1)
+
+
+@pytest.mark.timeout(60 * MINUTES + 180)
+def test_soak(start: Starter, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    port = tmp_path / "naze-by-id"
+    udp_port, tcp_port = free_port(), free_port(SOCK_STREAM)
+    daemon = start.daemon(str(port), gcs=[f"udpin:127.0.0.1:{udp_port}", f"tcpin:127.0.0.1:{tcp_port}"])
+    daemon.wait_up()
+    meter = Meter(daemon.process.pid)
+    crowd = Crowd(daemon, udp_port, tcp_port, random.Random(SEED))
+    stalls = Stalls()
+    witness = Witness(("127.0.0.1", udp_port), stalls)
+    weather: list[Weather] = []
+    memory_kb: list[int] = []
+    descriptors: list[int] = []
+    with ExitStack() as stack:
+        for watch in (stalls, witness):
+            watch.start()
+            stack.callback(watch.end)
+        for number, tele_prot in enumerate(TELE_PROTS):
+            folder = tmp_path / f"board {number}"
+            folder.mkdir()
+            board = Starter(folder, stack).board("--tele-prot", str(tele_prot), "--state", str(tmp_path / "flash"))
+            port.unlink(missing_ok=True)
+            port.symlink_to(board.link)
+            weather.append(Weather(board, random.Random(SEED + number)))
+            weather[-1].start()
+            end = time.monotonic() + 60 * MINUTES / len(TELE_PROTS)
+            while time.monotonic() < end:
+                crowd.act(board)
+            weather[-1].end()
+            # It gets better, and all is well.
+            crowd.leave()
+            daemon.wait()
+            until(partial(crowd.writes, board), "a mission in fine weather")
+            assert daemon.held()["records"] == board.records()
+            board.assert_was_treated_well()
+            memory_kb.append(meter.memory_kb())
+            descriptors.append(_settled(meter))
+            board.end()
+        until(lambda: daemon.has_logged("fc.port_lost"), "the loss of the port")
+    happened = sum((each.happened for each in weather), crowd.happened)
+    report = (
+        f"seed {SEED}, {MINUTES} min: {dict(happened)}; uploads {dict(crowd.uploads)};"
+        f" {witness.frames.total()} frames, {witness.frames[30]} attitudes; longest gap {max(witness.gaps_s):.2f} s;"
+        f" memory {memory_kb} kB, descriptors {descriptors}"
+    )
+    with capsys.disabled():
+        print(f"\n{report}")  # noqa: T201 (what a long soak is made for)
+    assert witness.damaged == []
+    assert max(witness.gaps_s) <= 1.5
+    assert len(set(descriptors)) == 1, report
+    assert memory_kb[-1] - memory_kb[0] <= MEMORY_KB, report
+    assert "Traceback" not in daemon.printed
+    assert [entry for entry in daemon.events() if entry["level"] == "error"] == []
+    assert daemon.is_alive
+
+
+def _settled(meter: Meter) -> int:
+    """Return how many descriptors are open when those of all who left are closed."""
+    counts = [len(meter.descriptors())]
+    while len(counts) < 10 or len(set(counts[-10:])) > 1:
+        time.sleep(0.1)
+        counts.append(len(meter.descriptors()))
+    return counts[-1]
