@@ -1,0 +1,165 @@
+"""Links that come, go, move and stall under a running daemon: real terminals and real sockets."""
+
+import os
+import socket
+from functools import partial
+from pathlib import Path
+
+from benches import Bench, Starter
+from mission_planner import MissionPlanner
+from plain_station import PlainStation, tcp_station, udp_station
+from plan import PlanRow, judge, plain_plan, records_of
+from programs import PATIENCE, Daemon, free_port, until
+
+from protocols.mission_item import MissionResult
+
+PLAN = plain_plan(40)
+
+
+def ground_stations(bench: Bench) -> list[str]:
+    status = bench.daemon.status()
+    assert status is not None
+    stations: list[str] = status["ground_stations"]
+    return stations
+
+
+def has_lost_port(daemon: Daemon, times: int) -> bool:
+    return len([entry for entry in daemon.events() if entry["event"] == "fc.port_lost"]) == times
+
+
+def take_terminals(name: Path) -> list[int]:
+    """Open terminals until the one of that name is among them, or surely somebody else's."""
+    taken: list[int] = []
+    while len(taken) < 40 and not (taken and os.ttyname(taken[-1]) == str(name)):
+        taken += os.openpty()
+    return taken
+
+
+def answer_requests(station: PlainStation, plan: list[PlanRow], until_seq: int | None = None) -> MissionResult | None:
+    """Give each item that is asked for, until one number is or until the final ack."""
+    while True:
+        message = station.wait_for("MISSION_REQUEST", "MISSION_ACK")
+        if message.get_type() == "MISSION_ACK":
+            return MissionResult(message.type)
+        if message.seq == until_seq:
+            return None
+        station.give(plan, message.seq)
+
+
+# -- the flight controller's side ----------------------------------------------------------------------------
+
+
+def test_it_comes_back_under_another_name_behind_the_same_link(start: Starter, tmp_path: Path) -> None:
+    """As USB adapters do: ttyUSB0 becomes ttyUSB1, and /dev/serial/by-id/... leads there."""
+    board = start.board()
+    by_id = tmp_path / "usb-FTDI_FT232R-if00-port0"
+    by_id.symlink_to(board.link)
+    daemon = start.daemon(str(by_id))
+    daemon.wait()
+    with udp_station(daemon.address) as station:
+        station.say_hello()
+        for number in range(3):
+            name = by_id.resolve()
+            board.set("unplug")
+            until(partial(has_lost_port, daemon, number + 1), "the loss of the port")
+            # Somebody else has the name now.
+            taken = take_terminals(name)
+            board.set("plug")
+            assert by_id.resolve() != name
+            daemon.wait()
+            plan = plain_plan(12, start=number)
+            assert station.upload(plan) is MissionResult.ACCEPTED
+            assert board.records() == records_of(judge(plan))
+            for end in taken:
+                os.close(end)
+    board.assert_was_treated_well()
+
+
+def test_a_reset_is_nothing_that_a_ground_station_loses_its_vehicle_by(bench: Bench) -> None:
+    planner = bench.mission_planner()
+    planner.meet()
+    planner.write(PLAN)
+    for _ in range(3):
+        planner.heard.clear()
+        bench.board.set("power off")
+        bench.board.set("power on")
+        planner.wait_until(lambda: len(planner.heard_of("HEARTBEAT")) >= 2, "the vehicle")
+        planner.wait_until(lambda: len(planner.heard_of("ATTITUDE")) >= 10, "its telemetry")
+        assert {(beat.get_srcSystem(), beat.get_srcComponent()) for beat in planner.heard_of("HEARTBEAT")} == {(1, 1)}
+    bench.daemon.wait()
+    planner.write(plain_plan(41))
+    assert bench.board.records() == records_of(judge(plain_plan(41)))
+
+
+# -- ground stations that move -------------------------------------------------------------------------------
+
+
+def test_an_upload_goes_on_from_another_address(bench: Bench) -> None:
+    """The same ids from elsewhere: Wi-Fi has given the laptop another address."""
+    with udp_station(bench.daemon.address) as there:
+        there.announce(len(PLAN))
+        assert answer_requests(there, PLAN, until_seq=20) is None
+    with udp_station(bench.daemon.address) as here:
+        here.say_hello()
+        here.wait_for("HEARTBEAT")
+        assert answer_requests(here, PLAN) is MissionResult.ACCEPTED
+        assert bench.board.records() == records_of(judge(PLAN))
+        assert bench.daemon.has_logged("mission.station_moved")
+        # The old address is not spoken to for a minute, as that of one who just fell silent is.
+
+        def is_alone() -> bool:
+            here.say_hello()
+            return len(ground_stations(bench)) == 1
+
+        until(is_alone, "the end of the old address")
+
+
+def test_what_was_written_meanwhile_is_acked_at_the_other_address(bench: Bench) -> None:
+    with udp_station(bench.daemon.address) as there:
+        there.announce(len(PLAN))
+        assert answer_requests(there, PLAN, until_seq=len(PLAN) - 1) is None
+        there.give(PLAN, len(PLAN) - 1)
+    with udp_station(bench.daemon.address) as here:
+        here.say_hello()
+
+        def is_acked() -> bool:
+            """It has seen no ack, and repeats its last item."""
+            here.give(PLAN, len(PLAN) - 1)
+            here.wait_for("HEARTBEAT", "MISSION_ACK")
+            return any(message.get_type() == "MISSION_ACK" and not message.type for message in here.heard)
+
+        until(is_acked, "the final ack")
+    assert bench.board.records() == records_of(judge(PLAN))
+
+
+# -- other kinds of links ------------------------------------------------------------------------------------
+
+
+def test_ipv6_and_a_name(start: Starter) -> None:
+    udp, tcp, named = free_port(), free_port(socket.SOCK_STREAM), free_port()
+    bench = start.bench(gcs=[f"udpin:[::1]:{udp}", f"tcpin:[::1]:{tcp}", f"udpout:localhost:{named}"])
+    by_udp = socket.socket(socket.AF_INET6, socket.SOCK_DGRAM)
+    by_udp.connect(("::1", udp))
+    for number, connection in enumerate((by_udp, socket.create_connection(("::1", tcp), PATIENCE))):
+        with PlainStation(connection) as station:
+            plan = plain_plan(12 + number)
+            assert station.upload(plan) is MissionResult.ACCEPTED
+            assert bench.board.records() == records_of(judge(plan))
+    with MissionPlanner(("127.0.0.1", named), listen=True) as called:
+        called.connect()
+        called.write(PLAN)
+    assert bench.board.records() == records_of(judge(PLAN))
+
+
+def test_a_client_that_reads_nothing_keeps_nobody_waiting(start: Starter) -> None:
+    port, udp = free_port(socket.SOCK_STREAM), free_port()
+    bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{udp}"])
+    with tcp_station(port) as deaf, tcp_station(port) as station, udp_station(("127.0.0.1", udp)) as by_udp:
+        deaf.say_hello()
+        for number, writer in enumerate((station, by_udp)):
+            plan = plain_plan(50 + number)
+            assert writer.upload(plan) is MissionResult.ACCEPTED
+            assert bench.board.records() == records_of(judge(plan))
+        # It reads again, and is as good as any.
+        assert deaf.upload(PLAN) is MissionResult.ACCEPTED
+    assert bench.board.records() == records_of(judge(PLAN))
