@@ -149,9 +149,8 @@ class FcSession:
             self.polls.ask(self.link, now, beside_missions=self._runner.is_busy)
             self._notice_silence(self.link, now)
         if self._mavlink is not None:
-            self._mavlink.tick(now, is_conversing=self._runner.is_busy)
-            if self._mavlink.ended:
-                self._begin_search(now, self._mavlink.ended)
+            line = self._mavlink
+            self._mavlink_frames(line, line.tick(now, is_conversing=self._runner.is_busy), now)
         if self._frsky is not None:
             self._frsky.tick(now)
             if self._frsky.ended:
@@ -306,7 +305,9 @@ class FcSession:
         return self._met_harakiri or sender == _HARAKIRI_SENDER
 
     def _mavlink_data(self, line: MavlinkLine, data: bytes, now: float) -> None:
-        frames = line.receive(data, now)
+        self._mavlink_frames(line, line.receive(data, now), now)
+
+    def _mavlink_frames(self, line: MavlinkLine, frames: list[MavlinkFrame], now: float) -> None:
         self.vehicle.armed = line.armed
         if frames:
             self._on_mavlink(frames)

@@ -12,6 +12,8 @@ _SILENCE_S = 2.5
 _HARAKIRI_ARMED_SILENCE_S = 0.8
 #: Harakiri is asked for MSP now and then: it answers again once it is disarmed.
 _PROBE_INTERVAL_S = 1.0
+#: After so long without a byte nothing more comes of a frame that has begun.
+_LINE_SILENCE_S = 0.1
 #: A heartbeat's base_mode: where it is, and its bit for "armed".
 _BASE_MODE, _SAFETY_ARMED = 6, 0x80
 
@@ -23,7 +25,8 @@ class MavlinkLine:
         self._is_harakiri = is_harakiri
         self._splitter = MavlinkSplitter()
         self._msp = MspParser()
-        self._heard_at = now
+        self._heard_at = self._last_byte_at = now
+        self._look_at = now + _LINE_SILENCE_S
         self._probe_due = now + _PROBE_INTERVAL_S
         self._sender = HarakiriSender()
         self._output: list[bytes] = []
@@ -32,7 +35,14 @@ class MavlinkLine:
 
     def receive(self, data: bytes, now: float) -> list[MavlinkFrame]:
         """Take bytes from the port; return the whole frames."""
+        self._last_byte_at = now
         frames = self._splitter.feed(data)
+        self._note(frames, now)
+        if self._is_harakiri and self._msp.feed(data):
+            self.ended = "it answers MSP again"
+        return frames
+
+    def _note(self, frames: list[MavlinkFrame], now: float) -> None:
         if frames:
             self._heard_at = now
         for frame in frames:
@@ -41,9 +51,6 @@ class MavlinkLine:
                 if self.armed and not armed:
                     self._probe_due = now
                 self.armed = armed
-        if self._is_harakiri and self._msp.feed(data):
-            self.ended = "it answers MSP again"
-        return frames
 
     def send(self, packed: Packed) -> bool:
         """Send a message to a Harakiri; False if there is no safe way to."""
@@ -58,18 +65,29 @@ class MavlinkLine:
         output, self._output = self._output, []
         return output
 
-    def tick(self, now: float, *, is_conversing: bool) -> None:
-        """Ask for MSP when that is due, but not amidst a conversation; notice silence."""
+    def tick(self, now: float, *, is_conversing: bool) -> list[MavlinkFrame]:
+        """Ask for MSP when that is due, but not amidst a conversation; notice silence.
+
+        Return frames that a false header was hiding: it is believed no longer once the line is quiet.
+        """
+        frames: list[MavlinkFrame] = []
+        if self._splitter.is_waiting and now >= self._last_byte_at + _LINE_SILENCE_S:
+            frames = self._splitter.reset()
+            self._note(frames, now)
+        # Looked at ten times a second rather than after each byte: a timer for each would cost more than the frames.
+        self._look_at = now + _LINE_SILENCE_S
         if now >= self._silent_at:
             self.ended = f"no MAVLink for {self._patience_s} s"
         elif self._is_harakiri and now >= self._probe_due:
             self._probe_due = now + _PROBE_INTERVAL_S
             if not is_conversing:
                 self._output.append(PROBE)
+        return frames
 
     def next_deadline(self) -> float:
         """Return when `tick` has something to do."""
-        return min(self._silent_at, self._probe_due) if self._is_harakiri else self._silent_at
+        deadline = min(self._silent_at, self._probe_due) if self._is_harakiri else self._silent_at
+        return min(deadline, self._look_at) if self._splitter.is_waiting else deadline
 
     @property
     def _patience_s(self) -> float:

@@ -113,7 +113,7 @@ class MissionUploads:
                 return
             if count == 0:
                 # Mission Planner's Cancel button. The pilot did not ask to lose the mission that is in the craft.
-                self._cancel(now, "cancelled by the ground station")
+                self._cancel(now, "cancelled")
                 return
             if count == present.count:
                 if present.phase is Phase.RECEIVING:
@@ -209,7 +209,7 @@ class MissionUploads:
         if transfer is None or transfer.station != station or result == MissionResult.ACCEPTED:
             return
         if transfer.phase is not Phase.DELIVERING:
-            self._cancel(now, f"cancelled by the ground station (result {result})")
+            self._cancel(now, f"cancelled (result {result})")
 
     def armed(self, now: float) -> None:
         """The craft was armed: a transfer that is not yet with the flight controller ends."""
@@ -221,7 +221,7 @@ class MissionUploads:
         """A ground station's connection is closed: others need not wait for its upload to time out."""
         transfer = self._transfer
         if transfer is not None and transfer.station.peer == peer and transfer.phase is not Phase.DELIVERING:
-            self._cancel(now, "ended, the ground station hung up")
+            self._cancel(now, "ended by hanging up")
 
     def link_lost(self, now: float) -> None:
         """The flight controller is gone: so is the reason to go on receiving."""
@@ -236,7 +236,7 @@ class MissionUploads:
         if transfer is None or transfer.phase is not Phase.RECEIVING:
             return
         if now >= transfer.progress_at + _GIVE_UP_S:
-            self._cancel(now, f"no item came for {_GIVE_UP_S:.0f} s")
+            self._cancel(now, f"silent for {_GIVE_UP_S:.0f} s")
         elif now >= transfer.request_due:
             transfer.patience_s = min(transfer.patience_s * 2, _MAX_PATIENCE_S)
             self._request(transfer, now)
@@ -369,7 +369,7 @@ class MissionUploads:
 
     def _cancel(self, now: float, why: str) -> None:
         assert self._transfer is not None
-        refusal = Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}; old mission kept")
+        refusal = Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}, old mission kept")
         self._abandon(self._transfer, refusal, now)
 
     def _abandon(self, transfer: _Transfer, refusal: Refusal, now: float) -> None:

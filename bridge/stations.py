@@ -104,7 +104,10 @@ class Stations:
         return [
             Station(peer, *speaker)
             for peer, known in self._known.items()
-            if peer.link == station.peer.link and speaker in known.speakers and known.came_at >= old.heard_at
+            if peer != station.peer
+            and peer.link == station.peer.link
+            and speaker in known.speakers
+            and known.came_at >= old.heard_at
         ]
 
     def _note_speaker(self, station: Station, known: _Known, now: float) -> None:

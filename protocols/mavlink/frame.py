@@ -98,6 +98,11 @@ class MavlinkSplitter:
         self.bad_frames = 0  # of a known message, whose CRC was wrong
         self.skipped_bytes = 0
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a frame has begun that is not whole."""
+        return bool(self._buffer)
+
     def feed(self, data: bytes) -> list[MavlinkFrame]:
         """Take bytes as they come and return the frames that they complete."""
         return self._split(self._buffer + data, is_end=False)

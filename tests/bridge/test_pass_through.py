@@ -208,3 +208,13 @@ def test_frames_are_split_as_mavlink_says() -> None:
     _, autopilot, _ = passing()
     frames = [autopilot.pack(message) for message in telemetry(5, 10)]
     assert [frame.raw for frame in MavlinkSplitter().feed(b"".join(frames))] == frames
+
+
+def test_a_false_header_does_not_hold_back_a_slow_stream() -> None:
+    """Twelve heartbeats would fit the frame that never comes."""
+    world, autopilot, (station, _) = passing()
+    autopilot.outgoing += b"\xfd\xff\x00\x00\x00\x01\x01\x1e\x00\x00"
+    world.run(6)
+    assert world.events("fc.lost") == []
+    assert station.frames_heard == autopilot.sent
+    assert len(autopilot.sent) >= 5

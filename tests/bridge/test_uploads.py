@@ -507,7 +507,7 @@ def test_silence_repeats_the_request_and_ends_the_transfer_after_five_seconds(se
     world.wait_until(lambda _: bool(acks(station)), 10)
     assert world.now - began == pytest.approx(5.0, abs=0.05)
     assert acks(station) == [A.OPERATION_CANCELLED]
-    assert any("no item came for 5 s" in text for text in station.texts())
+    assert any("silent for 5 s" in text for text in station.texts())
     times = [at - began for at, message in station.heard if message.get_type() == "MISSION_REQUEST"]
     assert set(requested(station)) == {sent}
     assert times[0] == pytest.approx(0.25, abs=0.05)
