@@ -1,0 +1,173 @@
+"""What the real MAVSDK and the real MAVProxy show of a flown circle, beside what the simulated craft really did.
+
+Between a moment on board and the truth that is asked for lie the poll, the ground station's own rate and this process:
+half a second at the most. The craft flies at 2.5 m/s on a circle of 25 m (6 degrees a second), and climbs at 2.5 m/s
+at first. Tolerances are what it does meanwhile, and what MSP rounds.
+"""
+
+import asyncio
+import json
+import math
+import re
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from benches import Bench
+from mavproxy import MavProxy
+from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
+from programs import PATIENCE, comes
+from test_mavsdk import vehicle_at
+
+POSITION_M = 1.5
+HEIGHT_M = 1.0
+DIRECTION_DEG = 6.0
+TILT_DEG = 1.0
+SPEED_MS = 0.1
+VOLTAGE_V = 0.1
+#: By the box that is active.
+MAVSDK_MODES = {
+    1 << 0: "STABILIZED",
+    1 << 2: "ALTCTL",
+    1 << 7: "HOLD",
+    1 << 6: "RETURN_TO_LAUNCH",
+    1 << 8: "MISSION",
+    0: "ACRO",
+}
+_METRES_PER_DEGREE = 111_320.0
+
+
+def truth(bench: Bench) -> dict[str, Any]:
+    """What the craft is doing: the fields of FlightState."""
+    craft = json.loads(bench.board.line("truth"))
+    flight: dict[str, Any] = craft["flight"]
+    return flight
+
+
+def metres_from(flight: dict[str, Any], lat_deg: float, lon_deg: float) -> float:
+    north = (lat_deg - flight["lat_e7"] / 1e7) * _METRES_PER_DEGREE
+    east = (lon_deg - flight["lon_e7"] / 1e7) * _METRES_PER_DEGREE * math.cos(math.radians(lat_deg))
+    return math.hypot(north, east)
+
+
+def degrees_between(one: float, other: float) -> float:
+    return abs((one - other + 180) % 360 - 180)
+
+
+async def agrees(values: AsyncIterator[Any], check: Callable[[Any], None], times: int = 10) -> None:
+    """Check values as they come, until so many in a row agree: the first ones may be older than the flight."""
+    agreed, failure = 0, None
+    try:
+        async with asyncio.timeout(PATIENCE):
+            async for value in values:
+                try:
+                    check(value)
+                except AssertionError as error:
+                    agreed, failure = 0, error
+                else:
+                    agreed += 1
+                if agreed >= times:
+                    return
+    except TimeoutError:
+        raise failure or AssertionError(f"nothing came to {check.__name__}") from None
+
+
+async def test_mavsdk_shows_the_flight_as_it_is(bench: Bench) -> None:
+    bench.board.set("armed 1")
+    async with vehicle_at(bench.daemon.port) as vehicle:
+        telemetry = TelemetryAsync(vehicle)
+
+        def position(shown: Any) -> None:
+            now = truth(bench)
+            assert metres_from(now, shown.latitude_deg, shown.longitude_deg) <= POSITION_M
+            assert shown.relative_altitude_m == pytest.approx(now["height_m"], abs=HEIGHT_M)
+            assert shown.absolute_altitude_m == pytest.approx(now["altitude_m"], abs=HEIGHT_M + 0.5)
+
+        def attitude(shown: Any) -> None:
+            now = truth(bench)
+            assert shown.roll_deg == pytest.approx(now["roll"], abs=TILT_DEG)
+            assert shown.pitch_deg == pytest.approx(-now["pitch"], abs=TILT_DEG)
+            assert degrees_between(shown.yaw_deg, now["heading"]) <= DIRECTION_DEG
+
+        def velocity(shown: Any) -> None:
+            now = truth(bench)
+            assert math.hypot(shown.north_m_s, shown.east_m_s) == pytest.approx(now["speed_ms"], abs=SPEED_MS)
+            course = math.degrees(math.atan2(shown.east_m_s, shown.north_m_s))
+            assert degrees_between(course, now["course"]) <= DIRECTION_DEG
+            assert shown.down_m_s == pytest.approx(-now["climb_ms"], abs=0.3)
+
+        def battery(shown: Any) -> None:
+            assert shown.voltage_v == pytest.approx(truth(bench)["volts"], abs=VOLTAGE_V)
+            assert not shown.remaining_percent >= 0  # not known
+
+        def gps(shown: Any) -> None:
+            assert (shown.num_satellites, shown.fix_type) == (9, 3)
+
+        def home(shown: Any) -> None:
+            start = (453838000 / 1e7, 84733000 / 1e7)
+            assert (shown.latitude_deg, shown.longitude_deg) == pytest.approx(start, abs=1e-6)
+            assert shown.absolute_altitude_m == pytest.approx(131, abs=1)
+
+        await agrees(telemetry.subscribe_position(), position)
+        await agrees(telemetry.subscribe_attitude_euler(), attitude)
+        await agrees(telemetry.subscribe_velocity_ned(), velocity)
+        await agrees(telemetry.subscribe_battery(), battery, times=3)
+        await agrees(telemetry.subscribe_gps_info(), gps, times=3)
+        await telemetry.set_rate_home(1.0)
+        await agrees(telemetry.subscribe_home(), home, times=1)
+        for boxes, name in MAVSDK_MODES.items():
+            bench.board.set(f"boxes {boxes}")
+
+            def mode(shown: Any, name: str = name) -> None:
+                assert shown.name == name
+
+            await agrees(telemetry.subscribe_flight_mode(), mode, times=1)
+
+
+def shown_by(mavproxy: MavProxy, name: str) -> dict[str, float]:
+    """Return the fields of a message as MAVProxy's `status` prints them."""
+    mavproxy.type(f"status {name}")
+    printed = mavproxy.wait_for(f"{name} {{")
+    (line,) = re.findall(rf"{name} {{(.*)}}", printed)
+    fields = (field.split(" : ") for field in line.split(", ") if " : " in field)
+    return {key.strip(): float(value) for key, value in fields if re.fullmatch(r"[-\d.e+]+", value)}
+
+
+def test_mavproxy_shows_the_flight_as_it_is(bench: Bench, tmp_path: Path) -> None:
+    modules = "--default-modules=wp,param,arm,mode,fence,battery"
+    with MavProxy(tmp_path, bench.daemon.port, modules) as mavproxy:
+        bench.board.set("armed 1")
+        mavproxy.wait_for("ARMED")
+        for _ in range(5):
+            time.sleep(1)
+            check_position(bench, mavproxy)
+        hud, now = shown_by(mavproxy, "VFR_HUD"), truth(bench)
+        assert hud["groundspeed"] == pytest.approx(now["speed_ms"], abs=SPEED_MS)
+        assert degrees_between(hud["heading"], now["heading"]) <= DIRECTION_DEG
+        assert hud["throttle"] == 45
+        attitude, now = shown_by(mavproxy, "ATTITUDE"), truth(bench)
+        assert math.degrees(attitude["roll"]) == pytest.approx(now["roll"], abs=TILT_DEG)
+        assert math.degrees(attitude["pitch"]) == pytest.approx(-now["pitch"], abs=TILT_DEG)
+        battery = shown_by(mavproxy, "SYS_STATUS")["voltage_battery"] / 1000
+        assert battery == pytest.approx(truth(bench)["volts"], abs=VOLTAGE_V)
+        channels = shown_by(mavproxy, "RC_CHANNELS")
+        assert [channels[f"chan{number}_raw"] for number in range(1, 6)] == [1500, 1500, 1450, 1500, 2000]
+        for boxes, mode in ((1 << 2, "ALT_HOLD"), (1 << 7, "LOITER"), (1 << 6, "RTL"), (1 << 8, "AUTO"), (0, "ACRO")):
+            bench.board.set(f"boxes {boxes}")
+            mavproxy.wait_for(f"Mode {mode}")
+        printed = (tmp_path / "mavproxy.log").read_text()
+    assert not re.search("breach|fail|unhealthy", printed, re.IGNORECASE)
+
+
+def check_position(bench: Bench, mavproxy: MavProxy) -> None:
+    """MAVProxy asks for four a second; a busy machine may print late, so it may try again."""
+
+    def agrees_now() -> bool:
+        position, now = shown_by(mavproxy, "GLOBAL_POSITION_INT"), truth(bench)
+        near = metres_from(now, position["lat"] / 1e7, position["lon"] / 1e7) <= POSITION_M
+        high = abs(position["relative_alt"] / 1000 - now["height_m"]) <= HEIGHT_M
+        return near and high and degrees_between(position["hdg"] / 100, now["heading"]) <= DIRECTION_DEG
+
+    assert comes(agrees_now, seconds=3.0)
