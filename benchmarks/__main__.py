@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import structlog
 
-from benchmarks import forward, idle, push, resync, search, upload
+from benchmarks import forward, idle, push, resync, search, telemetry, upload
 from benchmarks.figure import Figure
 from benchmarks.report import keep_json, print_table
 
@@ -15,6 +15,7 @@ _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "push": push.measure,
     "upload": upload.measure,
     "idle": idle.measure,
+    "telemetry": telemetry.measure,
     "search": search.measure,
     "forward": forward.measure,
     "resync": resync.measure,

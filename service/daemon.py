@@ -98,8 +98,8 @@ class Daemon:
         bridge = self.bridge
         self._port.set_speed(bridge.speed)
         self._port.may_gather = bridge.is_passing_through
-        for data in bridge.take_fc_output():
-            self._port.write(data)
+        if output := bridge.take_fc_output():
+            self._port.write(b"".join(output))
         self._send_datagrams()
         for effect in bridge.take_store_effects():
             self._carry_out(effect)
