@@ -16,7 +16,8 @@ class Peer:
     key: Hashable
 
     def __str__(self) -> str:
-        return f"{self.link} {self.key}"
+        address = ":".join(str(part) for part in self.key[:2]) if isinstance(self.key, tuple) else str(self.key)
+        return f"{self.link} {address}"
 
 
 @dataclass(frozen=True, slots=True)
