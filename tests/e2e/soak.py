@@ -77,7 +77,7 @@ class Witness(threading.Thread):
             if time.monotonic() >= beat_due:
                 beat_due += 1.0
                 self._send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-                # The wish may have been lost with an earlier one's address.
+                # Each time: wishes are forgotten with a peer that others have displaced.
                 self._send(m.MAVLink_command_long_message(VEHICLE, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             if select.select([self._socket], [], [], 0.1)[0]:
                 data, extra, _, _ = self._socket.recvmsg(2048, 64)

@@ -15,7 +15,7 @@ from soak import Crowd, Meter, Stalls, Weather, Witness
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "0.5"))
 SEED = int(os.environ.get("SOAK_SEED", "1"))
-#: What Python may keep of what it had: its pools are seldom given back.
+#: SQLite's page cache fills up to 2 MB, and Python seldom gives back what it had.
 MEMORY_KB = 3000
 #: Each has its own way of arming.
 TELE_PROTS = (2, 0, 3, 1)
