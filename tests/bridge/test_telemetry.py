@@ -1,6 +1,7 @@
 """MSP polls become a living MAVLink vehicle: what is sent is what the craft does, and the line bears it."""
 
 import math
+import random
 from collections import Counter
 from itertools import pairwise
 
@@ -285,3 +286,19 @@ def test_telemetry_goes_on_beside_a_mission(baud: int) -> None:
     assert max(later - earlier for earlier, later in pairwise([began, *asked, world.now])) <= 0.5 + 2530 / baud
     assert 1 <= rate_hz(station, "ATTITUDE", seconds) <= 6
     world.assert_line_was_clean()
+
+
+def test_noise_on_the_line_is_no_telemetry_and_no_flight_controller() -> None:
+    world, station = flown(3)
+    world.power_off()
+    world.run(0.5)
+    noise = random.Random(5)
+    station.take()
+    found = len(world.events("fc.found"))
+    for _ in range(300):
+        world.hear(noise.randbytes(1000))
+        world.run(0.087)
+    assert len(world.events("fc.found")) == found
+    assert {message.get_type() for message in station.said()} <= {"HEARTBEAT", "MISSION_CURRENT", "STATUSTEXT"}
+    world.power_on()
+    world.wait_ready()
