@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from structlog.testing import capture_logs
 
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, key_from_passphrase, ticks
@@ -157,24 +158,24 @@ async def test_without_a_key_there_is_no_file(tmp_path: Path) -> None:
         "\xff",
     ],
 )
-async def test_a_damaged_file_is_told_and_replaced(
-    tmp_path: Path, content: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+async def test_a_damaged_file_is_told_and_replaced(tmp_path: Path, content: str) -> None:
     pi = Pi(tmp_path)
     pi.path.write_bytes(content.encode("latin-1"))
-    state = pi.boot()
-    assert signing(state).check(frame(ticks(NOON))) is Check.VALID
-    state.close()
+    with capture_logs() as told:
+        state = pi.boot()
+        assert signing(state).check(frame(ticks(NOON))) is Check.VALID
+        state.close()
     assert pi.stored()["timestamp"] == ticks(NOON)
-    assert "signing.state_lost" in capsys.readouterr().out
+    assert [entry["event"] for entry in told] == ["signing.state_lost"]
 
 
-async def test_a_disk_that_cannot_be_written_stops_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+async def test_a_disk_that_cannot_be_written_stops_nobody(tmp_path: Path) -> None:
     pi = Pi(tmp_path / "missing")
-    state = pi.boot()
-    assert signing(state).check(frame(ticks(NOON))) is Check.VALID
-    state.close()
-    assert "signing.state_not_stored" in capsys.readouterr().out
+    with capture_logs() as told:
+        state = pi.boot()
+        assert signing(state).check(frame(ticks(NOON))) is Check.VALID
+        state.close()
+    assert "signing.state_not_stored" in [entry["event"] for entry in told]
 
 
 async def test_the_file_is_nobody_elses_and_holds_no_key(tmp_path: Path) -> None:
