@@ -10,12 +10,16 @@ from collections import deque
 from dataclasses import dataclass
 
 from bridge.procedure import Send
+from protocols.frsky import FRSKY_SPEED
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from protocols.msp.hazards import is_clean
 
 #: Harakiri's ring less one heartbeat (25 bytes) that it may send of its own accord in AUTOSENSE, and some air.
 MAX_OUTSTANDING_BYTES = 224
+#: The same at the speed of FrSky telemetry, which an armed Harakiri puts into the ring as well: 13 bytes eight times a
+#: second, and with GPS, barometer and time up to 85. While these bytes leave the ring two of its frames may join them.
+_OUTSTANDING_BESIDE_FRSKY = 140
 MIN_TIMEOUT_S = 0.06
 MAX_TIMEOUT_S = 1.0
 #: BEGIN and COMMIT erase and write flash: 100 ms and more during which the board does nothing else.
@@ -58,6 +62,7 @@ class MspLink:
 
     def __init__(self, baud: int | None, now: float) -> None:
         self._byte_s = 10 / baud if baud else 0.0
+        self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
         self._parser = MspParser()
         self._waiting: deque[Send] = deque()
         self._sent: list[_Request] = []  # in the order in which they went out
@@ -106,7 +111,7 @@ class MspLink:
             return _ANY_SIZE
         if self._waiting or self._is_exclusive():
             return 0
-        return MAX_OUTSTANDING_BYTES - self.outstanding_bytes
+        return self._ring_size - self.outstanding_bytes
 
     def may_send(self, reply_size: int) -> bool:
         """Tell whether a request with such a reply may go out now."""
@@ -168,7 +173,7 @@ class MspLink:
         return any(sent.awaited and sent.exclusive for sent in self._sent)
 
     def _has_room(self, reply_size: int) -> bool:
-        return not self._sent or self.outstanding_bytes + reply_size <= MAX_OUTSTANDING_BYTES
+        return not self._sent or self.outstanding_bytes + reply_size <= self._ring_size
 
     def _flush(self, now: float) -> None:
         if self._resync_due and not self._is_exclusive() and self._has_room(_RESYNC_REPLY_SIZE):
