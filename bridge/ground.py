@@ -124,7 +124,7 @@ class Ground:
         return [frame for frame in frames if self._is_welcome(peer, frame, now)]
 
     def _is_welcome(self, peer: Peer, frame: MavlinkFrame, now: float) -> bool:
-        if frame.sysid == self._sysid:
+        if (frame.sysid, frame.compid) == (self._sysid, self._compid):
             # What we sent, come back: a broadcast, or a router that sends everything everywhere.
             return False
         station = Station(peer, frame.sysid, frame.compid)

@@ -24,12 +24,12 @@ class PassThrough:
 
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
-        self._aboard: set[int] = set()
+        self._aboard: set[tuple[int, int]] = set()
         self._heard: dict[tuple[int, int], set[Peer]] = {}
 
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
         """Send the autopilot's frames on."""
-        self._aboard.add(frames[0].sysid)
+        self._aboard.add((frames[0].sysid, frames[0].compid))
         for_all = without_target(frames)
         if for_all is not None:
             self._send(for_all)
@@ -39,18 +39,22 @@ class PassThrough:
 
     def is_aboard(self, system: int) -> bool:
         """Tell whether a system was heard on the autopilot's side."""
-        return system in self._aboard
+        return any(system == sysid for sysid, _ in self._aboard)
 
     def from_station(self, peer: Peer, frame: MavlinkFrame) -> bool:
         """Send a frame that the guard has let in on to other stations; tell whether it is for the autopilot, too."""
-        self._heard.setdefault((frame.sysid, frame.compid), set()).add(peer)
+        speaker = frame.sysid, frame.compid
+        if speaker in self._aboard:
+            # The autopilot's own frame, come back by a router that sends everything everywhere.
+            return False
+        self._heard.setdefault(speaker, set()).add(peer)
         system, component = target_of(frame)
         if system == 0:
             self._ground.forward([frame.raw], [other for other in self._ground.everyone() if other != peer])
             return True
         others = [other for other in self._peers_of(system, component) if other != peer]
         self._ground.forward([frame.raw], others)
-        return system in self._aboard or not others
+        return self.is_aboard(system) or not others
 
     def forget(self, peer: Peer) -> None:
         """A ground station is gone."""
@@ -67,7 +71,7 @@ class PassThrough:
         return [peer for peer in self._ground.peers() if peer in found]
 
     def _send_alone(self, frame: MavlinkFrame) -> None:
-        self._aboard.add(frame.sysid)
+        self._aboard.add((frame.sysid, frame.compid))
         if frame.msgid == _NEVER_FORWARDED:
             return
         system, component = target_of(frame)

@@ -218,3 +218,17 @@ def test_a_false_header_does_not_hold_back_a_slow_stream() -> None:
     assert world.events("fc.lost") == []
     assert station.frames_heard == autopilot.sent
     assert len(autopilot.sent) >= 5
+
+
+def test_a_companion_of_the_autopilots_own_system_is_heard_and_echoes_are_not() -> None:
+    world, autopilot, (one, _) = passing()
+    companion = GroundStation(world, "companion", sysid=1, compid=191)
+    companion.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+    world.run(0.1)
+    assert bytes(autopilot.received)
+    assert one.said("HEARTBEAT")[-1].get_srcComponent() == 191
+    autopilot.received.clear()
+    world.run(2)
+    world.spoken_by(one, autopilot.sent[-1])
+    world.run(0.1)
+    assert bytes(autopilot.received) == b""
