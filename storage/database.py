@@ -140,7 +140,8 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
     """Make commits durable and bring the file to this release's schema."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")  # NORMAL would lose the last commits in a power cut
-    connection.execute("PRAGMA cache_size = -256")  # KiB: the 2 MB that are the default would be the daemon's largest part
+    # KiB. The 2 MB of the default would be a part of the daemon that grows with every mission.
+    connection.execute("PRAGMA cache_size = -256")
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     # A file that may not be written is found now, not when a mission comes. Rolled back, it costs no space.
     connection.executescript(f"BEGIN; PRAGMA user_version = {version}; ROLLBACK")
