@@ -113,10 +113,6 @@ class MspLink:
             return 0
         return self._ring_size - self.outstanding_bytes
 
-    def may_send(self, reply_size: int) -> bool:
-        """Tell whether a request with such a reply may go out now."""
-        return reply_size <= self.room
-
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""
         if not is_clean(message.frame):

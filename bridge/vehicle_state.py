@@ -42,7 +42,7 @@ class Fix(IntEnum):
 
 @dataclass(slots=True)
 class VehicleState:
-    """The latest of everything. `gps_at` and the like are not kept: a lost link clears the state as a whole."""
+    """The latest of everything. When it was heard is not kept: a lost link clears the state as a whole."""
 
     mixer: int | None = None
     armed: bool | None = None
