@@ -51,7 +51,7 @@ class MissionPlanner:
         address: tuple[str, int],
         *,
         listen: bool = False,
-        pace: float = 0.3,
+        pace: float = 1.0,
         appetite: float = 0.0,
         seed: float = 0,
         mavlink_1_only: bool = False,

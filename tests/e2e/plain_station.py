@@ -23,10 +23,16 @@ class PlainStation:
     `heard` has what came but was not waited for, too.
     """
 
-    def __init__(self, connection: socket.socket, dialect: ModuleType | None = None, sysid: int = SYSID) -> None:
+    def __init__(
+        self,
+        connection: socket.socket,
+        dialect: ModuleType | None = None,
+        sysid: int = SYSID,
+        compid: int = COMPID,
+    ) -> None:
         self._socket = connection
         self._dialect: Any = dialect or v20
-        self._codec = self._dialect.MAVLink(None, srcSystem=sysid, srcComponent=COMPID)
+        self._codec = self._dialect.MAVLink(None, srcSystem=sysid, srcComponent=compid)
         self._codec.robust_parsing = True
         self.heard: list[Any] = []
 
@@ -107,11 +113,13 @@ class PlainStation:
                     yield message
 
 
-def udp_station(address: tuple[str, int], dialect: ModuleType | None = None, sysid: int = SYSID) -> PlainStation:
+def udp_station(
+    address: tuple[str, int], dialect: ModuleType | None = None, sysid: int = SYSID, compid: int = COMPID
+) -> PlainStation:
     """A station that speaks to a daemon's udpin."""
     connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     connection.connect(address)
-    return PlainStation(connection, dialect, sysid)
+    return PlainStation(connection, dialect, sysid, compid)
 
 
 def tcp_station(port: int) -> PlainStation:

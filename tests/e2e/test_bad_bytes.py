@@ -170,9 +170,9 @@ def test_messages_for_others_change_nothing(shared: Bench, kept: list[str]) -> N
     assert shared.board.records() == kept
 
 
-def test_a_vehicle_with_our_own_number_is_not_obeyed(shared: Bench, kept: list[str]) -> None:
+def test_a_vehicle_with_our_own_numbers_is_not_obeyed(shared: Bench, kept: list[str]) -> None:
     """An echo of our own messages looks like this, too."""
-    with udp_station(shared.daemon.address, sysid=1) as echo, udp_station(shared.daemon.address) as station:
+    with udp_station(shared.daemon.address, sysid=1, compid=1) as echo, udp_station(shared.daemon.address) as station:
         echo.say_hello()
         echo.send(messages.MAVLink_mission_clear_all_message(1, 1, 0))
         echo.announce(12)
