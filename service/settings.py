@@ -11,6 +11,7 @@ from bridge.fc_session import Autopilot
 from service.bounded_file import read_bounded
 from service.connection import AddressError, FcAddress, GcsAddress, parse_fc, parse_gcs
 from service.write_access import WriteAccess, parse_link
+from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError, parse_zenoh
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
 DEFAULT_SYSID = 1
@@ -34,7 +35,8 @@ class TlogLimits:
 class Settings:
     """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
 
-    `access`: who may write over a link, by its address as text; over others everyone may.
+    `access`: who may write over a link, by its address as text; over others everyone may. `zenoh` None: it is not
+    joined.
     """
 
     fc: FcAddress
@@ -46,10 +48,17 @@ class Settings:
     record_uart: Path | None = None
     autopilot: Autopilot = Autopilot.AUTO
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
+    zenoh: ZenohSettings | None = None
 
 
 _MAX_CONFIG_BYTES = 1 << 20
-_IN_WORDS = {str: "text in quotes", int: "a whole number", bool: "true or false", list: "a list in brackets"}
+_IN_WORDS = {
+    str: "text in quotes",
+    int: "a whole number",
+    bool: "true or false",
+    list: "a list in brackets",
+    dict: "a table",
+}
 
 #: Keys of the configuration file: name -> (type, what it is).
 _KEYS: dict[str, tuple[type, str]] = {
@@ -64,6 +73,7 @@ _KEYS: dict[str, tuple[type, str]] = {
     "tlog_days": (int, "how many days a telemetry log is kept, 1..3650"),
     "record_uart": (str, "file to record the UART into"),
     "autopilot": (str, "whose MAVLink is heard on the port: auto, harakiri or other"),
+    "zenoh": (dict, "table of zenoh's settings"),
 }
 
 
@@ -92,6 +102,8 @@ def load_settings(
         return _put_together(flags, {}, Path())
     try:
         return _put_together(flags, _read_config(config), config.parent)
+    except ZenohSettingsError as error:
+        raise SettingsError(f"{config}: {error}") from error
     except (AddressError, SettingsError) as error:
         raise type(error)(f"{config}: {error}") from error
 
@@ -121,7 +133,12 @@ def _put_together(flags: _Flags, values: dict[str, object], folder: Path) -> Set
         autopilot=_autopilot(values.get("autopilot", Autopilot.AUTO.value)),
         # A link that is named by a flag, too, stays as safe as the file says.
         access={str(address): access for address, access in links.items() if not access.is_open},
+        zenoh=_zenoh(values.get("zenoh"), folder),
     )
+
+
+def _zenoh(table: object, folder: Path) -> ZenohSettings | None:
+    return parse_zenoh(table, folder) if isinstance(table, dict) else None
 
 
 def _links(entries: object, folder: Path) -> dict[GcsAddress, WriteAccess]:

@@ -1,0 +1,107 @@
+"""What is known of a vehicle, in groups with a name for each value: for zenoh, the web page and the command line.
+
+None means "not known". The notes beside the fields are part of the published schemas (service/zenoh_link/schemas).
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """How the vehicle is turned."""
+
+    roll_deg: Annotated[float | None, "right side down is positive"] = None
+    pitch_deg: Annotated[float | None, "nose up is positive"] = None
+    heading_deg: Annotated[float | None, "0 up to 360, clockwise from north; only with a compass"] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where the vehicle is; all of it only while the receiver has a fix, but for height and climb."""
+
+    lat_deg: Annotated[float | None, "WGS 84"] = None
+    lon_deg: Annotated[float | None, "WGS 84"] = None
+    altitude_m: Annotated[float | None, "above the sea, by GPS"] = None
+    height_m: Annotated[float | None, "above the place of the launch, as the flight controller estimates it"] = None
+    climb_m_s: Annotated[float | None, "upwards is positive"] = None
+    north_m_s: Annotated[float | None, "speed over ground, northward part"] = None
+    east_m_s: Annotated[float | None, "speed over ground, eastward part"] = None
+    home_lat_deg: Annotated[float | None, "home: where the vehicle took off"] = None
+    home_lon_deg: Annotated[float | None, "home: where the vehicle took off"] = None
+    home_distance_m: Annotated[float | None, "way to home"] = None
+    home_direction_deg: Annotated[float | None, "direction of home, clockwise from north"] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Gps:
+    """What the satellite receiver says of itself."""
+
+    fix: Annotated[str | None, "none, 2D or 3D"] = None
+    satellites: Annotated[int | None, "how many are used"] = None
+    hdop: Annotated[float | None, "horizontal dilution of precision"] = None
+    ground_speed_m_s: Annotated[float | None, "speed over ground"] = None
+    course_deg: Annotated[float | None, "direction of the movement, clockwise from north"] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """What is measured of the battery."""
+
+    voltage_v: float | None = None
+    current_a: float | None = None
+    drawn_mah: Annotated[int | None, "since the flight controller was switched on"] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Rc:
+    """What comes from the pilot's transmitter."""
+
+    channels_us: Annotated[tuple[int, ...] | None, "pulse widths: roll, pitch, throttle, yaw, then aux 1.."] = None
+    rssi_percent: Annotated[float | None, "strength of the received signal"] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How the flight controller is."""
+
+    armed: bool | None = None
+    mode: Annotated[str | None, "ACRO, STABILIZE, ALT_HOLD, LOITER, RTL or AUTO; an autopilot's own: its number"] = None
+    sensors: Annotated[tuple[str, ...] | None, "what is on board and answers"] = None
+    cycle_time_us: Annotated[int | None, "one turn of its main loop"] = None
+    i2c_errors: Annotated[int | None, "failed talks with a sensor since its start"] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """How the bridge and its flight controller get on."""
+
+    state: Annotated[str, "no port, searching, identifying, MSP, MAVLink or FrSky"]
+    flight_controller: Annotated[str | None, "who it is"] = None
+    speed_baud: Annotated[int | None, "speed of the port"] = None
+    round_trip_ms: Annotated[float | None, "from a question to its answer"] = None
+    requests_lost: Annotated[int | None, "questions without an answer since it was found"] = None
+    bad_checksums: Annotated[int | None, "damaged answers since it was found"] = None
+    ground_stations: Annotated[tuple[str, ...], "who is heard over MAVLink"] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class MissionIdentity:
+    """Which mission the flight controller holds."""
+
+    count: Annotated[int, "records, home included; 0: none"]
+    checksum: Annotated[str, "CRC-32 over the records, 8 hexadecimal digits"]
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleReport:
+    """All groups together."""
+
+    attitude: Attitude
+    position: Position
+    gps: Gps
+    battery: Battery
+    rc: Rc
+    status: Status
+    link: Link
+    mission: MissionIdentity | None
