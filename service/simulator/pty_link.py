@@ -1,8 +1,10 @@
 """A simulated board on a pseudo-terminal that looks like a serial port, speed included."""
 
 import asyncio
+import fcntl
 import os
 import re
+import struct
 import termios
 import tty
 from pathlib import Path
@@ -14,6 +16,8 @@ _BAUD_BY_CODE = {getattr(termios, name): int(name[1:]) for name in dir(termios) 
 _CODE_BY_BAUD = {baud: code for code, baud in _BAUD_BY_CODE.items()}
 _INPUT_SPEED, _OUTPUT_SPEED = 4, 5
 _TERMINALS = Path("/dev/pts")
+#: struct flock: the whole file, for writing. Not flock(2), with which a client takes the port for itself.
+_WHOLE_FILE = struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
 
 
 class PlugError(Exception):
@@ -36,10 +40,12 @@ class PtyLink:
     def plug(self) -> None:
         """Make the terminal and the link. PlugError if something is in the way or it cannot be made.
 
-        Only a link to a terminal is replaced: a simulator that was killed left it behind.
+        Only a link to a terminal of no living simulator is replaced: one that was killed left it behind.
         """
         if self._pump:
             return
+        if self._is_anothers():
+            raise PlugError(f"{self._path} is a running simulator's: stop that one, or name another --link")
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
         self._set_speed(self._board.baud)
@@ -47,6 +53,7 @@ class PtyLink:
         try:
             if self._leads_to().parent == _TERMINALS:
                 self._path.unlink()
+            _lock(self._far)
             self._path.symlink_to(os.ttyname(self._far))
         except OSError as error:
             self._close()
@@ -75,6 +82,22 @@ class PtyLink:
     def _leads_to(self) -> Path:
         return self._path.readlink() if self._path.is_symlink() else self._path
 
+    def _is_anothers(self) -> bool:
+        """Tell whether the terminal behind the link is that of a simulator that runs; numbers are given out again."""
+        if self._leads_to().parent != _TERMINALS:
+            return False
+        try:
+            terminal = os.open(self._path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError:
+            return False
+        try:
+            _lock(terminal)
+        except BlockingIOError:
+            return True
+        finally:
+            os.close(terminal)
+        return False
+
     def _close(self) -> None:
         os.close(self._near)
         os.close(self._far)
@@ -86,3 +109,8 @@ class PtyLink:
 
     def _far_baud(self) -> int:
         return _BAUD_BY_CODE.get(termios.tcgetattr(self._near)[_OUTPUT_SPEED], 0)
+
+
+def _lock(terminal: int) -> None:
+    """Mark a terminal as a simulator's for as long as it is open. BlockingIOError if it is another one's."""
+    fcntl.fcntl(terminal, fcntl.F_OFD_SETLK, _WHOLE_FILE)

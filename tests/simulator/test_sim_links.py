@@ -228,7 +228,25 @@ def test_a_link_that_a_killed_one_left_behind_is_replaced(start: Callable[..., S
 
 
 def test_a_link_that_another_one_has_taken_over_is_left_to_it(start: Callable[..., Simulator]) -> None:
-    first, second = start(), start()
+    first = start()
+    first.link.unlink()
+    second = start()
     second_terminal = second.link.readlink()
     assert first.end() == 0
     assert second.link.readlink() == second_terminal
+
+
+def test_a_second_one_leaves_the_link_of_a_running_one_alone(start: Callable[..., Simulator], tmp_path: Path) -> None:
+    first = start()
+    with serial.Serial(str(first.link), 115200, timeout=PATIENCE, exclusive=True) as port:
+        program = "from service.simulator.command import sim; sim()"
+        second = subprocess.run(
+            [sys.executable, "-c", program, "--link", str(first.link)], capture_output=True, text=True, timeout=PATIENCE
+        )
+        assert second.returncode == 1
+        assert f"{first.link} is a running simulator's" in second.stderr
+        assert "Traceback" not in second.stderr
+        # A look at the lock does not take it away.
+        again = subprocess.run([sys.executable, "-c", program, "--link", str(first.link)], timeout=PATIENCE)
+        assert again.returncode == 1
+        assert ask(port, IDENT) is not None
