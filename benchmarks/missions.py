@@ -2,7 +2,7 @@
 
 import random
 
-from bridge.mission_records import items_from_records
+from bridge.harakiri_records import items_from_records
 from protocols.mission_item import MissionItem
 from protocols.wp_record import WpCommand, WpRecord
 

@@ -21,7 +21,8 @@ from pathlib import Path
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import BenchmarkError, free_udp_port, simulated_naze
-from bridge.mission_check import RuleProfile, check_list
+from bridge.harakiri_check import HarakiriRules
+from bridge.mission_check import check_list
 from bridge.mission_dialect import PushResult
 from bridge.procedure import Procedure, Send
 from protocols.msp.mission import MissionCommand
@@ -67,7 +68,7 @@ async def _push_all(link: Path) -> list[float]:
 
 
 def _records(seed: int) -> tuple[WpRecord, ...]:
-    records = check_list(random_mission(seed), RuleProfile()).records
+    records = check_list(random_mission(seed), HarakiriRules()).records
     assert len(records) == COUNT
     return records
 
@@ -78,7 +79,7 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     dialect = daemon.bridge.desk.dialect
     assert dialect is not None
     begun_at: list[float] = []
-    done: asyncio.Future[tuple[PushResult | None, float]] = loop.create_future()
+    done: asyncio.Future[tuple[PushResult[WpRecord] | None, float]] = loop.create_future()
     push = _noting_first_chunk(dialect.push(records, lambda _: None), lambda: begun_at.append(loop.time()))
     daemon.bridge.runner.start(push, lambda result, _: done.set_result((result, loop.time())), loop.time())
     daemon.flush()
@@ -88,7 +89,9 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     return ended_at - begun_at[0]
 
 
-def _noting_first_chunk(push: Procedure[PushResult], note: Callable[[], None]) -> Procedure[PushResult]:
+def _noting_first_chunk(
+    push: Procedure[PushResult[WpRecord]], note: Callable[[], None]
+) -> Procedure[PushResult[WpRecord]]:
     """Pass the conversation through, and call `note` when its first CHUNK comes by."""
     noted = False
     effect = next(push)
@@ -100,5 +103,5 @@ def _noting_first_chunk(push: Procedure[PushResult], note: Callable[[], None]) -
         try:
             effect = push.send(answer)
         except StopIteration as stop:
-            result: PushResult = stop.value
+            result: PushResult[WpRecord] = stop.value
             return result

@@ -4,8 +4,8 @@ The service feeds bytes, time and the store's answers in, and afterwards takes w
 A byte's way from the UART:
     fc_received -> FcSession -> MspLink -> VehicleState -> OwnVehicle -> Ground -> take_datagrams
 A mission item's way to the flight controller, and back for the proof:
-    gcs_received -> Ground -> Guard -> Inbox -> MissionUploads -> MissionCheck
-        -> MissionDesk.deliver -> HarakiriMissions.push -> MspLink
+    gcs_received -> Ground -> Guard -> Inbox -> MissionUploads -> ListCheck
+        -> MissionDesk.deliver -> MissionDialect.push -> MspLink
 An autopilot that speaks MAVLink for itself is not represented but passed through, both ways:
     FcSession <-> PassThrough <-> Ground
 """
@@ -16,19 +16,18 @@ from functools import partial
 from math import inf
 
 from bridge.commands import Commands
+from bridge.dialects import Surroundings, dialect_of
 from bridge.fc_actions import FcActions
 from bridge.fc_session import Autopilot, FcSession
 from bridge.flight_controller import FlightController, Kind
 from bridge.ground import Ground, Tap
 from bridge.guard import Guard, LinkAccess, Refused, denial
-from bridge.harakiri import HarakiriMissions
-from bridge.harakiri_mavlink import HarakiriMavlinkMissions
 from bridge.harakiri_relay import HarakiriRelay
 from bridge.inbox import Inbox
 from bridge.journal import Journal
 from bridge.mission_check import check_list
 from bridge.mission_desk import Delivery, HeldMission, MissionDesk, Refusal
-from bridge.mission_dialect import MissionDialect, StoreReport
+from bridge.mission_dialect import StoreReport
 from bridge.mission_download import MissionDownloads
 from bridge.mission_log import ArrivedMission
 from bridge.mission_upload import MissionUploads
@@ -203,7 +202,7 @@ class Bridge:
             report: StoreReport | Refusal = yield from self.desk.preflight()
             if isinstance(report, Refusal):
                 return report
-            verdict = check_list(items, report.profile, self._vehicle.home())
+            verdict = check_list(items, report.rules, self._vehicle.home())
             arrived.append(ArrivedMission(source, tuple(items), verdict))
             return (yield from self.desk.deliver(arrived[0], on_progress))
 
@@ -285,11 +284,8 @@ class Bridge:
         return system in (0, self._config.sysid) and component in (0, self._config.compid)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
-        dialect: MissionDialect | None = None
-        if controller is not None and controller.info is not None:
-            dialect = HarakiriMissions(controller.info, self._config.takeoff_max_m)
-        elif controller is not None and controller.kind is Kind.HARAKIRI_MAVLINK:
-            dialect = HarakiriMavlinkMissions(self._is_armed, self._config.takeoff_max_m)
+        around = Surroundings(self._is_armed, self._config.takeoff_max_m)
+        dialect = None if controller is None else dialect_of(controller, around)
         self.desk.controller_changed(controller, dialect)
         self._downloads.forget_all()
         if controller is None:

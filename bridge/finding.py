@@ -59,3 +59,8 @@ class Rejection:
 
     ack: MissionResult
     finding: Finding
+
+
+def reject(ack: MissionResult, seq: int | None, name: str, was: float | None, why: str) -> Rejection:
+    """Make a rejection of the list because of item `seq`."""
+    return Rejection(ack, Finding(seq, name, was, REJECTED, why))

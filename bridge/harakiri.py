@@ -1,14 +1,17 @@
 """Harakiri with the mission extension: docs/msp-mission.md, the companion's side."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from bridge.mission_check import RuleProfile
+from bridge.harakiri_check import HarakiriRules
+from bridge.harakiri_records import items_from_records
 from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from bridge.procedure import LinkLost, Procedure, ask, ask_surely, pause, receive, send
+from protocols.mission_item import MissionItem
+from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
 from protocols.msp.frame import MspFrame
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Status, Stored
-from protocols.wp_record import RECORD_SIZE, ListIdentity, WpRecord, identify
+from protocols.wp_record import RECORD_SIZE, WpRecord
 
 _SHORT_REPLY_SIZE = 7
 #: A read asks for no more than this, so that two replies fit the flight controller's send ring.
@@ -76,10 +79,10 @@ class HarakiriMissions:
             state = StoreState.BUSY
         else:
             state = StoreState.READY
-        profile = RuleProfile(info.capacity, info.wp_radius_cm, self._takeoff_max_m)
-        return StoreReport(state, profile, info.stored)
+        rules = HarakiriRules(info.capacity, info.wp_radius_cm, self._takeoff_max_m)
+        return StoreReport(state, rules, info.stored)
 
-    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult]:
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult[WpRecord]]:
         """Put the list there: BEGIN, CHUNKs in a window, COMMIT; proven by the checksum over the flash."""
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER
@@ -118,6 +121,10 @@ class HarakiriMissions:
             if records is not None and identify(records) == info.stored:
                 return records
         return None
+
+    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """Return what a ground station reads of a list."""
+        return tuple(items_from_records(records, sent_as))
 
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
         """Set gps_wp_radius, 0..2000 cm; INFO tells what came of it, and not a late answer to another value."""

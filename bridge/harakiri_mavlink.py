@@ -9,13 +9,13 @@ A written list is read back, item by item. Single precision holds a coordinate t
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from bridge.mission_check import RuleProfile
+from bridge.harakiri_check import HarakiriRules
+from bridge.harakiri_records import items_from_records
+from bridge.harakiri_rules import MAV_COMMANDS
 from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from bridge.mission_records import items_from_records
-from bridge.mission_rules import MAV_COMMANDS
 from bridge.procedure import Await, LinkLost, Procedure, Transmit, pause
 from protocols.float32 import neighbours, single
 from protocols.mavlink.codec import MavlinkDecoder, pack
@@ -60,14 +60,14 @@ class HarakiriMavlinkMissions:
 
     def __init__(self, is_armed: Callable[[], bool | None], takeoff_max_m: int) -> None:
         self._is_armed = is_armed
-        self._profile = RuleProfile(takeoff_max_m=takeoff_max_m)
+        self._rules = HarakiriRules(takeoff_max_m=takeoff_max_m)
         self._decoder = MavlinkDecoder()
         self._known: tuple[WpRecord, ...] | None = None
 
     @property
     def wp_radius_cm(self) -> int:
         """Harakiri's default: its own value cannot be asked for here."""
-        return self._profile.wp_radius_cm
+        return self._rules.wp_radius_cm
 
     def report(self) -> Procedure[StoreReport | None]:
         """Tell whether it would take a list; what it holds is not known without reading it."""
@@ -75,9 +75,9 @@ class HarakiriMavlinkMissions:
         armed = self._is_armed()
         if armed is None:
             return None
-        return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._profile, None)
+        return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules, None)
 
-    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult]:
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult[WpRecord]]:
         """Write the list and read it back."""
         wanted = tuple(as_stored(record) for record in records)
         items = [_message(seq, item) for seq, item in enumerate(items_from_records(wanted))] or _NOTHING
@@ -108,6 +108,10 @@ class HarakiriMavlinkMissions:
     def pull(self) -> Procedure[tuple[WpRecord, ...] | None]:
         """Read the list that is there."""
         return (yield from self._read(self._known or ()))
+
+    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """Return what a ground station reads of a list."""
+        return tuple(items_from_records(records, sent_as))
 
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
         """Harakiri knows the parameter by another name and scale; it is not set from here."""

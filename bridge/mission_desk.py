@@ -5,14 +5,15 @@ Mission Planner over UDP (bridge.mission_upload, bridge.mission_download) and th
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from bridge.flight_controller import FlightController, Kind
-from bridge.mission_check import Result, items_from_records
-from bridge.mission_dialect import MissionDialect, PushFailure, StoreReport, StoreState
+from bridge.mission_dialect import AnyDialect, PushFailure, StoreReport, StoreState
 from bridge.mission_log import ArrivedMission, Conclusion, Outcome
 from bridge.procedure import LinkLost, Procedure, conclude, pause, recall, save
+from bridge.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.wp_record import ListIdentity, WpRecord, identify
+from protocols.mission_record import ListIdentity, identify
 
 #: mission-rules.md, "a flash write is still running": wait for it up to 1 s.
 _BUSY_PATIENCE_S = 1.0
@@ -41,7 +42,7 @@ class HeldMission:
     """The list that the flight controller holds, as it was read from there."""
 
     identity: ListIdentity
-    records: tuple[WpRecord, ...]
+    records: tuple[Any, ...]
     items: tuple[MissionItem, ...]
 
 
@@ -60,19 +61,19 @@ class MissionDesk:
     """Holds the lock of the one transfer, the dialect of the present flight controller, and the list it holds."""
 
     def __init__(self) -> None:
-        self._dialect: MissionDialect | None = None
+        self._dialect: AnyDialect | None = None
         self._refusal = _NO_LINK
         self._owner: object | None = None
         self.held: HeldMission | None = None
 
-    def controller_changed(self, controller: FlightController | None, dialect: MissionDialect | None) -> None:
+    def controller_changed(self, controller: FlightController | None, dialect: AnyDialect | None) -> None:
         """Work with another flight controller, or with none."""
         self._dialect = dialect
         self._refusal = _NO_LINK if controller is None else _REASONS.get(controller.kind, _NO_LINK)
         self.held = None
 
     @property
-    def dialect(self) -> MissionDialect | None:
+    def dialect(self) -> AnyDialect | None:
         """How the present flight controller stores missions; None if it does not."""
         return self._dialect
 
@@ -137,7 +138,7 @@ class MissionDesk:
             self.held = HeldMission(
                 identify(result.held),
                 result.held,
-                tuple(items_from_records(result.held, verdict.roi_commands)),
+                dialect.items(result.held, verdict.sent_as),
             )
         if verdict.result is not Result.CLEARED:
             text = f"Mission verified: {len(verdict.records)} records" + (", unchanged" if result.unchanged else "")
@@ -170,8 +171,8 @@ class MissionDesk:
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:
             return self.held
-        roi_commands: Mapping[int, int] = yield from recall(identity)
-        held = HeldMission(identity, records, tuple(items_from_records(records, roi_commands)))
+        sent_as: Mapping[int, int] = yield from recall(identity)
+        held = HeldMission(identity, records, dialect.items(records, sent_as))
         if dialect is self._dialect:
             # The store may take its time, and another flight controller be there by then.
             self.held = held

@@ -1,17 +1,19 @@
 """The seam between missions and the flight controllers that store them.
 
-A dialect is one kind of flight controller: how a list is put there, proven and read back.
+A dialect is one kind of flight controller: by which rules a list is judged, how it is put there, proven and read back.
 `bridge.harakiri` and `bridge.harakiri_mavlink` are two.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import Any, Generic, Protocol
 
-from bridge.mission_check import RuleProfile
+from bridge.mission_check import MissionRules
 from bridge.procedure import Procedure
-from protocols.wp_record import ListIdentity, WpRecord
+from bridge.verdict import RecordT
+from protocols.mission_item import MissionItem
+from protocols.mission_record import ListIdentity
 
 
 class StoreState(Enum):
@@ -27,7 +29,7 @@ class StoreReport:
     """What the flight controller says of its mission store. `stored` None: not known without reading the list."""
 
     state: StoreState
-    profile: RuleProfile
+    rules: MissionRules
     stored: ListIdentity | None
 
 
@@ -45,7 +47,7 @@ class PushFailure(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class PushResult:
+class PushResult(Generic[RecordT]):
     """`failure` is None when the list was proven there. `unchanged`: it was there already.
 
     `held`: what is there, if the flight controller could not take the records exactly.
@@ -53,28 +55,35 @@ class PushResult:
 
     failure: PushFailure | None
     unchanged: bool = False
-    held: tuple[WpRecord, ...] | None = None
+    held: tuple[RecordT, ...] | None = None
 
 
 #: Called with the number of records that the flight controller has.
 PushProgress = Callable[[int], None]
 
 
-class MissionDialect(Protocol):
+class MissionDialect(Protocol[RecordT]):
     """What the bridge asks of a flight controller that stores missions."""
 
     @property
-    def wp_radius_cm(self) -> int:
-        """The least hit radius as last heard, cm."""
+    def wp_radius_cm(self) -> int | None:
+        """The least hit radius as last heard, cm; None if it cannot be known or set."""
 
     def report(self) -> Procedure[StoreReport | None]:
         """Ask the flight controller; None if it does not answer."""
 
-    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult]:
+    def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Procedure[PushResult[RecordT]]:
         """Put the list there and prove it. The empty list clears."""
 
-    def pull(self) -> Procedure[tuple[WpRecord, ...] | None]:
-        """Read the list that is there, checked against its checksum; None if that fails."""
+    def pull(self) -> Procedure[tuple[RecordT, ...] | None]:
+        """Read the list that is there, and make sure that it was read right; None if that fails."""
+
+    def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """Return what a ground station reads of a list, home first; `sent_as` is remembered from when it was sent."""
 
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
         """Set gps_wp_radius, 0..2000 cm; the value in force, None if there was no answer."""
+
+
+#: Whatever the present flight controller is.
+AnyDialect = MissionDialect[Any]

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
-from bridge.mission_check import Verdict
+from bridge.verdict import Verdict
 from protocols.mission_item import MissionItem
 
 
@@ -23,7 +24,7 @@ class ArrivedMission:
 
     source: str
     items: tuple[MissionItem, ...]
-    verdict: Verdict
+    verdict: Verdict[Any]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,14 +7,17 @@ below is so because of that, and clients.md says which of its habits it answers.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
+from bridge.finding import Finding
 from bridge.journal import Journal
-from bridge.mission_check import Finding, MissionCheck, Result, RuleProfile, Verdict, check_count, check_list
+from bridge.mission_check import ListCheck, check_count
 from bridge.mission_desk import ARMED, Delivery, MissionDesk, Refusal
 from bridge.mission_dialect import StoreReport
 from bridge.mission_log import ArrivedMission
 from bridge.runner import Runner
 from bridge.station import Peer, Post, Severity, Station
+from bridge.verdict import CLEARED_LIST, Result, Verdict
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
@@ -43,7 +46,7 @@ class _Transfer:
     station: Station
     count: int
     phase: Phase = Phase.ASKING
-    check: MissionCheck | None = None
+    check: ListCheck | None = None
     items: dict[int, MissionItem] = field(default_factory=dict)
     checked: int = 0  # items 0..checked-1 are there and have been checked
     progress_at: float = 0.0
@@ -127,7 +130,7 @@ class MissionUploads:
             self._refuse(station, count, refusal, now)
             return
         if count == 0:
-            self._deliver(_Transfer(station, 0), check_list((), RuleProfile()), (), now)
+            self._deliver(_Transfer(station, 0), CLEARED_LIST, (), now)
             return
         self._transfer = _Transfer(station, count)
         if not self._is_asking:
@@ -256,11 +259,11 @@ class MissionUploads:
         if isinstance(answer, Refusal):
             self._abandon(transfer, answer, now)
             return
-        rejection = check_count(transfer.count, answer.profile)
+        rejection = check_count(transfer.count, answer.rules)
         if rejection is not None:
             self._abandon(transfer, Refusal(rejection.ack, rejection.finding.text()), now)
             return
-        transfer.check = MissionCheck(answer.profile, transfer.count, self._fallback_home())
+        transfer.check = answer.rules.begin(transfer.count, self._fallback_home())
         transfer.phase = Phase.RECEIVING
         transfer.progress_at = now
         self._journal("info", "mission.upload_started", station=str(transfer.station), count=transfer.count)
@@ -335,7 +338,7 @@ class MissionUploads:
         items = tuple(transfer.items[seq] for seq in sorted(transfer.items))
         self._deliver(transfer, transfer.check.finish(), items, now)
 
-    def _deliver(self, transfer: _Transfer, verdict: Verdict, items: tuple[MissionItem, ...], now: float) -> None:
+    def _deliver(self, transfer: _Transfer, verdict: Verdict[Any], items: tuple[MissionItem, ...], now: float) -> None:
         self._transfer = transfer
         transfer.phase = Phase.DELIVERING
         # The finding that rejects a list is said once, as the error that ends it.
@@ -377,7 +380,7 @@ class MissionUploads:
         if transfer.items:
             items = tuple(transfer.items[seq] for seq in sorted(transfer.items))
             finding = Finding(None, "list", len(items), None, refusal.text)
-            verdict = Verdict(Result.REJECTED, refusal.ack, (), (), (finding,), {})
+            verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
             arrived = ArrivedMission(str(transfer.station), items, verdict)
             self._runner.start(self._desk.deliver(arrived, _ignore), lambda _delivery, _at: None, now)
         self._end(now)

@@ -39,7 +39,7 @@ class Parameters:
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered by the value that is in force then, as the protocol wants."""
         dialect = self._desk.dialect
-        if name != WP_RADIUS or dialect is None:
+        if name != WP_RADIUS or dialect is None or dialect.wp_radius_cm is None:
             self._send(station, name)
             return
         if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
@@ -69,8 +69,9 @@ class Parameters:
 
     def _values(self) -> dict[str, float]:
         values = {SYSID: float(self._sysid)}
-        if self._desk.dialect is not None:
-            values[WP_RADIUS] = float(self._desk.dialect.wp_radius_cm)
+        dialect = self._desk.dialect
+        if dialect is not None and dialect.wp_radius_cm is not None:
+            values[WP_RADIUS] = float(dialect.wp_radius_cm)
         return values
 
     def _send(self, station: Station, name: str) -> None:

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 from bridge.mission_log import ArrivedMission, Conclusion
 from protocols.mavlink.codec import Packed
+from protocols.mission_record import ListIdentity
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
-from protocols.wp_record import ListIdentity
 
 
 class LinkLost(Exception):
@@ -77,7 +77,7 @@ class Conclude:
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """Look up how the ROIs of a stored list were sent. Answer: record number -> MAV_CMD number."""
+    """Look up how records of a stored list were sent, if they do not tell. Answer: record number -> MAV_CMD number."""
 
     identity: ListIdentity
 
@@ -147,6 +147,6 @@ def conclude(number: int, conclusion: Conclusion) -> Procedure[bool]:
 
 
 def recall(identity: ListIdentity) -> Procedure[Mapping[int, int]]:
-    """Return the ROI commands, by record number, with which the list was sent; empty if unknown."""
+    """Return the commands, by record number, with which records that do not tell were sent; empty if unknown."""
     commands: Mapping[int, int] = yield Recall(identity)
     return commands

@@ -3,10 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from typing import Any, Generic, TypeVar
 
-from bridge.finding import Finding
+from bridge.finding import Finding, Rejection
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.wp_record import WpRecord
+from protocols.mission_record import MissionRecord
+
+RecordT = TypeVar("RecordT", bound=MissionRecord)
 
 
 class Result(Enum):
@@ -18,17 +21,26 @@ class Result(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(Generic[RecordT]):
     """A checked list.
 
     `records` is what the flight controller is to hold, `items` the same as it reads back, both empty unless ACCEPTED.
-    `roi_commands` maps stored seq to the MAV_CMD with which a region of interest was sent. `findings` come in the order
-    of the list; that of a rejection is the last.
+    `sent_as` maps a record's place to the MAV_CMD with which it was sent, where the record does not tell (a region of
+    interest). `findings` come in the order of the list; that of a rejection is the last.
     """
 
     result: Result
     ack: MissionResult
-    records: tuple[WpRecord, ...] = ()
+    records: tuple[RecordT, ...] = ()
     items: tuple[MissionItem, ...] = ()
     findings: tuple[Finding, ...] = ()
-    roi_commands: Mapping[int, int] = field(default_factory=dict)
+    sent_as: Mapping[int, int] = field(default_factory=dict)
+
+
+#: What a list without items comes to.
+CLEARED_LIST: Verdict[Any] = Verdict(Result.CLEARED, MissionResult.ACCEPTED)
+
+
+def rejected(findings: tuple[Finding, ...], rejection: Rejection) -> Verdict[Any]:
+    """Return the verdict on a list that is refused."""
+    return Verdict(Result.REJECTED, rejection.ack, findings=(*findings, rejection.finding))

@@ -1,8 +1,6 @@
 """Harakiri's 16-byte mission record `wp_t` (firmware: mw.h, floppy.c; layout: docs/msp-mission.md)."""
 
 import struct
-import zlib
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -64,24 +62,3 @@ def unpack_records(data: bytes) -> list[WpRecord]:
     """Read every whole record in `data`; a shorter rest is ignored."""
     whole = len(data) - len(data) % RECORD_SIZE
     return [WpRecord(*fields) for fields in _LAYOUT.iter_unpack(data[:whole])]
-
-
-def pack_records(records: Iterable[WpRecord]) -> bytes:
-    """Concatenate the records' bytes."""
-    return b"".join(record.pack() for record in records)
-
-
-@dataclass(frozen=True, slots=True)
-class ListIdentity:
-    """What identifies a stored list: number of records and CRC-32 over their bytes (0 for none)."""
-
-    count: int
-    checksum: int
-
-    def __str__(self) -> str:
-        return f"{self.count} records, checksum {self.checksum:08x}"
-
-
-def identify(records: Sequence[WpRecord]) -> ListIdentity:
-    """Return the identity of a list, as the flight controller computes it."""
-    return ListIdentity(len(records), zlib.crc32(pack_records(records)))

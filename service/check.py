@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from enum import IntEnum
 from pathlib import Path
+from typing import Any
 
 import click
 
 from bridge.finding import DROPPED
-from bridge.mission_check import Result, RuleProfile, Verdict, check_list
+from bridge.harakiri_check import HarakiriRules
+from bridge.mission_check import MissionRules, check_list
+from bridge.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem
 from service.mission_data import Json
@@ -16,7 +19,7 @@ from service.mission_source import load_mission
 from service.mission_table import mission_table
 from service.printing import print_json, print_table
 
-_DEFAULT = RuleProfile()
+_DEFAULT = HarakiriRules()
 
 
 class ExitCode(IntEnum):
@@ -53,11 +56,11 @@ def check(
 
     Nothing is sent anywhere. Exit code 0: every file would be accepted, 1: one would be rejected, 2: one is unreadable.
     """
-    profile = RuleProfile(capacity=capacity, wp_radius_cm=wp_radius_cm)
-    ctx.exit(max(_check_file(path, profile, strict, as_json) for path in files))
+    rules = HarakiriRules(capacity=capacity, wp_radius_cm=wp_radius_cm)
+    ctx.exit(max(_check_file(path, rules, strict, as_json) for path in files))
 
 
-def _check_file(path: Path, profile: RuleProfile, strict: bool, as_json: bool) -> ExitCode:
+def _check_file(path: Path, rules: MissionRules, strict: bool, as_json: bool) -> ExitCode:
     name = click.format_filename(path)
     try:
         sent = load_mission(path)
@@ -67,7 +70,7 @@ def _check_file(path: Path, profile: RuleProfile, strict: bool, as_json: bool) -
         else:
             click.echo(f"Error: {error}", err=True)
         return ExitCode.UNREADABLE
-    verdict = check_list(sent, profile)
+    verdict = check_list(sent, rules)
     if as_json:
         print_json({"file": name, **_verdict_data(verdict)})
     else:
@@ -76,7 +79,7 @@ def _check_file(path: Path, profile: RuleProfile, strict: bool, as_json: bool) -
     return ExitCode.REJECTED if rejected else ExitCode.ACCEPTED
 
 
-def _verdict_data(verdict: Verdict) -> Json:
+def _verdict_data(verdict: Verdict[Any]) -> Json:
     return {
         "result": verdict.result.name,
         "ack": f"MAV_MISSION_{verdict.ack.name}",
@@ -86,13 +89,13 @@ def _verdict_data(verdict: Verdict) -> Json:
     }
 
 
-def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict) -> None:
+def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]) -> None:
     click.secho(name, bold=True)
     print_table(mission_table(sent, verdict.items, verdict.findings))
     click.echo(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n")
 
 
-def _summary(sent: int, verdict: Verdict) -> str:
+def _summary(sent: int, verdict: Verdict[Any]) -> str:
     if verdict.result is not Result.ACCEPTED:
         return f"MAV_MISSION_{verdict.ack.name}, {verdict.findings[-1].text()}"
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)

@@ -18,7 +18,7 @@ import structlog
 from bridge.mission_desk import Delivery, HeldMission, Refusal
 from bridge.mission_log import ArrivedMission
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.wp_record import pack_records
+from protocols.mission_record import pack_records
 from service.daemon import Daemon
 from service.mission_data import Json, mission_items, to_json, whole_number
 from service.store_worker import as_dicts

@@ -12,7 +12,7 @@ import structlog
 
 from bridge.mission_log import ArrivedMission
 from bridge.procedure import Conclude, Recall, Save, StoreEffect
-from protocols.wp_record import identify, pack_records
+from protocols.mission_record import identify, pack_records
 from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
 
 DATABASE_NAME = "missions.db"
@@ -82,8 +82,8 @@ class StoreWorker:
                     return True
                 case Recall(identity):
                     found = self._store.latest_verified(identity.count, identity.checksum)
-                    roi_commands: Mapping[int, int] = {} if found is None else found.received.roi_commands
-                    return roi_commands
+                    sent_as: Mapping[int, int] = {} if found is None else found.received.roi_commands
+                    return sent_as
         except StoreError as error:
             _log.error("store.failed", why=str(error))
         return nothing
@@ -103,7 +103,7 @@ def _received(mission: ArrivedMission) -> ReceivedMission:
         records=pack_records(verdict.records),
         record_count=identity.count,
         checksum=identity.checksum,
-        roi_commands=dict(verdict.roi_commands),
+        roi_commands=dict(verdict.sent_as),
     )
 
 

@@ -4,8 +4,9 @@ import re
 import sys
 from pathlib import Path
 
+from protocols.mission_record import identify, pack_records
 from protocols.msp import mission as ext
-from protocols.wp_record import WpCommand, WpRecord, identify, pack_records
+from protocols.wp_record import WpCommand, WpRecord
 
 sys.path.insert(0, str(Path(__file__).parent / "simulator"))
 from naze_bench import Bench

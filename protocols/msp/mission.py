@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
+from protocols.mission_record import ListIdentity, pack_records
 from protocols.msp.frame import request
 from protocols.msp.hazards import apply_mask, find_mask, is_clean
-from protocols.wp_record import ListIdentity, WpRecord, pack_records, unpack_records
+from protocols.wp_record import WpRecord, unpack_records
 
 VERSION = 1
 MAX_RADIUS_CM = 2000

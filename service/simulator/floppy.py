@@ -11,7 +11,8 @@ from protocols.mavlink.codec import MavlinkDecoder, Packed, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.wp_record import WpCommand, WpRecord, identify, unpack_records
+from protocols.mission_record import identify
+from protocols.wp_record import WpCommand, WpRecord, unpack_records
 from service.simulator.flash import NorFlash
 from service.simulator.mission_slots import MissionSlots
 from service.simulator.missions import Board

@@ -3,6 +3,7 @@
 import struct
 from dataclasses import dataclass
 
+from protocols.mission_record import ListIdentity
 from protocols.msp.mission import (
     MAX_RADIUS_CM,
     VERSION,
@@ -15,7 +16,7 @@ from protocols.msp.mission import (
     Stored,
     unmask,
 )
-from protocols.wp_record import RECORD_SIZE, ListIdentity, WpCommand
+from protocols.wp_record import RECORD_SIZE, WpCommand
 from service.simulator.flash import FlashError, NorFlash
 from service.simulator.mission_slots import MissionSlots
 from service.simulator.missions import Board

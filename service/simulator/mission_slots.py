@@ -7,7 +7,8 @@ then the other slot is the list. Staging needs no RAM.
 import struct
 import zlib
 
-from protocols.wp_record import RECORD_SIZE, ListIdentity
+from protocols.mission_record import ListIdentity
+from protocols.wp_record import RECORD_SIZE
 from service.simulator.flash import PAGE_SIZE, NorFlash
 from service.simulator.options import SimOptions
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from world import GroundStation
 
-from bridge.mission_check import RuleProfile, check_list
+from bridge.harakiri_check import HarakiriRules
+from bridge.mission_check import check_list
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult, degrees_to_e7
@@ -37,7 +38,7 @@ def waypoints(count: int, seed: int = 0) -> list[MissionItem]:
 
 def records_of(items: Sequence[MissionItem]) -> tuple[WpRecord, ...]:
     """What the flight controller is to hold of them."""
-    return check_list(items, RuleProfile()).records
+    return check_list(items, HarakiriRules()).records
 
 
 def rounded(items: Sequence[MissionItem]) -> list[MissionItem]:

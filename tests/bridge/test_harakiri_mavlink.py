@@ -8,8 +8,9 @@ from conversations import Download, Upload, waypoints
 from world import GroundStation, World
 
 from bridge.flight_controller import Kind
+from bridge.harakiri_check import HarakiriRules
 from bridge.harakiri_mavlink import as_stored
-from bridge.mission_check import RuleProfile, check_list
+from bridge.mission_check import check_list
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.wp_record import WpRecord
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
@@ -42,7 +43,7 @@ def mixed() -> list[MissionItem]:
 
 def held(items: list[MissionItem]) -> tuple[WpRecord, ...]:
     """What it can hold of a list: coordinates go through single precision."""
-    return tuple(as_stored(record) for record in check_list(items, RuleProfile()).records)
+    return tuple(as_stored(record) for record in check_list(items, HarakiriRules()).records)
 
 
 def near(one: int | None, other: int | None) -> bool:
@@ -56,7 +57,7 @@ def test_a_list_is_written_read_back_and_accepted(items: list[MissionItem]) -> N
     assert world.stored == held(items)
     read = Download(station).run()
     assert read is not None
-    for sent, got in zip(check_list(items, RuleProfile()).items, read, strict=True):
+    for sent, got in zip(check_list(items, HarakiriRules()).items, read, strict=True):
         assert near(sent.lat_e7, got.lat_e7)
         assert near(sent.lon_e7, got.lon_e7)
         assert replace(got, lat_e7=sent.lat_e7, lon_e7=sent.lon_e7) == sent

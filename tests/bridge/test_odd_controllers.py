@@ -12,9 +12,9 @@ from world import GroundStation, World
 from bridge.flight_controller import Kind
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
+from protocols.mission_record import ListIdentity, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Records, Status, Stored
-from protocols.wp_record import ListIdentity, identify
 
 BOXES = b"ANGLE;ARM;GTUNE;"
 INFO = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(0, 0), 200, 50, 0, 0)

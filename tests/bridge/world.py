@@ -25,9 +25,10 @@ from bridge.station import Peer
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
+from protocols.mission_record import identify
 from protocols.msp.frame import MspParser
 from protocols.msp.hazards import is_clean
-from protocols.wp_record import WpRecord, identify, unpack_records
+from protocols.wp_record import WpRecord, unpack_records
 from service.simulator.flash import ERASED, NorFlash
 from service.simulator.line import garble
 from service.simulator.mission_slots import MissionSlots, flash_size
@@ -73,7 +74,7 @@ class MemoryStore:
                 for mission, ended in reversed(self.missions):
                     verified = ended is not None and ended.outcome is Outcome.VERIFIED
                     if verified and identify(mission.verdict.records) == identity:
-                        return mission.verdict.roi_commands
+                        return mission.verdict.sent_as
         return {}
 
     def outcomes(self) -> list[Outcome | None]:

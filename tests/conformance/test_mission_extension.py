@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from mission_devices import Device, model, simulated_core
 
+from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import request
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Records, Status, Stored
-from protocols.wp_record import ListIdentity, WpRecord, identify, pack_records
+from protocols.wp_record import WpRecord
 
 CAPACITY, CHUNK, READ = 146, 15, 6
 

@@ -13,8 +13,9 @@ from bridge.mission_dialect import PushResult
 from bridge.msp_link import MspLink
 from bridge.procedure import Procedure, StoreEffect
 from bridge.runner import Runner
+from protocols.mission_record import pack_records
 from protocols.msp.mission import MissionCommand, decode_info
-from protocols.wp_record import WpRecord, pack_records
+from protocols.wp_record import WpRecord
 
 _BAUD = 115200
 _LOOP_S = 0.003
@@ -93,7 +94,7 @@ class Line:
             self._step()
         raise AssertionError("the procedure does not end")
 
-    def push(self, records: tuple[WpRecord, ...]) -> PushResult:
+    def push(self, records: tuple[WpRecord, ...]) -> PushResult[WpRecord]:
         result = self.run(self._missions.push(records, lambda _: None))
         assert isinstance(result, PushResult)
         return result

@@ -4,12 +4,15 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bridge.mission_check import RuleProfile, Verdict, check_list
+from bridge.harakiri_check import HarakiriRules
+from bridge.mission_check import check_list
+from bridge.verdict import Verdict
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
-from protocols.wp_record import pack_records
+from protocols.mission_record import pack_records
+from protocols.wp_record import WpRecord
 
-PROFILE = RuleProfile(capacity=146, wp_radius_cm=200)
+PROFILE = HarakiriRules(capacity=146, wp_radius_cm=200)
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ def single(value: float) -> float:
     return number
 
 
-def judge(rows: Sequence[PlanRow], *, use_int: bool = True, profile: RuleProfile = PROFILE) -> Verdict:
+def judge(rows: Sequence[PlanRow], *, use_int: bool = True, profile: HarakiriRules = PROFILE) -> Verdict[WpRecord]:
     """What the rules make of a list; the board holds its records and a reader gets its items."""
     return check_list([row.as_sent(seq, use_int=use_int) for seq, row in enumerate(rows)], profile)
 
@@ -82,7 +85,7 @@ def expected_fields(plan: Sequence[PlanRow], *, use_int: bool = True) -> list[tu
     return [stored_fields(item) for item in judge(plan, use_int=use_int).items]
 
 
-def records_of(verdict: Verdict) -> list[str]:
+def records_of(verdict: Verdict[WpRecord]) -> list[str]:
     """Return a verdict's records in hex, as the simulated board tells its own."""
     return [pack_records([record]).hex() for record in verdict.records]
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from protocols.mission_record import ListIdentity
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.hazards import HAZARDS, apply_mask, find_mask, is_clean
 from protocols.msp.mission import (
@@ -19,7 +20,7 @@ from protocols.msp.mission import (
     encode_read,
     unmask,
 )
-from protocols.wp_record import RECORD_SIZE, ListIdentity, WpRecord, unpack_record, unpack_records
+from protocols.wp_record import RECORD_SIZE, WpRecord, unpack_record, unpack_records
 from service.simulator.msp_port import MspReceiver
 
 #: Bytes of which a third are hazards: what a mission would have to be made of to be hard to send.

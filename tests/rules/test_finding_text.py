@@ -6,7 +6,8 @@ import pytest
 from rule_items import LAND, ROI, SET_ROI, SPEED, TAKEOFF, TIME, WAYPOINT, item, mission
 
 from bridge.finding import DROPPED, Finding
-from bridge.mission_check import RuleProfile, check_list
+from bridge.harakiri_check import HarakiriRules
+from bridge.mission_check import check_list
 
 
 @pytest.mark.parametrize(
@@ -46,7 +47,7 @@ def test_every_reason_that_the_rules_give_fits_a_statustext() -> None:
         [item(WAYPOINT), item(SET_ROI)],
         [item(ROI), item(SPEED)],
     ):
-        verdict = check_list(mission(*before, *tail), RuleProfile())
+        verdict = check_list(mission(*before, *tail), HarakiriRules())
         texts += [finding.text() for finding in verdict.findings]
     assert len(texts) > 15
     assert [text for text in texts if len(text) > 50] == []

@@ -27,15 +27,17 @@ from rule_items import (
 )
 
 from bridge.finding import CLEARED, DROPPED, REJECTED
-from bridge.mission_check import MissionCheck, Result, RuleProfile, Verdict, check_count, check_list
+from bridge.harakiri_check import HarakiriCheck, HarakiriRules
+from bridge.mission_check import check_count, check_list
+from bridge.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.wp_record import WpCommand, WpRecord
 
-PROFILE = RuleProfile()
+PROFILE = HarakiriRules()
 NAN, INF = math.nan, math.inf
 
 
-def verdict_on(*items: MissionItem, profile: RuleProfile = PROFILE, **kwargs: Any) -> Verdict:
+def verdict_on(*items: MissionItem, profile: HarakiriRules = PROFILE, **kwargs: Any) -> Verdict[WpRecord]:
     return check_list(mission(*items), profile, **kwargs)
 
 
@@ -50,7 +52,7 @@ def placed(tested: MissionItem) -> tuple[list[MissionItem], int]:
             return mission(item(WAYPOINT), tested, item(WAYPOINT)), 2
 
 
-def stored(tested: MissionItem, profile: RuleProfile = PROFILE) -> tuple[MissionItem, dict[str, tuple[Any, Any]]]:
+def stored(tested: MissionItem, profile: HarakiriRules = PROFILE) -> tuple[MissionItem, dict[str, tuple[Any, Any]]]:
     """What the item reads back as, and its findings: field to (was, becomes)."""
     items, seq = placed(tested)
     verdict = check_list(items, profile)
@@ -131,13 +133,13 @@ def test_a_value_is_truncated_and_clamped_and_a_changed_one_is_a_finding(
     [(0, 0), (1, 1), (99, 1), (100, 1), (101, 2), (200, 2), (201, 3), (2000, 20), (25500, 255), (65535, 255)],
 )
 def test_gps_wp_radius_is_rounded_up_to_whole_metres(wp_radius_cm: int, least: int) -> None:
-    profile = RuleProfile(wp_radius_cm=wp_radius_cm)
+    profile = HarakiriRules(wp_radius_cm=wp_radius_cm)
     for sent in (0, NAN, least - 1):
         assert stored(item(WAYPOINT, p2=sent), profile)[0].p2 == least
 
 
 def test_the_highest_take_off_is_a_setting() -> None:
-    assert stored(item(TAKEOFF, alt_m=80), RuleProfile(takeoff_max_m=30))[0].alt_m == 30
+    assert stored(item(TAKEOFF, alt_m=80), HarakiriRules(takeoff_max_m=30))[0].alt_m == 30
 
 
 def test_records_hold_what_the_firmware_expects() -> None:
@@ -162,7 +164,7 @@ def test_records_hold_what_the_firmware_expects() -> None:
     )
     assert [held.seq for held in verdict.items] == list(range(8))
     assert [held.frame for held in verdict.items] == [0] + [3] * 7
-    assert verdict.roi_commands == {2: SET_ROI}
+    assert verdict.sent_as == {2: SET_ROI}
 
 
 # ---------------------------------------------------------------- nose on the region of interest
@@ -275,7 +277,7 @@ def test_every_other_frame_rejects_the_list(command: int, frame: int) -> None:
 # ---------------------------------------------------------------- rejected lists
 
 
-def assert_rejected(verdict: Verdict, ack: MissionResult, seq: int | None, field: str) -> None:
+def assert_rejected(verdict: Verdict[WpRecord], ack: MissionResult, seq: int | None, field: str) -> None:
     assert (verdict.result, verdict.ack) == (Result.REJECTED, ack)
     last = verdict.findings[-1]
     assert (last.seq, last.field, last.becomes) == (seq, field, REJECTED)
@@ -377,7 +379,7 @@ def test_a_home_alone_is_invalid() -> None:
 
 @pytest.mark.parametrize("capacity", [2, 120, 146])
 def test_more_than_the_capacity_is_no_space(capacity: int) -> None:
-    profile = RuleProfile(capacity=capacity)
+    profile = HarakiriRules(capacity=capacity)
     full = mission(*[item(WAYPOINT)] * (capacity - 1))
     assert check_list(full, profile).result is Result.ACCEPTED
     assert_rejected(check_list([*full, item(WAYPOINT)], profile), MissionResult.NO_SPACE, None, "count")
@@ -461,7 +463,7 @@ def test_home_without_a_finite_height_rejects_the_list(height: float) -> None:
 def test_a_rejection_comes_with_the_item_that_proves_it_and_stays(seq: int, faulty: MissionItem) -> None:
     items = [HOME] + [item(WAYPOINT)] * 5
     items[seq] = faulty
-    check = MissionCheck(PROFILE, len(items))
+    check = HarakiriCheck(PROFILE, len(items))
     answers = [check.take(each) for each in items]
     assert answers[:seq] == [None] * seq
     assert answers[seq] is not None
@@ -472,7 +474,7 @@ def test_a_rejection_comes_with_the_item_that_proves_it_and_stays(seq: int, faul
 
 
 def test_half_a_list_has_no_verdict() -> None:
-    check = MissionCheck(PROFILE, 3)
+    check = HarakiriCheck(PROFILE, 3)
     check.take(HOME)
     check.take(item(WAYPOINT))
     with pytest.raises(ValueError, match="2 of 3"):

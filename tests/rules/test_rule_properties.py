@@ -8,7 +8,10 @@ from hypothesis import strategies as st
 from rule_oracle import expected
 
 from bridge.finding import DROPPED, REJECTED
-from bridge.mission_check import MissionCheck, Result, RuleProfile, check_list, items_from_records
+from bridge.harakiri_check import HarakiriCheck, HarakiriRules
+from bridge.harakiri_records import items_from_records
+from bridge.mission_check import check_list
+from bridge.verdict import Result
 from protocols.mission_item import MissionItem
 from protocols.wp_record import WpRecord, unpack_record
 
@@ -68,7 +71,7 @@ def plausible_lists(draw: st.DrawFn) -> list[MissionItem]:
 
 lists = st.one_of(plausible_lists(), plausible_lists(), st.lists(wild_items, max_size=5))
 profiles = st.builds(
-    RuleProfile,
+    HarakiriRules,
     capacity=st.sampled_from([146, 146, 5]),
     wp_radius_cm=st.sampled_from([0, 1, 100, 150, 200, 2000, 65535]),
     takeoff_max_m=st.sampled_from([2, 15, 80]),
@@ -79,7 +82,7 @@ homes = st.sampled_from([None, (123, -456)])
 @settings(max_examples=600)
 @given(items=lists, profile=profiles, home=homes)
 def test_the_verdict_is_the_documents(
-    items: list[MissionItem], profile: RuleProfile, home: tuple[int, int] | None
+    items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
 ) -> None:
     verdict = check_list(items, profile, home)
     wanted = expected(items, profile.capacity, profile.wp_radius_cm, profile.takeoff_max_m, home)
@@ -97,21 +100,21 @@ def test_the_verdict_is_the_documents(
 @settings(max_examples=300)
 @given(items=plausible_lists(), profile=profiles, home=homes)
 def test_what_reads_back_can_be_sent_again_and_stays_as_it_is(
-    items: list[MissionItem], profile: RuleProfile, home: tuple[int, int] | None
+    items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
 ) -> None:
     verdict = check_list(items, profile, home)
     if verdict.result is Result.ACCEPTED:
         again = check_list(verdict.items, profile)
         assert (again.result, again.findings) == (Result.ACCEPTED, ())
         assert (again.records, again.items) == (verdict.records, verdict.items)
-        assert again.roi_commands == verdict.roi_commands
-        assert tuple(items_from_records(verdict.records, verdict.roi_commands)) == verdict.items
+        assert again.sent_as == verdict.sent_as
+        assert tuple(items_from_records(verdict.records, verdict.sent_as)) == verdict.items
 
 
 @settings(max_examples=300)
 @given(items=plausible_lists(), profile=profiles, home=homes)
 def test_every_difference_is_a_finding_and_every_finding_a_difference(
-    items: list[MissionItem], profile: RuleProfile, home: tuple[int, int] | None
+    items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
 ) -> None:
     verdict = check_list(items, profile, home)
     if verdict.result is not Result.ACCEPTED:
@@ -138,8 +141,8 @@ def given_value(item: MissionItem, field: str) -> float:
 @settings(max_examples=200)
 @given(items=lists.filter(lambda items: len(items) > 1))
 def test_item_by_item_says_the_same_as_the_whole_list(items: list[MissionItem]) -> None:
-    profile = RuleProfile()
-    check = MissionCheck(profile, len(items))
+    profile = HarakiriRules()
+    check = HarakiriCheck(profile, len(items))
     answers = [check.take(item) for item in items]
     whole = check_list(items, profile)
     assert check.finish() == check.finish() == whole
@@ -150,7 +153,7 @@ def test_item_by_item_says_the_same_as_the_whole_list(items: list[MissionItem]) 
 
 
 @given(items=lists, profile=profiles)
-def test_findings_are_one_line_each(items: list[MissionItem], profile: RuleProfile) -> None:
+def test_findings_are_one_line_each(items: list[MissionItem], profile: HarakiriRules) -> None:
     for finding in check_list(items, profile).findings:
         assert finding.text().isprintable()
         assert finding.text() in finding.full_text() or finding.full_text().startswith(finding.text())

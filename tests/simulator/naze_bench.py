@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import (
     Progress,
@@ -15,7 +16,7 @@ from protocols.msp.mission import (
     encode_commit,
     encode_read,
 )
-from protocols.wp_record import WpRecord, identify
+from protocols.wp_record import WpRecord
 from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults, SimOptions
 

@@ -15,9 +15,9 @@ import pytest
 import serial
 from naze_bench import mission
 
+from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
-from protocols.wp_record import identify
 from service.simulator.naze import SimulatedNaze
 from service.simulator.pipe_link import SimLink
 

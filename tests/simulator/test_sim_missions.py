@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from naze_bench import BOOT_SECONDS, Bench, mission
 
+from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
 from protocols.msp.hazards import apply_mask
 from protocols.msp.mission import (
@@ -28,7 +29,7 @@ from protocols.msp.mission import (
     encode_radius,
     encode_read,
 )
-from protocols.wp_record import ListIdentity, WpRecord, identify, pack_records
+from protocols.wp_record import WpRecord
 from service.simulator.naze import Power
 from service.simulator.options import Faults, SimOptions
 

@@ -3,9 +3,9 @@
 import pytest
 from naze_bench import BOOT_SECONDS, Bench, mission
 
+from protocols.mission_record import identify
 from protocols.msp.frame import request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
-from protocols.wp_record import identify
 from service.simulator.firmware import Protocol
 from service.simulator.naze import Power
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol

@@ -1,9 +1,9 @@
-"""Stored items to records and back: what the flight controller holds, as a ground station reads it."""
+"""Records to items: what a Harakiri holds, as a ground station reads it."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from bridge.mission_rules import MAV_COMMANDS
+from bridge.harakiri_rules import MAV_COMMANDS
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.wp_record import WpRecord
 
@@ -11,24 +11,24 @@ _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
 _UNKNOWN_COMMAND = 0
 
 
-def items_from_records(records: Iterable[WpRecord], roi_commands: Mapping[int, int] = _NONE_KNOWN) -> list[MissionItem]:
+def items_from_records(records: Iterable[WpRecord], sent_as: Mapping[int, int] = _NONE_KNOWN) -> list[MissionItem]:
     """Return the read-back form of a stored list (mission-rules.md, "Read-back").
 
-    Frame 3, home frame 0. A region of interest carries the command number that `roi_commands` (stored seq to MAV_CMD)
+    Frame 3, home frame 0. A region of interest carries the command number that `sent_as` (stored seq to MAV_CMD)
     remembers, else 80. A record whose number is no WpCommand (ours) is shown as MAV_CMD 0, which no ground station
     takes for something that flies and which the rules would drop, with the raw number as its param1.
     """
-    return [_item(seq, record, roi_commands) for seq, record in enumerate(records)]
+    return [_item(seq, record, sent_as) for seq, record in enumerate(records)]
 
 
-def _item(seq: int, record: WpRecord, roi_commands: Mapping[int, int]) -> MissionItem:
+def _item(seq: int, record: WpRecord, sent_as: Mapping[int, int]) -> MissionItem:
     match MAV_COMMANDS.get(record.command):
         case None:
             command, p1 = _UNKNOWN_COMMAND, record.command
         case Command.NAV_LOITER_TURNS:
             command, p1 = int(Command.NAV_LOITER_TURNS), record.turns
         case Command.NAV_ROI:
-            command, p1 = roi_commands.get(seq, int(Command.NAV_ROI)), record.time
+            command, p1 = sent_as.get(seq, int(Command.NAV_ROI)), record.time
         case known:
             command, p1 = int(known), record.time
     return MissionItem(

@@ -24,18 +24,6 @@ _MAX_RADIUS_M = 255
 
 
 @dataclass(frozen=True, slots=True)
-class RuleProfile:
-    """What the rules need to know of the flight controller and the settings.
-
-    capacity: records it can hold, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: highest take-off.
-    """
-
-    capacity: int = 146
-    wp_radius_cm: int = 200
-    takeoff_max_m: int = 15
-
-
-@dataclass(frozen=True, slots=True)
 class Range:
     """The whole numbers that a field can hold; `instead_of_zero` is stored where a 0 would mean nothing."""
 
@@ -96,14 +84,14 @@ class CommandRule:
         return self.height is not UNUSED
 
 
-def command_rules(profile: RuleProfile) -> Mapping[int, CommandRule]:
+def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, CommandRule]:
     """Return the table: MAV_CMD number to rule; a command without a rule cannot be stored.
 
     gps_wp_radius is rounded up to whole metres, so that no stored radius is smaller than it.
     """
-    least = min(math.ceil(profile.wp_radius_cm / 100), _MAX_RADIUS_M)
+    least = min(math.ceil(wp_radius_cm / 100), _MAX_RADIUS_M)
     radius = Range(least, _MAX_RADIUS_M, f"hit radius {least}..{_MAX_RADIUS_M} m")
-    climb = Range(2, profile.takeoff_max_m, f"take-off 2..{profile.takeoff_max_m} m")
+    climb = Range(2, takeoff_max_m, f"take-off 2..{takeoff_max_m} m")
     # fmt: off
     rows = (
         #           record                      p1       p2      p4           position height  place           alone

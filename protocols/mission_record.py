@@ -1,0 +1,34 @@
+"""What all flight controllers' stored records have in common: bytes, and a list's identity by their checksum."""
+
+import zlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+
+class MissionRecord(Protocol):
+    """One stored record of whatever flight controller; its number is its position in the list."""
+
+    def pack(self) -> bytes:
+        """Return the bytes; struct.error if a field does not fit, which is a bug in the caller."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListIdentity:
+    """What identifies a stored list: number of records and CRC-32 over their bytes (0 for none)."""
+
+    count: int
+    checksum: int
+
+    def __str__(self) -> str:
+        return f"{self.count} records, checksum {self.checksum:08x}"
+
+
+def pack_records(records: Iterable[MissionRecord]) -> bytes:
+    """Concatenate the records' bytes."""
+    return b"".join(record.pack() for record in records)
+
+
+def identify(records: Sequence[MissionRecord]) -> ListIdentity:
+    """Return the identity of a list; a Harakiri with the mission extension computes the same."""
+    return ListIdentity(len(records), zlib.crc32(pack_records(records)))
