@@ -117,6 +117,7 @@ class MissionJobs:
             "satellites": vehicle.gps.satellites if vehicle.gps else None,
             "ground_stations": [str(peer) for peer in bridge.ground.peers()],
             "refused": [f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()],
+            "recording": self._daemon.recording,
             "mission_records": None if held is None else held.identity.count,
             "mission_checksum": None if held is None else _hex(held.identity.checksum),
             "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),
@@ -191,7 +192,7 @@ class ControlServer:
             writer.write(to_json(answer).encode() + b"\n")
 
         try:
-            tell({"result": await self._jobs.do(_request(await reader.readline()), tell)})
+            tell({"result": await self._jobs.do(_request(await _read_line(reader)), tell)})
             await writer.drain()
         except (ControlError, StoreError) as error:
             tell({"error": str(error)})
@@ -201,6 +202,13 @@ class ControlServer:
             pass
         except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
             tell({"error": "the daemon was stopped meanwhile; `pull` tells what the flight controller holds"})
+
+
+async def _read_line(reader: asyncio.StreamReader) -> bytes:
+    try:
+        return await reader.readline()
+    except ValueError:
+        raise ValueError(f"it is longer than {_MAX_LINE >> 20} MB, and no mission is") from None
 
 
 def _request(line: bytes) -> Json:
@@ -237,7 +245,9 @@ def ask_daemon(state_dir: Path, request: Json, progress: Callable[[int], None] =
                 f"no daemon answers on {path}: start one with `naze-bridge run`, or use --fc directly"
             ) from error
         with suppress(ConnectionError):
+            # Who is refused in the middle of a long request has its answer to read all the same.
             connection.sendall(to_json(request).encode() + b"\n")
+        with suppress(ConnectionError):
             for answer in _lines(connection):
                 if "progress" in answer:
                     progress(answer["progress"])

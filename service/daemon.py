@@ -59,6 +59,11 @@ class Daemon:
         """Why the flight controller's port cannot be opened; empty if it could be."""
         return self._port.trouble
 
+    @property
+    def recording(self) -> list[str]:
+        """What is recorded, and where."""
+        return self._recording.describe()
+
     async def run(self) -> None:
         """Run until cancelled. LinkError if a ground station link cannot be set up."""
         port: asyncio.Task[None] | None = None

@@ -35,6 +35,11 @@ class Recording:
             return FcPort(address, on_open, on_data, on_close)
         return RecordedPort(address, on_open, on_data, on_close, self._uart)
 
+    def describe(self) -> list[str]:
+        """Tell what is recorded, and where; or why not any more."""
+        told = [] if self._tlog is None else [f"telemetry log: {self._tlog.describe()}"]
+        return told if self._uart is None else [*told, f"UART capture: {self._uart.describe()}"]
+
     def close(self) -> None:
         """Write what is left."""
         if self._uart is not None:

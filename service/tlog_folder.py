@@ -50,12 +50,19 @@ class TlogFolder:
         self._own: list[Path] = []
         self._synced_at = 0.0
         self._retry_at = 0.0
-        self._has_complained = False
+        self._trouble = ""
 
     @property
     def is_full(self) -> bool:
         """Tell whether the open file has reached its size."""
         return self._file is not None and self._file.size >= self._limits.file_size
+
+    def describe(self) -> str:
+        """Tell which file is open, or why none is. May be called while another thread writes."""
+        file, trouble = self._file, self._trouble
+        if file is not None:
+            return str(file.path)
+        return f"stopped, {trouble}" if trouble else f"nothing yet, in {self._folder}"
 
     def write(self, records: bytes, now: float) -> None:
         """Append whole records to the open file, or to a new one. `now`: seconds of a monotonic clock."""
@@ -70,7 +77,7 @@ class TlogFolder:
             self._file.append(records)
             if is_first:
                 _log.info("tlog.recording", file=str(self._file.path))
-                self._has_complained = False
+                self._trouble = ""
             if now >= self._synced_at + _SYNC_S:
                 self._file.sync()
                 self._synced_at = now
@@ -114,9 +121,9 @@ class TlogFolder:
     def _give_up(self, error: OSError, now: float) -> None:
         self.close()
         self._retry_at = now + _RETRY_S
-        level = _log.debug if self._has_complained else _log.warning
-        level("tlog.stopped", folder=str(self._folder), why=error.strerror or str(error), tried_again_every_s=_RETRY_S)
-        self._has_complained = True
+        level = _log.debug if self._trouble else _log.warning
+        self._trouble = error.strerror or str(error)
+        level("tlog.stopped", folder=str(self._folder), why=self._trouble, tried_again_every_s=_RETRY_S)
 
 
 class _LittleSpaceError(OSError):

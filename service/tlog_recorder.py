@@ -40,6 +40,11 @@ class TlogRecorder:
                 frames = self._vehicle_first(frames)
             self._writer.put(b"".join([tlog_record(frame, at_us) for frame in frames]))
 
+    def describe(self) -> str:
+        """Tell into which file it records, or why into none."""
+        dropped = f", {self._writer.dropped} bytes left out" if self._writer.dropped else ""
+        return self._folder.describe() + dropped
+
     def close(self) -> None:
         """Write what is left."""
         self._writer.close()

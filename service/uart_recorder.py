@@ -31,15 +31,21 @@ class UartRecorder:
         self._max_size = max_size
         self._descriptor, self._size = _open(path)
         self._began_at = time.monotonic()
-        self._is_over = False
+        self._over_because = ""
         self._writer = DiskWriter("UART capture", self._write, lambda: os.close(self._descriptor))
         started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
         self._put(capture_header(started))
 
     def note(self, deed: UartDeed, speed: int | None, data: bytes = b"", text: str = "") -> None:
         """Record what happened just now."""
-        if not self._is_over:
+        if not self._over_because:
             self._put(capture_line(UartEvent(time.monotonic() - self._began_at, speed, deed, data, text)))
+
+    def describe(self) -> str:
+        """Tell into which file it records, or why not any more."""
+        ended = f", ended: {self._over_because}" if self._over_because else ""
+        dropped = f", {self._writer.dropped} bytes left out" if self._writer.dropped else ""
+        return f"{self._path}, {self._size / 1e6:.1f} of {self._max_size / 1e6:.0f} MB{dropped}{ended}"
 
     def close(self) -> None:
         """Write what is left."""
@@ -65,9 +71,9 @@ class UartRecorder:
             self._end(error.strerror or str(error))
 
     def _end(self, why: str) -> None:
-        if self._is_over:
+        if self._over_because:
             return
-        self._is_over = True
+        self._over_because = why
         _log.warning("uart.recording_ended", file=str(self._path), why=why)
 
 

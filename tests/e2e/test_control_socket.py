@@ -10,6 +10,8 @@ from benches import Starter
 from plan import plain_plan
 from programs import Daemon, run_naze_bridge, until
 
+from service.control import ControlError
+
 ITEM = {"seq": 0, "command": 16, "frame": 3, "p1": 0, "p2": 0, "p3": 0, "p4": 0, "lat_e7": 1, "lon_e7": 1, "alt_m": 1}
 
 
@@ -61,10 +63,8 @@ def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
         answer = say(daemon, line)
         assert list(answer) == ["error"], name
         assert len(str(answer["error"])) < 200, name
-    with socket.socket(socket.AF_UNIX) as endless:
-        endless.connect(str(daemon.state_dir / "control.sock"))
-        with pytest.raises(ConnectionError):
-            endless.sendall(b" " * (64 << 20))
+    with pytest.raises(ControlError, match="^request not understood: it is longer than 1 MB, and no mission is$"):
+        daemon.ask({"do": " " * (64 << 20)})
     assert daemon.held() == held
     daemon.push(plain_plan(6))
     assert daemon.end() == 0

@@ -150,8 +150,23 @@ def test_logs_that_cannot_be_written_are_told_once_and_hold_nothing_up(start: St
     daemon.wait()
     listener = connect(daemon)
     until(lambda: listener.has_heard(HEARTBEAT, 5), "telemetry")
+    shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
+    assert "telemetry log: stopped, File exists" in shown
     assert daemon.end() == 0
     assert [event["event"] for event in daemon.events() if "tlog" in event["event"]] == ["tlog.stopped"]
+
+
+def test_the_status_tells_what_is_recorded(start: Starter, connect: Connect) -> None:
+    capture = start.directory / "naze.uart"
+    daemon = start.daemon("sim:", options=("--record-uart", str(capture)))
+    daemon.wait()
+    listener = connect(daemon)
+    until(lambda: logs_of(daemon), "a log")
+    (path,) = logs_of(daemon)
+    shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
+    (line,) = [line for line in shown.splitlines() if line.startswith("recording ")]
+    assert f"telemetry log: {path}, UART capture: {capture}, 0.0 of 67 MB" in line
+    listener.close()
 
 
 def test_recording_can_be_switched_off(start: Starter, connect: Connect) -> None:
@@ -161,6 +176,7 @@ def test_recording_can_be_switched_off(start: Starter, connect: Connect) -> None
     daemon.wait()
     listener = connect(daemon)
     until(lambda: listener.has_heard(HEARTBEAT, 3), "telemetry")
+    assert daemon.ask({"do": "status"})["recording"] == []
     assert daemon.end() == 0
     assert logs_of(daemon) == []
 
