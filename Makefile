@@ -13,6 +13,8 @@
 
 PYTHON ?= python3
 UV ?= uv
+# Most tests wait for programs: two cores have time for four at once.
+JOBS ?= 4
 VENV := .venv
 BIN := $(VENV)/bin
 
@@ -23,7 +25,7 @@ demo: $(VENV)/.demo-ready
 	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
 
 test: $(VENV)/.test-ready
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(ARGS)
 	$(if $(ARGS),,$(MAKE) -C firmware test)
 
 lint: $(VENV)/.test-ready

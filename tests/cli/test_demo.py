@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -18,9 +19,16 @@ TEMPORARY = "naze-bridge-demo-"
 
 
 @pytest.fixture
-def demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Program]:
-    """A demonstration that stays up, with its temporary files in `tmp_path`."""
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
+def folder() -> Iterator[Path]:
+    """A short path: that of a Unix socket has 107 characters at most."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+@pytest.fixture
+def demo(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Program]:
+    """A demonstration that stays up, with its temporary files in `folder`."""
+    monkeypatch.setenv("TMPDIR", str(folder))
     with ExitStack() as stack:
         program = Program(tmp_path / "printed", "demo", "--port", str(free_port()))
         stack.callback(program.end, signal.SIGKILL)
@@ -29,12 +37,12 @@ def demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Program]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-def test_it_takes_its_daemon_and_its_files_with_it(demo: Program, tmp_path: Path, number: signal.Signals) -> None:
-    (folder,) = tmp_path.glob(f"{TEMPORARY}*")
-    daemon = int((folder / "lock").read_text())
+def test_it_takes_its_daemon_and_its_files_with_it(demo: Program, folder: Path, number: signal.Signals) -> None:
+    (state,) = folder.glob(f"{TEMPORARY}*")
+    daemon = int((state / "lock").read_text())
     os.kill(daemon, 0)
     assert demo.end(number) == (0 if number is signal.SIGINT else 128 + number)
-    assert not list(tmp_path.glob(f"{TEMPORARY}*"))
+    assert not list(folder.glob(f"{TEMPORARY}*"))
     with pytest.raises(ProcessLookupError):
         os.kill(daemon, 0)
     assert "Traceback" not in demo.printed
