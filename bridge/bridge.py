@@ -219,6 +219,24 @@ class Bridge:
         self._now = now
         self.runner.start(self.desk.read_back(), lambda held, _at: on_done(held), now)
 
+    # The end.
+
+    @property
+    def is_conversing(self) -> bool:
+        """Tell whether something that was begun is not ended yet."""
+        return self.runner.is_busy
+
+    def stop_missions(self, now: float) -> None:
+        """Begin no more transfers. An upload whose items are still coming in ends; a push under way goes on."""
+        self._now = now
+        self.desk.close()
+        self._uploads.stop(now)
+
+    def abort_missions(self, now: float) -> None:
+        """End a push under way: the flight controller keeps its old list, and the store and who sent it are told."""
+        self._now = now
+        self.runner.stop(now)
+
     # Time.
 
     def tick(self, now: float) -> None:

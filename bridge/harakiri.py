@@ -1,11 +1,12 @@
 """Harakiri with the mission extension: docs/msp-mission.md, the companion's side."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 from bridge.harakiri_check import HarakiriRules
 from bridge.harakiri_records import items_from_records
 from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from bridge.procedure import LinkLost, Procedure, ask, ask_surely, pause, receive, send
+from bridge.procedure import LinkLost, Procedure, Stopped, ask, ask_surely, pause, receive, send
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
@@ -104,6 +105,10 @@ class HarakiriMissions:
                     yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1)
         except _GiveUp as end:
             failure = end.failure
+        except Stopped:
+            failure = PushFailure.STOPPED
+            with suppress(LinkLost):
+                yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1, tries=1)
         except LinkLost:
             failure = PushFailure.NO_ANSWER
         if self._may_be_stored:

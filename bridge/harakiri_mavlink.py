@@ -16,7 +16,7 @@ from bridge.harakiri_check import HarakiriRules
 from bridge.harakiri_records import items_from_records
 from bridge.harakiri_rules import MAV_COMMANDS
 from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from bridge.procedure import Await, LinkLost, Procedure, Transmit, pause
+from bridge.procedure import Await, LinkLost, Procedure, Stopped, Transmit, pause
 from protocols.float32 import neighbours, single
 from protocols.mavlink.codec import MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
@@ -85,7 +85,10 @@ class HarakiriMavlinkMissions:
         try:
             for _ in range(_MAX_BEGINS):
                 try:
-                    yield from self._write(items, progress)
+                    try:
+                        yield from self._write(items, progress)
+                    except Stopped:
+                        raise _Failed(PushFailure.STOPPED, is_final=True) from None
                     yield from pause(_WRITTEN_AFTER_S)
                     held = yield from self._read(wanted)
                     if held != wanted:

@@ -10,7 +10,7 @@ from typing import Any
 from bridge.flight_controller import FlightController, Kind
 from bridge.mission_dialect import AnyDialect, PushFailure, StoreReport, StoreState
 from bridge.mission_log import ArrivedMission, Conclusion, Outcome
-from bridge.procedure import LinkLost, Procedure, conclude, pause, recall, save
+from bridge.procedure import LinkLost, Procedure, Stopped, conclude, pause, recall, save
 from bridge.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
@@ -54,6 +54,7 @@ _REASONS: dict[Kind, Refusal] = {
 }
 _NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
+_STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
 _OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
@@ -64,6 +65,7 @@ class MissionDesk:
         self._dialect: AnyDialect | None = None
         self._refusal = _NO_LINK
         self._owner: object | None = None
+        self._closed = False
         self.held: HeldMission | None = None
 
     def controller_changed(self, controller: FlightController | None, dialect: AnyDialect | None) -> None:
@@ -79,10 +81,16 @@ class MissionDesk:
 
     def acquire(self, owner: object) -> Refusal | None:
         """Take the lock of the one transfer, or say why not."""
+        if self._closed:
+            return _STOPPING
         if self._owner is not None and self._owner != owner:
             return _OCCUPIED
         self._owner = owner
         return None
+
+    def close(self) -> None:
+        """Begin no more transfers, because the bridge is about to end."""
+        self._closed = True
 
     def release(self, owner: object) -> None:
         """Give the lock back."""
@@ -107,6 +115,8 @@ class MissionDesk:
                     return _BUSY
                 yield from pause(_BUSY_INTERVAL_S)
                 waited_s += _BUSY_INTERVAL_S
+        except Stopped:
+            return _STOPPING
         except LinkLost:
             return _NO_LINK
 
@@ -166,6 +176,8 @@ class MissionDesk:
             records = yield from dialect.pull()
             if records is None:
                 return _NO_LINK
+        except Stopped:
+            return _STOPPING
         except LinkLost:
             return _NO_LINK
         identity = identify(records)

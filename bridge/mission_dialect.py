@@ -43,6 +43,7 @@ class PushFailure(Enum):
     UNSAFE = "an item's bytes would set off a trap of the firmware: move a waypoint a little"
     FLASH = "the flight controller could not write its flash; its old mission is kept"
     NO_ANSWER = "the flight controller does not answer; its old mission is kept"
+    STOPPED = "naze-bridge was stopped meanwhile; the old mission is kept"
     UNCERTAIN = "the flight controller fell silent while writing: read the mission back"
 
 

@@ -226,6 +226,12 @@ class MissionUploads:
         if transfer is not None and transfer.station.peer == peer and transfer.phase is not Phase.DELIVERING:
             self._cancel(now, "ended by hanging up")
 
+    def stop(self, now: float) -> None:
+        """The bridge is about to end: what is not yet with the flight controller does not get there any more."""
+        transfer = self._transfer
+        if transfer is not None and transfer.phase is not Phase.DELIVERING:
+            self._cancel(now, "ended: naze-bridge stops")
+
     def link_lost(self, now: float) -> None:
         """The flight controller is gone: so is the reason to go on receiving."""
         transfer = self._transfer

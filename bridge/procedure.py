@@ -1,7 +1,8 @@
 """Procedures: conversations with the flight controller and the store, written top to bottom without any I/O.
 
 A procedure is a generator. It yields one effect at a time and is sent the effect's answer; `bridge.runner.Runner`
-carries the effects out. When the link to the flight controller goes down, LinkLost is raised at the `yield`.
+carries the effects out. When the link to the flight controller goes down, LinkLost is raised at the `yield`; when the
+bridge can wait no longer for the end, its kind Stopped.
 """
 
 from collections.abc import Generator, Mapping
@@ -16,6 +17,10 @@ from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
 
 class LinkLost(Exception):
     """The flight controller is not reachable (any more)."""
+
+
+class Stopped(LinkLost):
+    """The bridge is about to end. The flight controller can still be reached, to leave it in order."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from bridge.procedure import (
     Receive,
     Save,
     Send,
+    Stopped,
     StoreEffect,
     Transmit,
 )
@@ -63,6 +64,11 @@ class Runner:
         self._mavlink = None
         if isinstance(self._awaited, Receive | Await | Pause):
             self._advance(LinkLost("the flight controller's port is gone"), now)
+
+    def stop(self, now: float) -> None:
+        """Tell the running procedure to come to its end now; it may still speak to the flight controller."""
+        if isinstance(self._awaited, Receive | Await | Pause):
+            self._advance(Stopped("the bridge is stopping"), now)
 
     def received(self, frame: MspFrame, now: float) -> None:
         """Take a reply from the flight controller; the running procedure gets it if it waits for it."""

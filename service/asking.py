@@ -16,7 +16,7 @@ from service.control import ControlError, MissionJobs, ask_daemon
 from service.daemon import Daemon
 from service.log_setup import set_up_logging
 from service.mission_data import Json
-from service.settings import Settings, SettingsError, default_state_dir
+from service.settings import Settings, SettingsError
 from storage.store_error import StoreError
 
 #: An unknown speed is found within 8 s.
@@ -55,7 +55,7 @@ def ask(
     """Ask the bridge; a refusal ends the program with status 1, an unusable option with 2."""
     try:
         if fc is None:
-            return ask_daemon(state_dir or default_state_dir(), request, progress)
+            return ask_daemon(state_dir, request, progress)
         return asyncio.run(_ask_directly(fc, request, progress))
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error

@@ -19,15 +19,16 @@ from bridge.mission_desk import Delivery, HeldMission, Refusal
 from bridge.mission_log import ArrivedMission
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import pack_records
+from service.control_socket import find_socket
 from service.daemon import Daemon
 from service.mission_data import Json, mission_items, to_json, whole_number
 from service.store_worker import as_dicts
 from storage.mission_store import StoreError
 
-SOCKET_NAME = "control.sock"
 #: The greatest number that a request may hold.
 MOST = 2**31 - 1
 _MAX_LINE = 1 << 20
+_LAST_ANSWERS_S = 0.05
 _log = structlog.get_logger()
 T = TypeVar("T")
 
@@ -173,6 +174,9 @@ class ControlServer:
         if self._server is not None:
             self._server.close()
             self._path.unlink(missing_ok=True)
+        if self._clients:
+            # Who has an answer by now shall have it.
+            await asyncio.wait(self._clients, timeout=_LAST_ANSWERS_S)
         for client in self._clients:
             client.cancel()
         await asyncio.gather(*self._clients)
@@ -231,19 +235,18 @@ def _hex(checksum: int) -> str:
     return f"{checksum:08x}"
 
 
-def ask_daemon(state_dir: Path, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
-    """Ask the daemon that runs on `state_dir`; ControlError if there is none or it refuses."""
-    path = state_dir / SOCKET_NAME
+def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
+    """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
+    path = find_socket(state_dir)
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
             connection.connect(str(path))
         except PermissionError as error:
-            remedy = "use sudo, or add yourself to the group that the daemon runs as"
+            remedy = "use sudo, or join the group that the daemon runs as (dialout, as a service)"
             raise ControlError(f"no permission to ask the daemon on {path}: {remedy}") from error
         except OSError as error:
-            raise ControlError(
-                f"no daemon answers on {path}: start one with `naze-bridge run`, or use --fc directly"
-            ) from error
+            remedy = "start one (sudo systemctl start naze-bridge, or naze-bridge run), or use --fc directly"
+            raise ControlError(f"no daemon answers on {path}: {remedy}") from error
         with suppress(ConnectionError):
             # Who is refused in the middle of a long request has its answer to read all the same.
             connection.sendall(to_json(request).encode() + b"\n")

@@ -1,7 +1,6 @@
 """The running bridge: its links, its store and its clock, on one event loop."""
 
 import asyncio
-import signal
 from collections.abc import Sequence
 from contextlib import suppress
 
@@ -23,6 +22,11 @@ from service.version import version
 
 #: How often it is said that nobody is found: a log that says nothing looks like a program that hangs.
 _SEARCH_REPORT_S = 60.0
+#: How long a stop waits: for a push to be done, for it to be given up, for the store. All of it is within 2 s.
+_FINISH_S = 1.0
+_ABORT_S = 0.6
+_STORE_PATIENCE_S = 0.2
+_REST_INTERVAL_S = 0.02
 _WHO_MAY_WRITE = "whoever reaches it may write missions and parameters; docs/signing.md tells how to limit that"
 
 _log = structlog.get_logger()
@@ -49,6 +53,8 @@ class Daemon:
             self._recording.tap,
         )
         self.store = StoreWorker(settings.state_dir)
+        #: Set when ground stations can connect.
+        self.started = asyncio.Event()
         self._port = self._recording.port(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
         self._links: dict[str, GcsLink] = {}
         self._timer: asyncio.TimerHandle | None = None
@@ -81,6 +87,7 @@ class Daemon:
                 if name not in self.settings.access:
                     _log.warning("gcs.open", link=name, what=_WHO_MAY_WRITE)
             self._signing.start()
+            self.started.set()
             port = self._loop.create_task(self._port.run())
             self._tick()
             await port
@@ -89,6 +96,8 @@ class Daemon:
                 port.cancel()
                 with suppress(asyncio.CancelledError):
                     await port
+                # Who sent a mission that ended with the port hears of it once that is stored.
+                await self.is_at_rest(_STORE_PATIENCE_S)
             for timer in (self._timer, self._search_report):
                 if timer is not None:
                     timer.cancel()
@@ -119,6 +128,24 @@ class Daemon:
     def _send_datagrams(self) -> None:
         for peer, data in self.bridge.ground.take_datagrams():
             self._links[peer.link].send(peer, data)
+
+    async def finish(self) -> None:
+        """Begin no more transfers; what is under way comes to a good end if that is soon, else to a clean one."""
+        self.bridge.stop_missions(self._loop.time())
+        self.flush()
+        if await self.is_at_rest(_FINISH_S):
+            return
+        self.bridge.abort_missions(self._loop.time())
+        self.flush()
+        await self.is_at_rest(_ABORT_S)
+
+    async def is_at_rest(self, seconds: float) -> bool:
+        """Wait until nothing is under way, but not longer than that; tell whether it is so."""
+        for _ in range(int(seconds / _REST_INTERVAL_S)):
+            if not self.bridge.is_conversing:
+                break
+            await asyncio.sleep(_REST_INTERVAL_S)
+        return not self.bridge.is_conversing
 
     # What the ground station links tell (service.gcs_links.GcsEvents).
 
@@ -178,21 +205,6 @@ class Daemon:
             self.flush()
 
         self.store.carry_out(effect, answered)
-
-
-async def run_until_signal(daemon: Daemon) -> None:
-    """Run the daemon until SIGINT or SIGTERM."""
-    loop = asyncio.get_running_loop()
-    running = loop.create_task(daemon.run())
-
-    def stop(number: signal.Signals) -> None:
-        _log.info("daemon.stopping", signal=number.name)
-        running.cancel()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop, number)
-    with suppress(asyncio.CancelledError):
-        await running
 
 
 def _speeds(address: FcAddress) -> Sequence[int | None]:

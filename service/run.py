@@ -8,10 +8,13 @@ from pathlib import Path
 import click
 
 from service.connection import AddressError
-from service.control import SOCKET_NAME, ControlError, ControlServer
-from service.daemon import Daemon, run_until_signal
+from service.control import ControlError, ControlServer
+from service.control_socket import socket_of_daemon
+from service.daemon import Daemon
 from service.gcs_links import LinkError
+from service.lifecycle import run_until_signal
 from service.log_setup import set_up_logging
+from service.notify import Notifier
 from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
 from service.uart_recorder import UartFileError
 from storage.state_lock import StateLock
@@ -49,7 +52,7 @@ def run(
 def _serve(settings: Settings) -> None:
     assert settings.state_dir is not None
     with StateLock(settings.state_dir):
-        asyncio.run(_main(settings, settings.state_dir / SOCKET_NAME))
+        asyncio.run(_main(settings, socket_of_daemon(settings.state_dir)))
 
 
 async def _main(settings: Settings, socket_path: Path) -> None:
@@ -57,6 +60,6 @@ async def _main(settings: Settings, socket_path: Path) -> None:
     control = ControlServer(daemon, socket_path)
     await control.start()
     try:
-        await run_until_signal(daemon)
+        await run_until_signal(daemon, Notifier())
     finally:
         await control.close()

@@ -1,0 +1,92 @@
+"""A daemon from its start to a signal, and what systemd hears meanwhile."""
+
+import asyncio
+import signal
+from contextlib import suppress
+
+import structlog
+
+from service.daemon import Daemon
+from service.notify import Notifier
+
+#: How often the line for `systemctl status` is looked at, and at least how often within the watchdog's time it is fed.
+_INTERVAL_S = 2.0
+_FEEDS = 3
+
+_log = structlog.get_logger()
+
+
+async def run_until_signal(daemon: Daemon, notifier: Notifier) -> None:
+    """Run the daemon until SIGINT or SIGTERM. A second signal does not wait for a mission under way."""
+    loop = asyncio.get_running_loop()
+    running = loop.create_task(daemon.run())
+    stopping: asyncio.Task[None] | None = None
+
+    async def stop() -> None:
+        await daemon.finish()
+        running.cancel()
+
+    def signalled(number: signal.Signals) -> None:
+        nonlocal stopping
+        _log.info("daemon.stopping", signal=number.name)
+        if stopping is None:
+            notifier.stopping()
+            stopping = loop.create_task(stop())
+        else:
+            running.cancel()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, signalled, number)
+    reporting = _Reporting(daemon, notifier)
+    ready = loop.create_task(_tell_ready(daemon, notifier))
+    try:
+        with suppress(asyncio.CancelledError):
+            await running
+    finally:
+        reporting.end()
+        ready.cancel()
+        if stopping is not None:
+            stopping.cancel()
+        notifier.close()
+
+
+async def _tell_ready(daemon: Daemon, notifier: Notifier) -> None:
+    """The flight controller may come at any time: nobody waits for it."""
+    await daemon.started.wait()
+    notifier.ready()
+
+
+class _Reporting:
+    """Feeds the watchdog and tells the link, by timers of the loop that owns the links: a thread would never stop."""
+
+    def __init__(self, daemon: Daemon, notifier: Notifier) -> None:
+        self._daemon = daemon
+        self._notifier = notifier
+        watchdog_s = notifier.watchdog_s
+        self._interval_s = _INTERVAL_S if watchdog_s is None else min(_INTERVAL_S, watchdog_s / _FEEDS)
+        self._timer: asyncio.Handle = asyncio.get_running_loop().call_soon(self._report)
+
+    def end(self) -> None:
+        """Say no more."""
+        self._timer.cancel()
+
+    def _report(self) -> None:
+        self._notifier.alive()
+        self._notifier.status(link_line(self._daemon))
+        self._timer = asyncio.get_running_loop().call_later(self._interval_s, self._report)
+
+
+def link_line(daemon: Daemon) -> str:
+    """Say in one line who is at either end."""
+    bridge = daemon.bridge
+    session = bridge.session
+    if daemon.fc_trouble:
+        where = daemon.fc_trouble
+    elif session.controller is None:
+        where = f"looking for a flight controller on {daemon.settings.fc}"
+    else:
+        speed = "" if session.speed is None else f", {session.speed} baud"
+        armed = {None: "", True: ", armed", False: ", disarmed"}[session.vehicle.armed]
+        where = f"{session.controller.name} ({session.state.value}{speed}{armed})"
+    count = len(list(bridge.ground.peers()))
+    return f"{where}; {count} ground station{'' if count == 1 else 's'}"

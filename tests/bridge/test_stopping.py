@@ -1,0 +1,117 @@
+"""The bridge is stopped while a mission is on its way: it arrives, or the old list stays; who sent it hears which."""
+
+import random
+
+import pytest
+from conversations import Upload, count_message, records_of, waypoints
+from world import Air, GroundStation, World, flash_holding
+
+from bridge.mission_desk import Refusal
+from bridge.mission_dialect import PushFailure
+from bridge.mission_log import Outcome
+from protocols.mission_item import MissionResult
+from protocols.msp.frame import MspParser
+from protocols.msp.mission import MissionCommand
+from service.simulator.options import Faults, SimOptions
+
+OLD, NEW = waypoints(20, seed=77), waypoints(146, seed=5)
+
+
+@pytest.fixture
+def world() -> World:
+    world = World(SimOptions(boot_ms=500), speeds=(115200,), flash=flash_holding(records_of(OLD)))
+    world.wait_ready()
+    return world
+
+
+def stop(world: World) -> None:
+    world.bridge.stop_missions(world.now)
+    world._flush()
+
+
+def abort(world: World) -> None:
+    world.bridge.abort_missions(world.now)
+    world._flush()
+
+
+def at_rest(world: World) -> bool:
+    return not world.bridge.is_conversing
+
+
+def test_a_push_under_way_is_finished(world: World) -> None:
+    outcome = world.push(NEW)
+    world.run(0.1)
+    assert not outcome
+    stop(world)
+    world.wait_until(at_rest, 1.0)
+    assert outcome[0][0].ack is MissionResult.ACCEPTED
+    assert world.stored == records_of(NEW)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_push_that_is_aborted_at_any_moment(world: World, seed: int) -> None:
+    """Whatever is answered is true; the board has been told, and takes the next list."""
+    outcome = world.push(NEW)
+    world.run(random.Random(seed).uniform(0, 0.45))
+    stop(world)
+    abort(world)
+    took = world.wait_until(at_rest, 1.0)
+    result = outcome[0][0]
+    if result.ack is MissionResult.ACCEPTED:
+        assert world.stored == records_of(NEW)
+        assert world.store.outcomes() == [Outcome.VERIFIED]
+    elif isinstance(result, Refusal):  # it was still asking whether the board would take a list
+        assert result.text == "naze-bridge is stopping: try again later"
+        assert world.stored == records_of(OLD)
+    else:
+        assert result.text == PushFailure.STOPPED.value
+        assert world.stored == records_of(OLD)
+        assert world.store.outcomes() == [Outcome.FAILED]
+        assert took < 0.2
+        sent = [frame.command for _, _, data in world.written for frame in MspParser().feed(data)]
+        assert MissionCommand.ABORT in sent
+    world.assert_line_was_clean()
+
+
+def test_a_board_that_is_deaf_is_left_with_its_old_list() -> None:
+    faults = Faults()
+    world = World(SimOptions(boot_ms=500), faults, speeds=(115200,), flash=flash_holding(records_of(OLD)))
+    world.wait_ready()
+    outcome = world.push(NEW)
+    world.run(0.1)
+    world.power_off()
+    world.run(0.05)
+    stop(world)
+    abort(world)
+    # The ABORT is not answered either. The daemon waits for 0.6 s, then it closes the port.
+    world.run(0.6)
+    world.unplug()
+    world.run(0.01)
+    assert at_rest(world)
+    assert outcome[0][0].ack is MissionResult.DENIED
+    assert world.stored == records_of(OLD)
+    assert world.store.outcomes() == [Outcome.FAILED]
+
+
+def test_an_upload_whose_items_are_still_coming_is_cancelled_and_kept(world: World) -> None:
+    station = GroundStation(world, air=Air(delay_s=0.005))
+    upload = Upload(station, NEW)
+    world.wait_until(lambda _: len(upload.requested) > 20, 5)
+    stop(world)
+    world.run(0.1)
+    assert world.store.outcomes() == [Outcome.CANCELLED]
+    # The item that was on its way then is answered the same.
+    assert {ack.type for ack in station.said("MISSION_ACK")} == {MissionResult.OPERATION_CANCELLED}
+    assert "Upload ended: naze-bridge stops, old mission kept" in station.texts()
+    assert world.stored == records_of(OLD)
+
+
+def test_no_transfer_is_begun_any_more(world: World) -> None:
+    station = GroundStation(world)
+    stop(world)
+    station.send(count_message(5))
+    outcome = world.push(NEW)
+    world.run(0.1)
+    assert [ack.type for ack in station.said("MISSION_ACK")] == [MissionResult.DENIED]
+    assert outcome[0][0].text == "naze-bridge is stopping: try again later"
+    assert at_rest(world)

@@ -1,0 +1,200 @@
+"""What systemd hears of a daemon, and how soon a daemon ends in the middle of a mission."""
+
+import asyncio
+import json
+import signal
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from plain_station import udp_station
+from plan import judge, plain_plan, records_of
+from programs import PATIENCE, free_port, run_naze_bridge, until
+from programs import Daemon as DaemonProgram
+
+from protocols.mission_item import MissionResult
+from service.connection import parse_fc, parse_gcs
+from service.daemon import Daemon
+from service.lifecycle import run_until_signal
+from service.notify import Notifier
+from service.settings import Settings
+
+_LONG = plain_plan(146)
+#: What systemd gives a stop before it kills (TimeoutStopSec=) is more; a loaded machine gets some of it here.
+STOPS_WITHIN_S = 2.0
+LOADED_S = 3.0
+
+
+class Systemd:
+    """The service manager's end of sd_notify(3)."""
+
+    def __init__(self, directory: Path) -> None:
+        self.path = directory / "notify"
+        self.heard: list[str] = []
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        self._socket.bind(str(self.path))
+
+    def listen(self) -> list[str]:
+        """Return all that was said so far."""
+        while True:
+            try:
+                self.heard.append(self._socket.recv(4096).decode())
+            except BlockingIOError:
+                return self.heard
+
+    def status(self) -> str:
+        told = [text for text in self.listen() if text.startswith("STATUS=")]
+        return told[-1].removeprefix("STATUS=") if told else ""
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@pytest.fixture
+def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Systemd]:
+    """Daemons that are started now find it."""
+    with closing(Systemd(tmp_path)) as systemd:
+        monkeypatch.setenv("NOTIFY_SOCKET", str(systemd.path))
+        monkeypatch.setenv("WATCHDOG_USEC", "600000")
+        yield systemd
+
+
+def test_ready_without_a_flight_controller_and_the_link_in_the_status(start: Starter, systemd: Systemd) -> None:
+    daemon = start.daemon(str(start.directory / "naze"))
+    until(lambda: "READY=1" in systemd.listen(), "READY")
+    until(lambda: "is missing: plug the flight controller in" in systemd.status(), "a word on the port")
+    assert systemd.status().endswith("; 0 ground stations")
+    start.board()
+    daemon.wait()
+    until(lambda: "(MSP, 115200 baud, disarmed); 0 ground stations" in systemd.status(), "a word on the link")
+    with udp_station(daemon.address) as station:
+        station.say_hello()
+        until(lambda: systemd.status().endswith("; 1 ground station"), "a word on the ground station")
+    assert daemon.end() == 0
+    assert systemd.listen().count("READY=1") == systemd.listen().count("STOPPING=1") == 1
+
+
+async def more_food(systemd: Systemd, before: int) -> int:
+    """Return how often the watchdog was fed, once that is more than before."""
+    for _ in range(int(PATIENCE / 0.02)):
+        fed = systemd.listen().count("WATCHDOG=1")
+        if fed > before:
+            return fed
+        await asyncio.sleep(0.02)
+    raise AssertionError(f"fed {before} times, and no more")
+
+
+async def test_the_watchdog_is_fed_by_the_loop_that_owns_the_links(systemd: Systemd, tmp_path: Path) -> None:
+    """A loop that hangs feeds it no more, whatever other threads do."""
+    daemon = Daemon(Settings(parse_fc("sim:"), [parse_gcs(f"udpin:127.0.0.1:{free_port()}")], tmp_path / "state"))
+    running = asyncio.create_task(run_until_signal(daemon, Notifier()))
+    fed = await more_food(systemd, 2)
+    time.sleep(1.0)  # noqa: ASYNC251 - this is the hang; the watchdog would have waited for 0.6 s
+    assert systemd.listen().count("WATCHDOG=1") == fed
+    await more_food(systemd, fed)
+    running.cancel()
+    await asyncio.wait([running])
+
+
+def test_a_start_that_fails_is_never_ready(start: Starter, systemd: Systemd) -> None:
+    first = start.daemon("sim:")
+    until(lambda: "READY=1" in systemd.listen(), "READY")
+    systemd.heard.clear()
+    link = f"udpin:127.0.0.1:{first.port}"
+    ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", start.directory / "other")
+    assert ended.returncode == 1
+    assert "READY=1" not in systemd.listen()
+
+
+def test_no_service_manager_and_one_that_is_gone(start: Starter, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NOTIFY_SOCKET", str(start.directory / "nobody"))
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    assert daemon.end() == 0
+    assert "Traceback" not in daemon.printed
+
+
+def push_begun(daemon: DaemonProgram) -> socket.socket:
+    """Push a long list as the command line does; return the connection once the board has some of it."""
+    connection = socket.socket(socket.AF_UNIX)
+    connection.settimeout(PATIENCE)
+    connection.connect(str(daemon.state_dir / "control.sock"))
+    items = [asdict(row.as_sent(seq, use_int=True)) for seq, row in enumerate(_LONG)]
+    connection.sendall(json.dumps({"do": "push", "source": "test", "items": items}).encode() + b"\n")
+    while b"progress" not in connection.recv(4096):
+        pass
+    return connection
+
+
+def last_answer(connection: socket.socket) -> dict[str, dict[str, object]]:
+    with connection, connection.makefile() as lines:
+        answer: dict[str, dict[str, object]] = json.loads(list(lines)[-1])
+        return answer
+
+
+def outcomes(start: Starter, daemon: DaemonProgram) -> list[str]:
+    """Ask another daemon on the same store."""
+    after = start.daemon("sim:", state_dir=daemon.state_dir)
+    after.wait_up()
+    return [mission["outcome"] for mission in after.missions()]
+
+
+def test_a_push_that_is_nearly_done_is_done(start: Starter) -> None:
+    bench = start.bench()
+    connection = push_begun(bench.daemon)
+    assert bench.daemon.end() == 0
+    assert last_answer(connection)["result"]["ack"] == "MAV_MISSION_ACCEPTED"
+    assert bench.board.records() == records_of(judge(_LONG))
+    assert outcomes(start, bench.daemon) == ["VERIFIED"]
+
+
+@pytest.mark.parametrize("trouble", ["slow", "deaf"])
+def test_a_push_that_would_take_long_is_given_up(start: Starter, trouble: str) -> None:
+    """The old list stays, who sent the new one is told, the store knows, and systemd waits for no more than 2 s."""
+    bench = start.bench("--baud", "9600") if trouble == "slow" else start.bench()
+    bench.daemon.push(plain_plan(5))
+    old = bench.board.records()
+    connection = push_begun(bench.daemon)
+    if trouble == "deaf":
+        bench.board.set("hang 10")
+    began = time.monotonic()
+    assert bench.daemon.end() == 0
+    took = time.monotonic() - began
+    assert took < LOADED_S, f"{took} s, where {STOPS_WITHIN_S} s are promised"
+    answer = last_answer(connection)["result"]
+    assert answer["ack"] == "MAV_MISSION_DENIED"
+    assert "old mission is kept" in str(answer["text"]) or trouble == "deaf"
+    assert outcomes(start, bench.daemon) == ["FAILED", "VERIFIED"]
+    if trouble == "slow":
+        assert bench.board.records() == old
+    assert "Traceback" not in bench.daemon.printed
+
+
+def test_a_second_signal_does_not_wait(start: Starter) -> None:
+    bench = start.bench()
+    connection = push_begun(bench.daemon)
+    bench.board.set("hang 10")
+    bench.daemon.process.send_signal(signal.SIGINT)
+    until(lambda: bench.daemon.has_logged("daemon.stopping"), "the first signal")
+    assert bench.daemon.end(signal.SIGINT) == 0
+    connection.close()
+    assert "Traceback" not in bench.daemon.printed
+
+
+def test_a_ground_station_hears_of_the_stop(start: Starter) -> None:
+    """Its upload is refused, and it is told why."""
+    bench = start.bench()
+    with udp_station(bench.daemon.address) as station:
+        station.say_hello()
+        station.announce(20)
+        station.wait_for("MISSION_REQUEST")
+        bench.daemon.process.send_signal(signal.SIGTERM)
+        assert station.wait_for("MISSION_ACK").type == MissionResult.OPERATION_CANCELLED
+        assert "Upload ended: naze-bridge stops" in " ".join(
+            message.text for message in station.heard if message.get_type() == "STATUSTEXT"
+        )
