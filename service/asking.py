@@ -5,7 +5,7 @@ import logging
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 import click
 from rich.console import Console
@@ -16,6 +16,7 @@ from service.control import ControlError, MissionJobs, ask_daemon
 from service.daemon import Daemon
 from service.log_setup import set_up_logging
 from service.mission_data import Json
+from service.printing import fail
 from service.settings import Settings, SettingsError
 from storage.store_error import StoreError
 
@@ -69,12 +70,6 @@ def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, tot
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("Flight controller", total=total)
         return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
-
-
-def fail(text: str) -> NoReturn:
-    """End the program with one sentence."""
-    click.echo(f"naze-bridge: {text}", err=True)
-    raise SystemExit(1)
 
 
 async def _ask_directly(fc: str, request: Json, progress: Callable[[int], None]) -> Json:

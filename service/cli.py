@@ -17,6 +17,7 @@ _COMMANDS = {
     "clear": "service.mission_commands:clear",
     "status": "service.mission_commands:status",
     "missions": "service.stored_missions:missions",
+    "fleet": "service.fleet.command:fleet",
     "sim": "service.simulator.command:sim",
     "demo": "service.demo:demo",
 }

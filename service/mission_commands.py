@@ -7,11 +7,11 @@ import click
 
 from bridge.finding import Finding
 from protocols.mission_file import MissionFileError, write_qgc_wpl
-from service.asking import STATUS, ask, ask_with_progress, bridge_options, fail
+from service.asking import STATUS, ask, ask_with_progress, bridge_options
 from service.mission_data import Json, mission_items
 from service.mission_source import load_mission, save_mission
 from service.mission_table import mission_table
-from service.printing import print_json, print_table
+from service.printing import fail, print_json, print_table
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _UNREADABLE = 2

@@ -14,10 +14,15 @@ _MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are abo
 
 def load_mission(path: Path) -> list[MissionItem]:
     """Read the mission file at `path`; MissionFileError also where the disk says no."""
-    name = click.format_filename(path)
+    return read_mission_file(mission_bytes(path), click.format_filename(path))
+
+
+def mission_bytes(path: Path) -> bytes:
+    """Return what is in the mission file at `path`, not yet understood; MissionFileError where the disk says no."""
     try:
-        return read_mission_file(read_bounded(path, _MAX_BYTES), name)
+        return read_bounded(path, _MAX_BYTES)
     except (OSError, ValueError) as error:
+        name = click.format_filename(path)
         raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None
 
 

@@ -1,6 +1,7 @@
-"""What commands print: tables that end where their text ends, and strict JSON."""
+"""What commands print: tables that end where their text ends, strict JSON, and the sentence of a failure."""
 
 import re
+from typing import NoReturn
 
 import click
 from rich.console import Console, RenderableType
@@ -21,3 +22,9 @@ def print_table(table: RenderableType) -> None:
 def print_json(value: object) -> None:
     """Print one line of JSON."""
     click.echo(to_json(value))
+
+
+def fail(text: str) -> NoReturn:
+    """End the program with one sentence and status 1."""
+    click.echo(f"naze-bridge: {text}", err=True)
+    raise SystemExit(1)

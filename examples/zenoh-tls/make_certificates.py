@@ -1,0 +1,49 @@
+"""Certificates for a fleet of one's own: `python make_certificates.py FOLDER ROUTER_HOST[,HOST...] NAME...`.
+
+Needs `pip install trustme`. Makes in FOLDER: ca.pem, which everybody gets, and ca.key, which stays here; router.pem and
+router.key for the router, which is reached under ROUTER_HOST (a name or an address); NAME.pem and NAME.key for each
+vehicle and each person. Run it again with the same FOLDER for further names: what is there is kept.
+"""
+
+import sys
+from pathlib import Path
+
+import trustme
+
+
+def main(folder: Path, hosts: list[str], names: list[str]) -> None:
+    """Make what is not there yet."""
+    folder.mkdir(parents=True, exist_ok=True)
+    authority = _authority(folder)
+    _issue(authority, folder, "router", hosts)
+    for name in names:
+        _issue(authority, folder, name, [name])
+
+
+def _authority(folder: Path) -> trustme.CA:
+    certificate, key = folder / "ca.pem", folder / "ca.key"
+    if key.exists():
+        return trustme.CA.from_pem(certificate.read_bytes(), key.read_bytes())
+    authority = trustme.CA(organization_name="naze-bridge fleet")
+    authority.cert_pem.write_to_path(str(certificate))
+    _write_secret(key, authority.private_key_pem.bytes())
+    return authority
+
+
+def _issue(authority: trustme.CA, folder: Path, name: str, hosts: list[str]) -> None:
+    if (folder / f"{name}.key").exists():
+        return
+    issued = authority.issue_cert(*hosts, common_name=name)
+    (folder / f"{name}.pem").write_bytes(b"".join(pem.bytes() for pem in issued.cert_chain_pems))
+    _write_secret(folder / f"{name}.key", issued.private_key_pem.bytes())
+
+
+def _write_secret(path: Path, data: bytes) -> None:
+    path.touch(mode=0o600)
+    path.write_bytes(data)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
+    main(Path(sys.argv[1]), sys.argv[2].split(","), sys.argv[3:])

@@ -1,0 +1,1 @@
+"""`naze-bridge fleet`: many vehicles over zenoh, seen and served from one place. Page: docs/fleet.md."""

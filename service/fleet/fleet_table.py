@@ -1,0 +1,65 @@
+"""The fleet as a table for a terminal."""
+
+from collections.abc import Iterable, Sequence
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from service.fleet.vehicle import Vehicle
+
+_UNKNOWN = "-"
+
+
+def fleet_table(fleet: Sequence[Vehicle], ages_s: Sequence[float | None] = ()) -> Table:
+    """Make one row per bridge; `ages_s`: how long ago each was heard, if that is to be shown."""
+    caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, caption=caption, caption_justify="left")
+    table.add_column("Vehicle", overflow="fold")
+    table.add_column("Speaks", no_wrap=True)
+    table.add_column("Armed")
+    for title in ("Battery", "Latitude", "Longitude", "Height"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("Mission", no_wrap=True)
+    if ages_s:
+        table.add_column("Heard", justify="right", no_wrap=True)
+    for row, vehicle in enumerate(fleet):
+        cells = _cells(vehicle)
+        if ages_s:
+            age_s = ages_s[row]
+            cells.append(Text(_UNKNOWN if age_s is None else f"{age_s:.0f} s"))
+        table.add_row(*cells)
+    return table
+
+
+def complaints(fleet: Iterable[Vehicle]) -> list[str]:
+    """Say what is wrong with the fleet, a line each."""
+    lines: dict[str, None] = {}
+    for vehicle in fleet:
+        if vehicle.bridges > 1:
+            line = f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each one its own (zenoh.vehicle)"
+            lines[line] = None
+        if not vehicle.answers:
+            lines[f"{vehicle.name}: alive, but tells no state"] = None
+    return list(lines)
+
+
+def _cells(vehicle: Vehicle) -> list[Text]:
+    armed = {True: Text("ARMED", style="bold red"), False: Text("no"), None: Text(_UNKNOWN)}[vehicle.armed]
+    mission = _UNKNOWN
+    if vehicle.mission_count is not None:
+        mission = f"{vehicle.mission_count:3} {vehicle.mission_checksum}" if vehicle.mission_count else "none"
+    return [
+        Text(vehicle.name),
+        Text(vehicle.protocol or _UNKNOWN),
+        armed,
+        _number(vehicle.battery_v, ".1f", " V"),
+        _number(vehicle.lat_deg, ".5f"),
+        _number(vehicle.lon_deg, ".5f"),
+        _number(vehicle.height_m, ".0f", " m"),
+        Text(mission),
+    ]
+
+
+def _number(value: float | None, form: str, unit: str = "") -> Text:
+    return Text(_UNKNOWN if value is None else f"{value:{form}}{unit}")

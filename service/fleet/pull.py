@@ -1,0 +1,60 @@
+"""What the vehicles' flight controllers hold, brought home."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import zenoh
+
+from protocols.mission_item import MissionItem
+from service.fleet.payload import decode, part, text, whole
+from service.fleet.session import ask
+from service.mission_data import mission_items
+from service.zenoh_link.keys import MISSION_CURRENT, full
+
+#: The bridge knows what is held, or reads it first: some seconds at 9600 baud.
+_PATIENCE_S = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What one vehicle holds; `error` says why that is not known, and the rest is empty then."""
+
+    vehicle: str
+    items: tuple[MissionItem, ...] = ()
+    count: int = 0
+    checksum: str = ""
+    error: str | None = None
+
+
+def pull(session: zenoh.Session, prefix: str, names: Collection[str]) -> list[Held]:
+    """Ask the vehicles what they hold; the answers by name, one for each."""
+    held: dict[str, Held] = {}
+    twice: set[str] = set()
+    # One question to all is as quick as one to the slowest.
+    only = next(iter(names)) if len(names) == 1 else "*"
+    for reply in ask(session, full(prefix, only, MISSION_CURRENT.suffix), timeout_s=_PATIENCE_S):
+        if reply.ok is None:
+            continue
+        name = str(reply.ok.key_expr).split("/")[1]
+        if name not in names:
+            continue
+        if name in held:
+            twice.add(name)
+        held[name] = _held(name, reply.ok)
+    for name in twice:
+        held[name] = Held(name, error="several bridges use this name: give each its own (zenoh.vehicle)")
+    silent = "it does not tell: its bridge hangs, or the router's access control denies the question"
+    return [held.get(name) or Held(name, error=silent) for name in names]
+
+
+def _held(name: str, sample: zenoh.Sample) -> Held:
+    data = decode(sample)
+    if data is None:
+        return Held(name, error="it answers what this version does not understand")
+    count, checksum, items = whole(data, "count"), text(data, "checksum"), part(data, "items")
+    if count is None or checksum is None:
+        return Held(name, error="what its flight controller holds is not known")
+    try:
+        return Held(name, tuple(mission_items(items)), count, checksum)
+    except ValueError as error:
+        return Held(name, error=f"it answers what this version does not understand: {error}")

@@ -1,0 +1,143 @@
+"""One mission to many vehicles at once; what happens to one is nothing to the others.
+
+`FleetPush` is told what comes and knows how each vehicle stands; `push` lets zenoh tell it.
+"""
+
+import queue
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import zenoh
+
+from service.fleet.payload import decode, part, text, whole
+from service.fleet.roll_call import alive
+from service.fleet.session import send_query
+from service.fleet.vehicle import Bridge, bridge_of
+from service.mission_data import Json
+from service.zenoh_link.keys import ALIVE, UPLOAD, full
+
+#: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
+_PATIENCE_S = 120.0
+_ACCEPTED = "MAV_MISSION_ACCEPTED"
+_LOOK = "`naze-bridge fleet list` tells what it holds"
+_LOST = f"it, or the router, went away before the end of the push was known; {_LOOK} when it is back"
+_SILENT = "it takes no commands: they are off there (zenoh.commands), or the router's access control denies them to you"
+_TWO = "several bridges use this name, and the mission is for one: give each its own name (zenoh.vehicle)"
+_TOO_LATE = f"the end of the push was not known after {_PATIENCE_S:.0f} s; {_LOOK}"
+
+
+@dataclass(slots=True)
+class Progress:
+    """How one vehicle stands. `records` of `total` are on its flight controller; `error` is why it failed."""
+
+    vehicle: str
+    records: int = 0
+    total: int | None = None
+    result: Json | None = None
+    error: str | None = None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it will not change any more."""
+        return self.result is not None or self.error is not None
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the vehicle does not hold the mission, as far as is known."""
+        return self.error is not None
+
+
+@dataclass(slots=True)
+class FleetPush:
+    """Every vehicle's progress, by name."""
+
+    vehicles: dict[str, Progress] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, names: Iterable[str], bridges: Iterable[Bridge]) -> "FleetPush":
+        """Make one for vehicles by name; a name that several bridges use fails at once."""
+        found = [bridge.vehicle for bridge in bridges]
+        return cls({name: Progress(name, error=_TWO if found.count(name) > 1 else None) for name in names})
+
+    @property
+    def waiting(self) -> list[str]:
+        """The vehicles that are not done."""
+        return [name for name, progress in self.vehicles.items() if not progress.is_done]
+
+    @property
+    def failed(self) -> list[Progress]:
+        """Those that do not hold the mission."""
+        return [progress for progress in self.vehicles.values() if progress.has_failed]
+
+    def replied(self, vehicle: str, reply: Json | None) -> None:
+        """Take a reply: progress, or the result of a mission that was accepted."""
+        progress = self.vehicles[vehicle]
+        if progress.is_done or reply is None:
+            return
+        records, total = whole(reply, "progress"), whole(reply, "of")
+        if records is not None:
+            progress.records, progress.total = records, total
+        result = part(reply, "result")
+        if isinstance(result, dict):
+            if result.get("ack") == _ACCEPTED:
+                progress.result = result
+            else:
+                progress.error = text(result, "text") or "it answers what this version does not understand"
+
+    def refused(self, vehicle: str, error: Json | None) -> None:
+        """Take an error; zenoh's own, that time is over, is no object."""
+        progress = self.vehicles[vehicle]
+        if not progress.is_done:
+            progress.error = _TOO_LATE if error is None else text(error, "error") or "it refuses without a reason"
+
+    def ended(self, vehicle: str, *, is_alive: bool) -> None:
+        """No more replies will come; one that is alive and never said a word did not take the question."""
+        progress = self.vehicles[vehicle]
+        if not progress.is_done:
+            progress.error = _SILENT if is_alive and progress.total is None else _LOST
+
+    def gone(self, vehicle: str) -> None:
+        """Its liveliness token is no more."""
+        progress = self.vehicles.get(vehicle)
+        if progress is not None and not progress.is_done:
+            progress.error = _LOST
+
+
+def push(
+    session: zenoh.Session, prefix: str, fleet: FleetPush, mission: bytes, show: Callable[[FleetPush], None]
+) -> None:
+    """Send the mission to all and wait until each is done; `show` is called whenever something has changed."""
+    events: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+
+    def taken(name: str, reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            fleet.replied(name, decode(reply.ok))
+        elif reply.err is not None:
+            fleet.refused(name, decode(reply.err))
+
+    def token(sample: zenoh.Sample) -> None:
+        bridge = bridge_of(str(sample.key_expr), prefix)
+        if bridge is not None and sample.kind is zenoh.SampleKind.DELETE:
+            events.put(lambda: fleet.gone(bridge.vehicle))
+
+    def ended(name: str) -> None:
+        if not fleet.vehicles[name].is_done:
+            fleet.ended(name, is_alive=name in {bridge.vehicle for bridge in alive(session, prefix)})
+
+    def start(name: str) -> None:
+        send_query(
+            session,
+            full(prefix, name, UPLOAD.suffix),
+            lambda reply: events.put(lambda: taken(name, reply)),
+            lambda: events.put(lambda: ended(name)),
+            mission,
+            _PATIENCE_S,
+        )
+
+    with session.liveliness().declare_subscriber(full(prefix, "*", f"{ALIVE}/*"), token):
+        for name in fleet.waiting:
+            start(name)
+        show(fleet)
+        while fleet.waiting:
+            events.get()()
+            show(fleet)

@@ -1,0 +1,56 @@
+"""Who is alive, and how each one is: one question to the whole fleet."""
+
+import zenoh
+
+from service.fleet.payload import decode_reply
+from service.fleet.session import FleetError, ask
+from service.fleet.vehicle import Bridge, Vehicle, as_fleet, bridge_of, vehicle_of
+from service.mission_data import Json
+from service.zenoh_link.keys import ALIVE, STATE, full
+
+#: A bridge that has not told its state by then is shown as one that does not answer.
+_PATIENCE_S = 2.0
+
+
+def alive(session: zenoh.Session, prefix: str) -> set[Bridge]:
+    """Return the bridges whose liveliness tokens are there."""
+    replies = session.liveliness().get(full(prefix, "*", f"{ALIVE}/*"), timeout=_PATIENCE_S)
+    samples = [reply.ok for reply in replies if reply.ok is not None]
+    return {bridge for sample in samples if (bridge := bridge_of(str(sample.key_expr), prefix)) is not None}
+
+
+def roll_call(session: zenoh.Session, prefix: str) -> list[Vehicle]:
+    """Return the fleet by name. Takes as long as the slowest bridge, two seconds at most."""
+    bridges = alive(session, prefix)
+    states: dict[Bridge, Json] = {}
+    # None to hear, nothing to wait for.
+    if bridges:
+        for reply in ask(session, full(prefix, "*", STATE.suffix), timeout_s=_PATIENCE_S):
+            state, bridge = decode_reply(reply), _replier(reply)
+            if state is not None and bridge in bridges:
+                states[bridge] = state
+                if len(states) == len(bridges):
+                    break
+    return as_fleet(vehicle_of(bridge, states.get(bridge)) for bridge in bridges)
+
+
+def chosen(bridges: set[Bridge], names: tuple[str, ...], prefix: str) -> list[str]:
+    """Return the names of the vehicles that are meant, all if none is named; FleetError if one is not there."""
+    there = sorted({bridge.vehicle for bridge in bridges})
+    if not there:
+        raise FleetError(f"no vehicle is alive under {prefix!r}: is naze-bridge running there, with this prefix?")
+    for name in names:
+        if name not in there:
+            raise FleetError(f"no vehicle {name!r} is alive; there {_are(there)}")
+    return list(dict.fromkeys(names)) or there
+
+
+def _are(names: list[str]) -> str:
+    return f"is {names[0]}" if len(names) == 1 else f"are {', '.join(names)}"
+
+
+def _replier(reply: zenoh.Reply) -> Bridge | None:
+    """Return whose reply it is: its key names the vehicle, its sender the session."""
+    if reply.ok is None or reply.replier_id is None:
+        return None
+    return Bridge(str(reply.ok.key_expr).split("/")[-len(STATE.suffix.split("/")) - 1], str(reply.replier_id.zid))

@@ -1,0 +1,127 @@
+"""How `naze-bridge fleet` joins the vehicles' zenoh: as a client of one router, or of one vehicle directly.
+
+A client, because sessions in mode peer that meet at a router only do not see each other through it.
+"""
+
+import json
+import queue
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from service.zenoh_link.endpoint_trouble import TlsFiles, endpoint_trouble
+
+DEFAULT_ENDPOINT = "tcp/localhost:7447"
+
+
+class FleetError(Exception):
+    """What was asked of the fleet cannot be done; one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetAddress:
+    """Where the fleet is. Of several endpoints the first that answers serves.
+
+    `config_file`: a zenoh configuration to start from, for TLS, passwords and the like.
+    """
+
+    prefix: str = "fleet"
+    connect: Sequence[str] = ()
+    config_file: Path | None = None
+
+
+def open_session(address: FleetAddress) -> zenoh.Session:
+    """Join; FleetError says why that is impossible."""
+    config = _config(address)
+    endpoints = _get(config, "connect/endpoints") or []
+    if not isinstance(endpoints, list) or not endpoints:
+        raise FleetError(f"{address.config_file} names no connect/endpoints: add them, or use --connect")
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        trouble = endpoint_trouble([str(each) for each in endpoints], _tls_files(config))
+        raise FleetError(f"no way into the fleet; {trouble}") from error
+
+
+def ask(
+    session: zenoh.Session, selector: str, payload: bytes | None = None, timeout_s: float = 2.0
+) -> Iterator[zenoh.Reply]:
+    """Yield the replies to a query as they come, of every vehicle that is meant."""
+    replies: queue.SimpleQueue[zenoh.Reply | None] = queue.SimpleQueue()
+    send_query(session, selector, replies.put, lambda: replies.put(None), payload, timeout_s)
+    while (reply := replies.get()) is not None:
+        yield reply
+
+
+def send_query(
+    session: zenoh.Session,
+    selector: str,
+    replied: Callable[[zenoh.Reply], Any],
+    ended: Callable[[], Any],
+    payload: bytes | None,
+    timeout_s: float,
+) -> None:
+    """Send a query; every reply comes (two vehicles of one name give two), and then `ended`, on zenoh's threads."""
+    session.get(
+        selector,
+        zenoh.handlers.Callback(replied, ended),
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        payload=payload,
+        timeout=timeout_s,
+    )
+
+
+def is_connected(session: zenoh.Session) -> bool:
+    """Whether the router (or the one vehicle) is there at this moment."""
+    return bool(session.info.routers_zid() or session.info.peers_zid())
+
+
+def _config(address: FleetAddress) -> zenoh.Config:
+    config = zenoh.Config() if address.config_file is None else _from_file(address.config_file)
+    endpoints = list(address.connect)
+    if not endpoints and address.config_file is None:
+        endpoints = [DEFAULT_ENDPOINT]
+    settings: dict[str, object] = {"mode": "client", "listen/endpoints": [], "scouting/multicast/enabled": False}
+    if endpoints:
+        settings["connect/endpoints"] = endpoints
+    try:
+        for key, value in settings.items():
+            config.insert_json5(key, json.dumps(value))
+    except zenoh.ZError as error:
+        raise FleetError(f"zenoh does not take --connect {' --connect '.join(endpoints)}: {_brief(error)}") from error
+    return config
+
+
+def _from_file(path: Path) -> zenoh.Config:
+    try:
+        path.open("rb").close()  # zenoh's own words for a file that is not there are long
+        return zenoh.Config.from_file(str(path))
+    except OSError as error:
+        raise FleetError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+    except zenoh.ZError as error:
+        raise FleetError(f"{path} is no zenoh configuration: {_brief(error)}") from error
+
+
+def _brief(error: zenoh.ZError) -> str:
+    """Return zenoh's words without the place in its source, on one line."""
+    return " ".join(str(error).split(" at /")[0].split())
+
+
+def _get(config: zenoh.Config, key: str) -> object:
+    try:
+        value: object = json.loads(config.get_json(key))
+    except (zenoh.ZError, ValueError):
+        return None
+    return value
+
+
+def _tls_files(config: zenoh.Config) -> TlsFiles:
+    def path(name: str) -> Path | None:
+        value = _get(config, f"transport/link/tls/{name}")
+        return Path(value) if isinstance(value, str) else None
+
+    return TlsFiles(path("root_ca_certificate"), path("connect_certificate"), path("connect_private_key"))

@@ -1,0 +1,82 @@
+"""A vehicle of the fleet, as its `state` tells."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from service.fleet.payload import flag, number, text, whole
+from service.mission_data import Json
+from service.zenoh_link.keys import ALIVE
+from service.zenoh_link.settings import ZenohSettingsError, check_name
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Bridge:
+    """Who says that he is alive: a vehicle's name, and zenoh's id of the session, which no two bridges share."""
+
+    vehicle: str
+    session_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """What is known of one vehicle; None: not known.
+
+    `answers`: whether its bridge told its state. `bridges`: how many use this name: 1 as it should be.
+    """
+
+    name: str
+    session_id: str
+    answers: bool = False
+    bridges: int = 1
+    protocol: str | None = None
+    flight_controller: str | None = None
+    armed: bool | None = None
+    mode: str | None = None
+    battery_v: float | None = None
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    height_m: float | None = None
+    mission_count: int | None = None
+    mission_checksum: str | None = None
+
+
+def bridge_of(key: str, prefix: str) -> Bridge | None:
+    """Return whose liveliness token a key is; None if it is none that a bridge of ours has."""
+    match key.split("/"):
+        case [first, name, middle, session_id] if first == prefix and middle == ALIVE:
+            try:
+                check_name("vehicle", name)
+            except ZenohSettingsError:
+                return None
+            return Bridge(name, session_id)
+    return None
+
+
+def vehicle_of(bridge: Bridge, state: Json | None) -> Vehicle:
+    """Make a vehicle of the payload of its `state`; None: it told nothing."""
+    if state is None:
+        return Vehicle(bridge.vehicle, bridge.session_id)
+    return Vehicle(
+        bridge.vehicle,
+        bridge.session_id,
+        answers=True,
+        protocol=text(state, "link", "state"),
+        flight_controller=text(state, "link", "flight_controller"),
+        armed=flag(state, "status", "armed"),
+        mode=text(state, "status", "mode"),
+        battery_v=number(state, "battery", "voltage_v"),
+        lat_deg=number(state, "position", "lat_deg"),
+        lon_deg=number(state, "position", "lon_deg"),
+        height_m=number(state, "position", "height_m"),
+        mission_count=whole(state, "mission", "count"),
+        mission_checksum=text(state, "mission", "checksum"),
+    )
+
+
+def as_fleet(vehicles: Iterable[Vehicle]) -> list[Vehicle]:
+    """Sort vehicles by name, and count who shares one."""
+    found = list(vehicles)
+    bridges = Counter(vehicle.name for vehicle in found)
+    counted = [replace(vehicle, bridges=bridges[vehicle.name]) for vehicle in found]
+    return sorted(counted, key=lambda vehicle: (vehicle.name, vehicle.session_id))

@@ -1,0 +1,87 @@
+"""Why a zenoh endpoint does not let us in: zenoh itself only says that it could not connect.
+
+So the first steps are taken once more with the standard library, which tells an expired certificate from a wrong name.
+Blocks for up to a few seconds: not for an event loop.
+"""
+
+import re
+import socket
+import ssl
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+_ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P<port>\d+)(?:[?#].*)?")
+_PATIENCE_S = 2.0
+#: How long a refusal of our own certificate is waited for: TLS 1.3 tells it after the handshake.
+_REFUSAL_S = 0.5
+_OVER_TCP = ("tcp", "tls", "ws")
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """PEM files as zenoh's `transport/link/tls` names them; None: not given."""
+
+    root_ca_certificate: Path | None = None
+    connect_certificate: Path | None = None
+    connect_private_key: Path | None = None
+
+
+def endpoint_trouble(endpoints: Sequence[str], files: TlsFiles) -> str:
+    """Return what is wrong with each endpoint, in one line."""
+    return "; ".join(f"{endpoint}: {_trouble(endpoint, files)}" for endpoint in endpoints)
+
+
+def _trouble(endpoint: str, files: TlsFiles) -> str:
+    match = _ENDPOINT.fullmatch(endpoint)
+    if match is None:
+        return 'this is no endpoint, which looks like "tcp/192.168.4.1:7447"'
+    if match["protocol"] not in _OVER_TCP:
+        return "no answer"
+    host, port = match["host"].strip("[]"), int(match["port"])
+    try:
+        with socket.create_connection((host, port), _PATIENCE_S) as connection:
+            if match["protocol"] == "tls":
+                return _tls_trouble(connection, host, files)
+    except ssl.SSLCertVerificationError as error:
+        return f"the router's certificate is not accepted: {error.verify_message}"
+    except ssl.SSLError as error:
+        return f"no secure connection: {_words(error)}"
+    except socket.gaierror:
+        return f"nobody knows a host {host!r}"
+    except TimeoutError:
+        return "no answer"
+    except OverflowError:
+        return "a port is at most 65535"
+    except OSError as error:
+        return (error.strerror or str(error)).lower()
+    return "somebody listens there, but lets us not in: check user and password, and that it is a zenoh router"
+
+
+def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
+    """Go on with TLS as zenoh does; SSLError or OSError is the trouble, too."""
+    context = ssl.create_default_context()
+    for path in (files.root_ca_certificate, files.connect_certificate, files.connect_private_key):
+        if path is not None and not path.is_file():
+            return f"there is no file {path}"
+    try:
+        if files.root_ca_certificate is not None:
+            context = ssl.create_default_context(cafile=files.root_ca_certificate)
+        if files.connect_certificate is not None:
+            context.load_cert_chain(files.connect_certificate, files.connect_private_key)
+    except ssl.SSLError as error:
+        return f"our own certificate or its key cannot be used: {_words(error)}"
+    with context.wrap_socket(connection, server_hostname=host) as secured:
+        secured.settimeout(_REFUSAL_S)
+        try:
+            secured.recv(1)
+        except TimeoutError:
+            return "it takes our certificate, but lets us not in: check user and password, and the router's log"
+        except ssl.SSLError as error:
+            return f"the router refuses our certificate: {_words(error)}"
+    return "the router hangs up: is it a zenoh router?"
+
+
+def _words(error: ssl.SSLError) -> str:
+    """Return OpenSSL's reason, as "tlsv13 alert certificate required", in lower case."""
+    return (error.reason or error.strerror or str(error)).replace("_", " ").lower()

@@ -1,0 +1,210 @@
+"""The examples for a fleet behind a router, as they stand: who comes in, who does not and why, who may do what."""
+
+import datetime
+import json
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import trustme
+import zenoh
+from programs import free_port, run_naze_bridge, until
+from zenoh_router import EXAMPLES, running_router
+
+_ELSEWHERE = "/etc/naze-bridge"
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """A router, and the folder with everybody's files. `endpoint` is what the examples call router.local."""
+
+    folder: Path
+    endpoint: str
+
+    def config(self, of: str, name: str) -> Path:
+        """The example `of` (vehicle or pilot) as `name` would have it."""
+        path = self.folder / f"{name}-{of}.json5"
+        text = (self.folder / f"{of}.json5").read_text()
+        path.write_text(text.replace({"vehicle": "naze-1", "pilot": "pilot"}[of], name) if of != name else text)
+        return path
+
+    def open(self, of: str, name: str) -> zenoh.Session:
+        return zenoh.open(zenoh.Config.from_file(self.config(of, name)))
+
+    def fleet_list(self, config: Path) -> subprocess.CompletedProcess[str]:
+        return run_naze_bridge("fleet", "list", "--zenoh-config", config)
+
+
+def example(folder: Path, of: str, endpoint: str) -> None:
+    """Copy an example to where it will be used; only places are changed."""
+    shutil.copytree(EXAMPLES / of, folder, dirs_exist_ok=True)
+    scheme, _, port = endpoint.partition("/")[0], None, endpoint.rpartition(":")[2]
+    for path in folder.glob("*.json5"):
+        text = path.read_text().replace(f"{_ELSEWHERE}/tls", str(folder)).replace(_ELSEWHERE, str(folder))
+        text = text.replace(f"{scheme}/router.local:7447", endpoint).replace("/0.0.0.0:7447", f"/127.0.0.1:{port}")
+        path.write_text(text)
+
+
+@pytest.fixture(scope="module")
+def stack() -> Iterator[ExitStack]:
+    with ExitStack() as stack:
+        yield stack
+
+
+@pytest.fixture(scope="module")
+def tls(tmp_path_factory: pytest.TempPathFactory, stack: ExitStack) -> Fleet:
+    folder = tmp_path_factory.mktemp("tls")
+    endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
+    example(folder, "zenoh-tls", endpoint)
+    script = [sys.executable, str(folder / "make_certificates.py"), str(folder), "localhost,127.0.0.1"]
+    subprocess.run([*script, "naze-1", "naze-2", "pilot"], check=True)
+    before = (folder / "pilot.pem").read_bytes()
+    subprocess.run([*script, "pilot", "guest", "stranger"], check=True)
+    assert (folder / "pilot.pem").read_bytes() == before
+    stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))
+    return Fleet(folder, endpoint)
+
+
+@pytest.fixture(scope="module")
+def passwords(tmp_path_factory: pytest.TempPathFactory, stack: ExitStack) -> Fleet:
+    folder = tmp_path_factory.mktemp("passwords")
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    example(folder, "zenoh-password", endpoint)
+    stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))
+    return Fleet(folder, endpoint)
+
+
+@pytest.fixture(params=["tls", "passwords"])
+def secured(request: pytest.FixtureRequest) -> Fleet:
+    found: Fleet = request.getfixturevalue(request.param)
+    return found
+
+
+def stands_in_for(stack: ExitStack, session: zenoh.Session, vehicle: str) -> None:
+    """What a bridge declares."""
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply(query.key_expr, "{}")
+
+    # The answer is given under the vehicle's own key, as a bridge does: a query's may have wildcards.
+    def state(query: zenoh.Query) -> None:
+        with query:
+            query.reply(f"fleet/{vehicle}/state", json.dumps({"link": {"state": "MSP"}}), encoding="application/json")
+
+    stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/state", state))
+    stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/@cmd/v1/status", answer))
+    stack.enter_context(session.liveliness().declare_token(f"fleet/{vehicle}/alive/{session.zid()}"))
+
+
+def asks(session: zenoh.Session, key: str) -> int:
+    return sum(reply.ok is not None for reply in session.get(key, timeout=5.0))
+
+
+def test_a_vehicle_is_seen_by_everybody_and_commanded_by_the_pilot(secured: Fleet) -> None:
+    with ExitStack() as stack:
+        vehicle = stack.enter_context(secured.open("vehicle", "naze-1"))
+        stands_in_for(stack, vehicle, "naze-1")
+        pilot, guest = (stack.enter_context(secured.open("pilot", name)) for name in ("pilot", "guest"))
+        until(lambda: asks(pilot, "fleet/naze-1/@cmd/v1/status") == 1, "the pilot's command")
+        assert asks(guest, "fleet/naze-1/state") == 1
+        assert asks(guest, "fleet/naze-1/@cmd/v1/status") == 0
+        heard: list[str] = []
+        stack.enter_context(guest.declare_subscriber("fleet/*/telemetry/*", lambda sample: heard.append(str(sample))))
+        publisher = stack.enter_context(vehicle.declare_publisher("fleet/naze-1/telemetry/position"))
+
+        def hears() -> bool:
+            publisher.put("{}")
+            return bool(heard)
+
+        until(hears, "a sample")
+        listed = secured.fleet_list(secured.config("pilot", "pilot"))
+        assert (listed.returncode, "naze-1" in listed.stdout) == (0, True), listed
+
+
+def test_a_vehicle_cannot_be_another_one(secured: Fleet) -> None:
+    with ExitStack() as stack:
+        vehicle = stack.enter_context(secured.open("vehicle", "naze-2"))
+        stands_in_for(stack, vehicle, "naze-1")
+        stands_in_for(stack, vehicle, "naze-2")
+        pilot = stack.enter_context(secured.open("pilot", "pilot"))
+        until(lambda: asks(pilot, "fleet/naze-2/@cmd/v1/status") == 1, "the answer under its own name")
+        assert asks(pilot, "fleet/naze-1/@cmd/v1/status") == 0
+        tokens = [str(reply.ok.key_expr) for reply in pilot.liveliness().get("fleet/*/alive/*") if reply.ok]
+        assert [key.split("/")[1] for key in tokens] == ["naze-2"]
+
+
+def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
+    with ExitStack() as stack:
+        vehicle = stack.enter_context(tls.open("vehicle", "naze-1"))
+        stands_in_for(stack, vehicle, "naze-1")
+        pilot, stranger = (stack.enter_context(tls.open("pilot", name)) for name in ("pilot", "stranger"))
+        until(lambda: asks(pilot, "fleet/naze-1/state") == 1, "the pilot's question")
+        assert asks(stranger, "fleet/naze-1/state") == asks(stranger, "fleet/naze-1/@cmd/v1/status") == 0
+
+
+def refused(listed: subprocess.CompletedProcess[str]) -> str:
+    assert (listed.returncode, listed.stdout) == (1, ""), listed
+    (sentence,) = listed.stderr.splitlines()
+    assert sentence.startswith("naze-bridge: no way into the fleet; "), sentence
+    return sentence
+
+
+def test_a_wrong_password(passwords: Fleet) -> None:
+    config = passwords.config("pilot", "pilot")
+    config.write_text(config.read_text().replace("change-me", "guessed"))
+    assert "check user and password" in refused(passwords.fleet_list(config))
+
+
+Issue = Callable[[trustme.CA, trustme.CA], trustme.LeafCert]
+_PAST = {"not_before": datetime.datetime(2020, 1, 1), "not_after": datetime.datetime(2021, 1, 1)}
+
+
+def write(folder: Path, name: str, issued: trustme.LeafCert) -> None:
+    issued.private_key_pem.write_to_path(str(folder / f"{name}.key"))
+    (folder / f"{name}.pem").write_bytes(b"".join(pem.bytes() for pem in issued.cert_chain_pems))
+
+
+@pytest.mark.parametrize(
+    ("name", "issue", "said"),
+    [
+        ("foreign", lambda _, other: other.issue_cert("pilot", common_name="pilot"), "refuses our certificate"),
+        ("old", lambda own, _: own.issue_cert("pilot", common_name="pilot", **_PAST), "certificate expired"),
+    ],
+)
+def test_a_pilots_certificate_that_does_not_hold(tls: Fleet, name: str, issue: Issue, said: str) -> None:
+    own = trustme.CA.from_pem((tls.folder / "ca.pem").read_bytes(), (tls.folder / "ca.key").read_bytes())
+    write(tls.folder, name, issue(own, trustme.CA()))
+    assert said in refused(tls.fleet_list(tls.config("pilot", name)))
+
+
+def test_no_certificate_of_ours(tls: Fleet) -> None:
+    config = tls.config("pilot", "nobody")
+    assert f"there is no file {tls.folder / 'nobody.pem'}" in refused(tls.fleet_list(config))
+
+
+@pytest.mark.parametrize(
+    ("issue", "said"),
+    [
+        (lambda own, _: own.issue_cert("localhost", **_PAST), "certificate has expired"),
+        (lambda own, _: own.issue_cert("elsewhere.example"), "Hostname mismatch"),
+        (lambda _, other: other.issue_cert("localhost"), "unable to get local issuer certificate"),
+    ],
+    ids=["expired", "another name", "not ours"],
+)
+def test_a_routers_certificate_that_does_not_hold(tls: Fleet, tmp_path: Path, issue: Issue, said: str) -> None:
+    endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
+    shutil.copytree(tls.folder, tmp_path, dirs_exist_ok=True)
+    own = trustme.CA.from_pem((tmp_path / "ca.pem").read_bytes(), (tmp_path / "ca.key").read_bytes())
+    write(tmp_path, "router", issue(own, trustme.CA()))
+    port, new_port = (each.rpartition(":")[2] for each in (tls.endpoint, endpoint))
+    for path in tmp_path.glob("*.json5"):
+        path.write_text(path.read_text().replace(str(tls.folder), str(tmp_path)).replace(f":{port}", f":{new_port}"))
+    with running_router(tmp_path, endpoint, tmp_path / "router.json5"):
+        assert said in refused(run_naze_bridge("fleet", "list", "--zenoh-config", tmp_path / "pilot.json5"))

@@ -1,0 +1,52 @@
+"""The router of a fleet as a process of its own: examples/zenoh_router.py."""
+
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from programs import PATIENCE, Program, free_port, until
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+class Router(Program):
+    """A router that listens on `endpoint`; `config`: with a zenoh configuration, which must say the same endpoint."""
+
+    def __init__(self, directory: Path, endpoint: str = "", config: Path | None = None) -> None:
+        self.endpoint = endpoint or f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+        super().__init__(directory / "router.log", str(config or self.endpoint))
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, str(EXAMPLES / "zenoh_router.py"), *self._arguments]
+        with self._output.open("ab") as file:
+            self._starts = self._output.read_text().count("is up")
+            return subprocess.Popen(command, stdout=file, stderr=file)
+
+    def wait(self) -> None:
+        until(lambda: self.printed.count("is up") > self._starts or not self.is_alive, "the router")
+        assert self.is_alive, self.printed
+
+    def stop(self) -> None:
+        """Go away; what is stopped (SIGSTOP) goes on first."""
+        if self.is_alive:
+            self.process.send_signal(signal.SIGCONT)
+            self.process.terminate()
+            self.process.wait(PATIENCE)
+
+    def start_again(self) -> None:
+        self.process = self._start()
+        self.wait()
+
+
+@contextmanager
+def running_router(directory: Path, endpoint: str = "", config: Path | None = None) -> Iterator[Router]:
+    router = Router(directory, endpoint, config)
+    try:
+        router.wait()
+        yield router
+    finally:
+        router.end(signal.SIGKILL)
