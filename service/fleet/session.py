@@ -15,6 +15,8 @@ import zenoh
 from service.zenoh_link.endpoint_trouble import TlsFiles, endpoint_trouble
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
+#: Somebody who does not speak zenoh is given up after so long; zenoh's own patience is 10 s.
+_OPEN_TIMEOUT_MS = 3000
 
 
 class FleetError(Exception):
@@ -85,7 +87,12 @@ def _config(address: FleetAddress) -> zenoh.Config:
     endpoints = list(address.connect)
     if not endpoints and address.config_file is None:
         endpoints = [DEFAULT_ENDPOINT]
-    settings: dict[str, object] = {"mode": "client", "listen/endpoints": [], "scouting/multicast/enabled": False}
+    settings: dict[str, object] = {
+        "mode": "client",
+        "listen/endpoints": [],
+        "scouting/multicast/enabled": False,
+        "transport/unicast/open_timeout": _OPEN_TIMEOUT_MS,
+    }
     if endpoints:
         settings["connect/endpoints"] = endpoints
     try:

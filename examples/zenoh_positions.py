@@ -1,0 +1,39 @@
+"""Hear where every vehicle of a fleet is: `python zenoh_positions.py [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
+
+The same for the shell, with the zenoh project's own tools: docs/fleet.md. Fields and units: docs/zenoh.md.
+"""
+
+import json
+import sys
+import time
+
+import zenoh
+
+
+def main(endpoint: str) -> None:
+    """Print a line for each position that comes, until Ctrl-C."""
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    newest: dict[str, int] = {}
+
+    def heard(sample: zenoh.Sample) -> None:
+        key = str(sample.key_expr)
+        vehicle = key.split("/")[1]
+        position = json.loads(sample.payload.to_bytes())
+        # The numbers of a key are without gaps: what is missing was lost on the way, as telemetry may be.
+        lost = position["seq"] - newest.get(key, position["seq"] - 1) - 1
+        newest[key] = position["seq"]
+        place = (position["lat_deg"], position["lon_deg"], position["height_m"])
+        print(f"{vehicle}: lat, lon, height {place}" + (f", {lost} lost before" if lost > 0 else ""), flush=True)
+
+    with zenoh.open(config) as session, session.declare_subscriber("fleet/*/telemetry/position", heard):
+        try:
+            while True:
+                time.sleep(1)
+        except KeyboardInterrupt:
+            print()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1] if len(sys.argv) > 1 else "tcp/localhost:7447")

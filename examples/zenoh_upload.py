@@ -1,0 +1,45 @@
+"""Write a mission to one vehicle: `python zenoh_upload.py VEHICLE FILE [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
+
+The vehicle must take commands: `commands = true` in its [zenoh] table, docs/zenoh.md.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import zenoh
+
+
+def main(vehicle: str, file: str, endpoint: str) -> int:
+    """Print how it goes and how it ends; return the exit status."""
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    with zenoh.open(config) as session:
+        replies = session.get(
+            f"fleet/{vehicle}/@cmd/v1/mission/upload",
+            payload=Path(file).read_bytes(),
+            timeout=120.0,
+            # Without this only the last reply comes, and not the progress before it.
+            consolidation=zenoh.ConsolidationMode.NONE,
+        )
+        for reply in replies:
+            if reply.err is not None:
+                print("Refused:", reply.err.payload.to_string())
+                return 1
+            assert reply.ok is not None
+            answer = json.loads(reply.ok.payload.to_bytes())
+            if "result" in answer:
+                print(answer["result"]["text"])
+                for finding in answer["result"]["findings"]:
+                    print(" ", finding)
+                return 0
+            print(f"{answer['progress']} of {answer['of']} records", flush=True)
+    print("No answer: is the vehicle there, and does it take commands?")
+    return 1
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    sys.exit(main(sys.argv[1], sys.argv[2], sys.argv[3] if len(sys.argv) > 3 else "tcp/localhost:7447"))

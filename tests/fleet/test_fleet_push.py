@@ -1,0 +1,88 @@
+"""The bookkeeping of a push to many vehicles: whatever comes when, each ends once and for its own reason."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.fleet.push import FleetPush
+from service.fleet.vehicle import Bridge
+
+ACCEPTED = {"result": {"ack": "MAV_MISSION_ACCEPTED", "text": "Mission verified: 3 records", "findings": []}}
+NAMES = ("a", "b", "c")
+
+
+def push_to(*names: str) -> FleetPush:
+    return FleetPush.of(names, [Bridge(name, f"{number}") for number, name in enumerate(names)])
+
+
+def test_one_that_fails_leaves_the_others_alone() -> None:
+    fleet = push_to(*NAMES)
+    fleet.replied("a", {"progress": 2, "of": 3})
+    fleet.refused("b", {"error": "Armed: disarm to change the mission"})
+    assert fleet.waiting == ["a", "c"]
+    fleet.replied("a", ACCEPTED)
+    fleet.gone("c")
+    assert fleet.waiting == []
+    assert [each.vehicle for each in fleet.failed] == ["b", "c"]
+    assert fleet.vehicles["b"].error == "Armed: disarm to change the mission"
+    assert "went away" in str(fleet.vehicles["c"].error)
+    assert fleet.vehicles["a"].result == ACCEPTED["result"]
+
+
+def test_a_vehicle_that_goes_after_its_success_has_not_failed() -> None:
+    fleet = push_to("a")
+    fleet.replied("a", ACCEPTED)
+    fleet.ended("a", is_alive=True)
+    fleet.gone("a")
+    assert fleet.failed == []
+
+
+def test_silence_has_three_reasons() -> None:
+    fleet = push_to(*NAMES)
+    fleet.ended("a", is_alive=True)
+    fleet.ended("b", is_alive=False)
+    fleet.refused("c", None)
+    reasons = [str(each.error) for each in fleet.failed]
+    assert ["takes no commands" in reasons[0], "went away" in reasons[1], "not known after" in reasons[2]] == [True] * 3
+
+
+def test_a_name_that_two_bridges_use_gets_nothing() -> None:
+    fleet = FleetPush.of(["a", "b"], [Bridge("a", "1"), Bridge("a", "2"), Bridge("b", "3")])
+    assert fleet.waiting == ["b"]
+    assert "several bridges" in str(fleet.vehicles["a"].error)
+
+
+def test_an_answer_that_is_not_accepted_has_failed() -> None:
+    fleet = push_to("a")
+    fleet.replied("a", {"result": {"ack": "MAV_MISSION_NO_SPACE", "text": "Too many\x1b[2J items"}})
+    assert fleet.vehicles["a"].error == "Too many?[2J items"
+
+
+_ODD = [None, True, 0, -1, 2.5, "", "x", [], {}, {"ack": 3}, {"ack": "MAV_MISSION_DENIED"}, ACCEPTED["result"]]
+_ANSWERS = st.none() | st.dictionaries(
+    st.sampled_from(["progress", "of", "result", "error"]), st.sampled_from(_ODD), max_size=4
+)
+_EVENTS = st.tuples(st.sampled_from(["replied", "refused", "ended", "gone"]), st.sampled_from(NAMES), _ANSWERS)
+
+
+@given(st.lists(_EVENTS, max_size=20))
+def test_whatever_comes(events: list[tuple[str, str, dict[str, object] | None]]) -> None:
+    fleet = push_to(*NAMES)
+    ends: dict[str, tuple[object, object]] = {}
+    for kind, name, answer in events:
+        match kind:
+            case "replied":
+                fleet.replied(name, answer)
+            case "refused":
+                fleet.refused(name, answer)
+            case "ended":
+                fleet.ended(name, is_alive=answer is None)
+            case "gone":
+                fleet.gone(name)
+        for each in fleet.vehicles.values():
+            if each.is_done:
+                assert ends.setdefault(each.vehicle, (each.result, each.error)) == (each.result, each.error)
+                assert (each.result is None) == each.has_failed
+                assert each.error != ""
+    for name in fleet.waiting:
+        fleet.ended(name, is_alive=False)
+    assert fleet.waiting == []

@@ -1,0 +1,103 @@
+"""How `naze-bridge fleet` finds its way in, and what it says if there is none."""
+
+import re
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from programs import free_port, run_naze_bridge
+from zenoh_router import EXAMPLES, Router, running_router
+
+
+@pytest.fixture(scope="module")
+def router(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Router]:
+    with running_router(tmp_path_factory.mktemp("router")) as router:
+        yield router
+
+
+def sentence_of(*arguments: str | Path, code: int = 1) -> str:
+    ended = run_naze_bridge("fleet", *arguments)
+    assert (ended.returncode, ended.stdout) == (code, ""), ended
+    if code == 1:
+        assert len(ended.stderr.splitlines()) == 1, ended.stderr
+    return ended.stderr.splitlines()[-1]
+
+
+def test_a_fleet_of_nobody(router: Router) -> None:
+    listed = run_naze_bridge("fleet", "list", "--connect", router.endpoint)
+    assert (listed.returncode, listed.stdout) == (0, "No vehicle is alive under 'fleet'.\n")
+    pushed = sentence_of("push", EXAMPLES / "naze-field.waypoints", "--all", "--connect", router.endpoint)
+    assert "no vehicle is alive under 'fleet'" in pushed
+
+
+def test_of_several_endpoints_the_first_that_answers(router: Router) -> None:
+    dead = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    listed = run_naze_bridge("fleet", "list", "--connect", dead, "--connect", router.endpoint)
+    assert listed.returncode == 0, listed
+
+
+def test_the_daemons_own_file_says_where(router: Router, tmp_path: Path) -> None:
+    config = tmp_path / "naze.toml"
+    config.write_text(f'[zenoh]\nprefix = "flock"\nconnect = ["{router.endpoint}"]\n')
+    listed = run_naze_bridge("fleet", "list", "--config", config)
+    assert listed.stdout == "No vehicle is alive under 'flock'.\n", listed
+    config.write_text("sysid = 3\n")
+    assert "has no [zenoh] table" in sentence_of("list", "--config", config, code=2)
+
+
+def test_no_router() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    sentence = sentence_of("list", "--connect", endpoint)
+    assert sentence == f"naze-bridge: no way into the fleet; {endpoint}: connection refused"
+
+
+def test_somebody_else_listens_there() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+        assert "is a zenoh router" in sentence_of("list", "--connect", endpoint)
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "said"),
+    [
+        ("tcp/no-such-host.invalid:7447", "nobody knows a host 'no-such-host.invalid'"),
+        ("192.168.4.1:7447", "192.168.4.1:7447"),
+        ("tcp/127.0.0.1", "tcp/127.0.0.1"),
+        ("smoke/127.0.0.1:7447", "smoke/127.0.0.1:7447"),
+        ("tcp/127.0.0.1:99999", "99999"),
+        ("", "--connect"),
+    ],
+)
+def test_endpoints_that_are_none(endpoint: str, said: str) -> None:
+    assert said in sentence_of("list", "--connect", endpoint)
+
+
+@pytest.mark.parametrize("prefix", ["fleet/*", "a/b", "@fleet", "fl eet", "fleet?x"])
+def test_a_prefix_that_no_key_can_have(prefix: str) -> None:
+    assert "zenoh.prefix" in sentence_of("list", "--prefix", prefix, code=2)
+
+
+def test_zenoh_files_that_cannot_be_used(tmp_path: Path) -> None:
+    missing = tmp_path / "none.json5"
+    assert f"{missing} cannot be read: no such file" in sentence_of("list", "--zenoh-config", missing)
+    broken = tmp_path / "broken.json5"
+    for text in ("{", '{mode: "aeroplane"}', '{no_such_key: 1, "', "\0\0"):
+        broken.write_text(text)
+        assert f"{broken} is no zenoh configuration" in sentence_of("list", "--zenoh-config", broken)
+    broken.write_text('{mode: "client"}')
+    assert "names no connect/endpoints" in sentence_of("list", "--zenoh-config", broken)
+
+
+def test_for_whom() -> None:
+    file = EXAMPLES / "naze-field.waypoints"
+    assert "--vehicle NAME, or --all" in sentence_of("push", file, code=2)
+    assert "--vehicle NAME, or --all" in sentence_of("push", file, "--all", "--vehicle", "a", code=2)
+
+
+def test_a_file_that_is_no_mission_goes_nowhere(tmp_path: Path) -> None:
+    file = tmp_path / "plan"
+    file.write_text("I am no mission")
+    ended = run_naze_bridge("fleet", "push", file, "--all")
+    assert ended.returncode == 2
+    assert re.fullmatch(r"naze-bridge: .*plan.*\n", ended.stderr), ended.stderr
