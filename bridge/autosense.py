@@ -14,7 +14,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from bridge.msp_link import RESYNC
+from bridge.msp_link import RESYNC, RESYNC_REPLY_SIZE
+from bridge.reply_debt import ReplyDebt
 from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.commands import Msp
@@ -29,6 +30,8 @@ _HEARTBEAT_SPEEDS = (115200, 57600)
 _FULL_VISIT_S = 1.1
 _LISTEN_S = 0.1
 _PROBE_INTERVAL_S = 0.15
+#: So many are asked in this interval, and more at longer ones: who stands still may answer all of them at once.
+_QUICK_PROBES = 4
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
 _HEARTBEAT_SIZE = 9
@@ -98,12 +101,18 @@ class Autosense:
     """
 
     def __init__(
-        self, speeds: Sequence[int | None], known: int | None, now: float, first: Sequence[int | None] = ()
+        self,
+        speeds: Sequence[int | None],
+        known: int | None,
+        now: float,
+        first: Sequence[int | None] = (),
+        debt: ReplyDebt | None = None,
     ) -> None:
         self._order = visit_order(known, speeds, first)
         self.speed = next(self._order)
         self.phase = Phase.LISTEN
         self.found: Found | None = None
+        self._debt = debt or ReplyDebt()
         self._output: list[bytes] = []
         self._visit = self._new_visit(now)
 
@@ -143,8 +152,7 @@ class Autosense:
         elif now >= visit.phase_ends:
             visit.answer = None
             self.phase = Phase.PROBE
-            # Each second probe also fills a parser that was left in mid-frame.
-            visit.phase_ends = now + self._ask(PROBE if visit.probes % 2 == 0 else RESYNC) + _PROBE_INTERVAL_S
+            visit.phase_ends = now + self._probe(now)
 
     def _new_visit(self, now: float) -> _Visit:
         listened = now + _LISTEN_S
@@ -155,9 +163,22 @@ class Autosense:
         """Return how long it takes to ask both ways and to hear the answers."""
         return self._on_wire_s(PROBE) + self._on_wire_s(RESYNC) + 2 * _PROBE_INTERVAL_S
 
-    def _ask(self, frame: bytes) -> float:
+    def _probe(self, now: float) -> float:
+        """Ask, if there is room for the answer; return how long to wait for it."""
+        room = self._debt.room(self.speed, now)
+        waiting = self._debt.questions(self.speed, now)
+        interval_s = _PROBE_INTERVAL_S * max(waiting / _QUICK_PROBES, 1)
+        # Each second probe also fills a parser that was left in mid-frame.
+        if self._visit.probes % 2 and room >= RESYNC_REPLY_SIZE:
+            return self._ask(RESYNC, RESYNC_REPLY_SIZE, now) + interval_s
+        if room >= _ANSWER_SIZE:
+            return self._ask(PROBE, _ANSWER_SIZE, now) + interval_s
+        return interval_s
+
+    def _ask(self, frame: bytes, reply_size: int, now: float) -> float:
         """Send; return how long the question and its answer are on the wire."""
         self._visit.probes += 1
+        self._debt.add(self.speed, reply_size, now)
         self._output.append(frame)
         return self._on_wire_s(frame)
 
@@ -167,6 +188,8 @@ class Autosense:
 
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
         visit = self._visit
+        if frame.direction is not Direction.REQUEST:
+            self._debt.settle()
         if self.found or frame.command != Msp.IDENT or frame.direction is Direction.REQUEST:
             return
         if visit.answer == frame:
@@ -174,12 +197,13 @@ class Autosense:
             return
         visit.answer = frame
         self.phase = Phase.CONFIRM
-        visit.phase_ends = now + self._ask(PROBE) + _CONFIRM_S
+        visit.phase_ends = now + self._ask(PROBE, _ANSWER_SIZE, now) + _CONFIRM_S
         visit.ends = max(visit.ends, visit.phase_ends)
 
     def _mavlink_frame(self, frame: MavlinkFrame, now: float) -> None:
         visit = self._visit
         before, visit.last_mavlink = visit.last_mavlink, frame
+        self._debt.settle()
         if self.found or visit.heartbeat is not None:
             return
         follows = (

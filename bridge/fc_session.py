@@ -10,6 +10,7 @@ from bridge.journal import Journal
 from bridge.mavlink_line import MavlinkLine
 from bridge.msp_link import MspLink
 from bridge.poll_schedule import PollSchedule
+from bridge.reply_debt import ReplyDebt
 from bridge.runner import Runner
 from bridge.vehicle_state import VehicleState
 from protocols.frsky import FRSKY_SPEED
@@ -203,10 +204,13 @@ class FcSession:
     def _begin_search(self, now: float, why: str, first: Sequence[int] = ()) -> None:
         self._enter(State.SEARCHING)
         was_known = self.controller is not None
+        debt = ReplyDebt()
+        if self.link is not None:
+            debt.add(self.speed, self.link.outstanding_bytes, self.link.last_heard_at)
         self._drop(now)
         if was_known:
             self._journal("warning", "fc.lost", why=why, speed_baud=self.speed)
-        self._search = Autosense(self._speeds, self._known_speed, now, first)
+        self._search = Autosense(self._speeds, self._known_speed, now, first, debt)
         self.speed = self._search.speed
 
     def _drop(self, now: float) -> None:

@@ -1,8 +1,8 @@
 """The request side of an MSP line: what may be sent when, how long to wait, what is still unanswered.
 
 Harakiri's send ring holds 255 bytes and has no overflow check, so the sum of the replies that are still to come
-is bounded. A flight controller that was writing its flash answers all at once what was asked meanwhile, so a request
-that timed out counts until it is certain that no reply comes any more: requests are answered in their order.
+is bounded. A flight controller that stood still answers all at once what was asked meanwhile, so a request that timed
+out counts until something that was asked later is answered: requests are answered in their order.
 Waiting time follows the measured round trip, as in TCP: 7/8 old + 1/8 measured, doubled on a loss.
 """
 
@@ -24,14 +24,17 @@ MIN_TIMEOUT_S = 0.06
 MAX_TIMEOUT_S = 1.0
 #: BEGIN and COMMIT erase and write flash: 100 ms and more during which the board does nothing else.
 EXCLUSIVE_TIMEOUT_S = 1.0
-#: A stalled flight controller answers after this long at the latest.
-_LONGEST_STALL_S = 1.0
+#: Who stands still for longer is taken to have lost what it was asked: reset, or without power.
+LONGEST_STALL_S = 3.0
+#: What may be outstanding while it is not known whether it stands still: a resync and what follows need the rest.
+_OUTSTANDING_IN_DOUBT = 64
 _FIRST_GUESS_S = 0.03
 #: After so long without a byte nothing more comes of a frame that has begun.
 _LINE_SILENCE_S = 0.05
 _ANY_SIZE = 1 << 16
 
-_REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: 4 + FRAME_OVERHEAD}
+#: Of a Harakiri, which does not know the second one; others are not so short of room.
+_REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: FRAME_OVERHEAD}
 #: Fills a parser that waits for the rest of a cut frame (64 payload bytes and a checksum on an unpatched Harakiri),
 #: with whole harmless frames. Their order has no period: eleven times the same, read by a receiver at a twelfth of the
 #: speed, can come out as three '#' in a row (tests/bridge/test_probe_at_wrong_speed.py).
@@ -40,9 +43,10 @@ _RESYNC_COMMANDS = (
     *(Msp.IDENT, Msp.IDENT, Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT),
 )
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
-_RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
-#: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error.
-_QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, 3 + FRAME_OVERHEAD)
+RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
+#: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error, and who says
+#: nothing at all to what it does not know was never identified.
+_QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 
 
 @dataclass(slots=True)
@@ -111,7 +115,7 @@ class MspLink:
             return _ANY_SIZE
         if self._waiting or self._is_exclusive():
             return 0
-        return self._ring_size - self.outstanding_bytes
+        return self._limit - self.outstanding_bytes
 
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""
@@ -141,7 +145,7 @@ class MspLink:
         lost = [sent for sent in self._sent if now >= sent.deadline]
         for sent in lost:
             sent.awaited = False
-            sent.deadline = now + _LONGEST_STALL_S
+            sent.deadline = sent.sent_at + LONGEST_STALL_S
         if lost:
             self.requests_lost += len(lost)
             self._losses_in_a_row += 1
@@ -168,18 +172,26 @@ class MspLink:
     def _is_exclusive(self) -> bool:
         return any(sent.awaited and sent.exclusive for sent in self._sent)
 
+    @property
+    def _limit(self) -> int:
+        is_in_doubt = any(not sent.awaited for sent in self._sent)
+        return min(self._ring_size, _OUTSTANDING_IN_DOUBT) if is_in_doubt else self._ring_size
+
     def _has_room(self, reply_size: int) -> bool:
-        return not self._sent or self.outstanding_bytes + reply_size <= self._ring_size
+        return not self._sent or self.outstanding_bytes + reply_size <= self._limit
+
+    def _fits_ring(self, reply_size: int) -> bool:
+        return self.outstanding_bytes + reply_size <= self._ring_size
 
     def _flush(self, now: float) -> None:
-        if self._resync_due and not self._is_exclusive() and self._has_room(_RESYNC_REPLY_SIZE):
+        if self._resync_due and not self._is_exclusive() and self._fits_ring(RESYNC_REPLY_SIZE):
             self._resync(now)
         while self._waiting:
             message = self._waiting[0]
             if self._is_exclusive():
                 return
             if not self._has_room(message.reply_size):
-                if not any(sent.awaited for sent in self._sent) and self._has_room(_QUESTION.reply_size):
+                if not any(sent.awaited for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
                     # Only what was given up is in the way: the answer to a short question behind it says it is over.
                     self._ask(_QUESTION, now)
                 return
@@ -198,7 +210,7 @@ class MspLink:
     def _resync(self, now: float) -> None:
         self._resync_due = False
         self._write(RESYNC, now)
-        reply_time = (self.outstanding_bytes + _RESYNC_REPLY_SIZE) * self._byte_s
+        reply_time = (self.outstanding_bytes + RESYNC_REPLY_SIZE) * self._byte_s
         deadline = self._line_free_at + reply_time + MIN_TIMEOUT_S
         self._sent += [
             _Request(command, _REPLY_SIZES[command], self._line_free_at, deadline, exclusive=True)

@@ -57,10 +57,10 @@ class Line:
             self.schedule.answered(frame)
 
     def _take(self, command: int) -> None:
-        if command not in REPLY_PAYLOADS:
-            return  # the link's own question
-        self.asked.append((self.now, command))
-        size = self.answer(command)
+        size: int | None = -1  # the link's own question
+        if command in REPLY_PAYLOADS:
+            self.asked.append((self.now, command))
+            size = self.answer(command)
         if size is not None:
             direction = Direction.ERROR if size < 0 else Direction.REPLY
             frame = MspFrame(direction, command, bytes(max(size, 0))).encode()

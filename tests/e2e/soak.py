@@ -114,7 +114,7 @@ class Weather(threading.Thread):
         self._over = threading.Event()
         self.happened: Counter[str] = Counter()
         self._kinds: list[Callable[[], None]] = [self._unplug, self._move, self._cut_power, self._reset]
-        self._kinds += [self._arm, self._arm_shortly]
+        self._kinds += [self._arm, self._arm_shortly, self._hang]
 
     def run(self) -> None:
         deck: list[Callable[[], None]] = []
@@ -153,6 +153,11 @@ class Weather(threading.Thread):
     def _reset(self) -> None:
         self._board.set("power off")
         self._board.set("power on")
+
+    def _hang(self) -> None:
+        self._board.set("hang 1")
+        self._pass(0.1, 2.8)
+        self._board.set("hang 0")
 
     def _arm(self) -> None:
         self._board.set("armed 1")

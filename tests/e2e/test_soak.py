@@ -18,8 +18,9 @@ MINUTES = float(os.environ.get("SOAK_MINUTES", "0.5"))
 SEED = int(os.environ.get("SOAK_SEED", "1"))
 #: SQLite's page cache fills up to 2 MB, and Python seldom gives back what it had.
 MEMORY_KB = 3000
-#: What the simulated board counts of what a real one would suffer from.
-TRAPS = ("hazard_runs", "rx_overflows", "tx_overflows", "cli_entered")
+#: What the simulated board counts of what a real one would suffer from. Not its receive ring: a board that hangs amid
+#: two chunks cannot keep them, and finds that by the checksum.
+TRAPS = ("hazard_runs", "tx_overflows", "cli_entered")
 #: Each has its own way of arming.
 TELE_PROTS = (2, 0, 3, 1)
 
