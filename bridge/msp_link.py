@@ -44,8 +44,8 @@ _RESYNC_COMMANDS = (
 )
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
-#: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error, and who says
-#: nothing at all to what it does not know was never identified.
+#: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error; who says
+#: nothing to what it does not know was never identified.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 
 
