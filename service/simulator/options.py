@@ -71,6 +71,7 @@ class Counters:
     hazard_runs: three equal hazard bytes in a row on the RX pin, acted on or not.
     rx_overflows, tx_overflows: how often a ring was lapped.
     max_outstanding_reply_bytes: of the 255 that the TX ring holds.
+    cli_entered, bootloader_entered, crashes: ways into a state that only a reset ends.
     flash_writes: mission lists that were ever made valid in this flash, as of the last mission command.
     """
 
@@ -79,5 +80,7 @@ class Counters:
     tx_overflows: int = 0
     max_outstanding_reply_bytes: int = 0
     cli_entered: bool = False
+    bootloader_entered: bool = False
+    crashes: int = 0
     resets: int = 0
     flash_writes: int = 0

@@ -1,0 +1,28 @@
+"""Which boards beside the Naze can be simulated, and how one is made."""
+
+from service.simulator.inav import InavFirmware
+from service.simulator.inav_mission import EEPROM_SIZE
+from service.simulator.msp_board import MspBoard
+from service.simulator.msp_firmware import BootFirmware
+from service.simulator.msp_options import MspOptions
+from service.simulator.multiwii import MultiWiiFirmware
+from service.simulator.multiwii_mission import blank_eeprom
+from service.simulator.options import Faults
+
+_FIRMWARE: dict[str, BootFirmware] = {"inav": InavFirmware, "multiwii": MultiWiiFirmware}
+KINDS = tuple(_FIRMWARE)
+
+
+def new_eeprom(kind: str, options: MspOptions) -> bytearray:
+    """Return the EEPROM of a board on which nothing was ever saved."""
+    return blank_eeprom(options.capacity) if kind == "multiwii" else bytearray(EEPROM_SIZE)
+
+
+def make_board(
+    kind: str, options: MspOptions | None = None, faults: Faults | None = None, eeprom: memoryview | None = None
+) -> MspBoard:
+    """Make a board without power. `eeprom` outlives the board; without it there is a blank one."""
+    options = options or MspOptions()
+    if eeprom is None:
+        eeprom = memoryview(new_eeprom(kind, options))
+    return MspBoard(_FIRMWARE[kind], eeprom, options, faults)

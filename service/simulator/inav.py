@@ -1,0 +1,229 @@
+"""A model of INAV as a copter with GPS and compass, versions 6.1.1 to 9.1.0 (src/main/fc/fc_msp.c).
+
+Its lengths and oddities were compared with INAV's own simulator of each version.
+"""
+
+import struct
+from enum import IntEnum
+
+from service.simulator.flight import Craft
+from service.simulator.inav_boxes import ARM, BOXES, NAV_RTH, NAV_WP, box_names
+from service.simulator.inav_mission import CAPACITY, FAKE, InavMission
+from service.simulator.inav_navigation import InavNavigation
+from service.simulator.msp_firmware import Boot, PortHabits, error, reply
+from service.simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from service.simulator.waypoint_craft import WaypointCraft
+
+_STEP_S = 0.05
+_STATUS_FLAGS = 32
+_SENSORS = 0b1000_0000_0000_1111  # accelerometer, barometer, compass, GPS; bit 15: hardware is healthy
+_CYCLE_TIME_US = 500
+_API_VERSION = bytes((0, 2, 5))
+_FIX_3D = 2
+_HDOP_E2 = 130
+_RSSI = 920
+_LOWEST, _MIDDLE, _CRUISE, _HIGHEST = 1000, 1500, 1450, 2000
+_HOME, _DESIRED, _PRESENT = 0, 254, 255
+
+
+class InavCommand(IntEnum):
+    """The commands that are simulated."""
+
+    API_VERSION = 1
+    FC_VARIANT = 2
+    FC_VERSION = 3
+    BOARD_INFO = 4
+    WP_MISSION_LOAD = 18
+    WP_MISSION_SAVE = 19
+    WP_GETINFO = 20
+    STATUS = 101
+    RAW_IMU = 102
+    MOTOR = 104
+    RC = 105
+    RAW_GPS = 106
+    COMP_GPS = 107
+    ATTITUDE = 108
+    ALTITUDE = 109
+    ANALOG = 110
+    BOXNAMES = 116
+    WP = 118
+    BOXIDS = 119
+    NAV_STATUS = 121
+    STATUS_EX = 150
+    ACC_CALIBRATION = 205
+    MAG_CALIBRATION = 206
+    SET_WP = 209
+    EEPROM_WRITE = 250
+
+
+class InavFirmware:
+    """See MspFirmware. The bits of `faults.boxes` are in the order of MSP_BOXIDS."""
+
+    def __init__(self, boot: Boot) -> None:
+        self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
+        self._version = tuple(int(part) for part in boot.options.version.split("."))
+        self._boxes = BOXES[boot.options.version]
+        self.habits = PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=self._version <= (8, 0, 1))
+        self._mission = InavMission(boot.eeprom)
+        self._craft = WaypointCraft()
+        self._navigation = InavNavigation(self._mission, self._craft)
+        self._clock = boot.now
+        self._busy = 0.0
+        self._armed = False
+        self._home: tuple[int, int] | None = None
+
+    @property
+    def armed(self) -> bool:
+        """Whether the craft is armed."""
+        return self._armed
+
+    @property
+    def stored(self) -> list[bytes]:
+        """The waypoints in the EEPROM."""
+        stored = self._mission.stored
+        return [stored[at : at + WAYPOINT_SIZE] for at in range(0, len(stored), WAYPOINT_SIZE)]
+
+    def take_busy_seconds(self) -> float:
+        """Return how long the EEPROM has held the CPU since the last call."""
+        busy, self._busy = self._busy, 0.0
+        return busy
+
+    # -- the craft -------------------------------------------------------------------------------------------
+
+    def follow_pilot(self, now: float) -> None:
+        """Fly until `now`, arm and disarm. CrashError: the check before arming met a JUMP to nowhere."""
+        self._fly_until(now)
+        flyable = self._armed or self._mission.is_flyable()
+        if self._faults.armed and not self._armed and flyable:
+            self._armed = True
+            self._home = self._craft.position
+            self._navigation.arm()
+        elif self._armed and not self._faults.armed:
+            self._armed = False
+            self._navigation.disarm()
+            self._craft.rest()
+
+    def craft_at(self, now: float) -> Craft:
+        """Return what the sensors say."""
+        self._fly_until(now)
+        return Craft(self._craft.state(), self._armed, self._flags(), self._home)
+
+    def _fly_until(self, now: float) -> None:
+        if not self._armed:
+            self._clock = now
+        while self._clock + _STEP_S <= now:
+            self._clock += _STEP_S
+            self._navigation.step(_STEP_S, self._is_on(NAV_WP))
+
+    def _is_on(self, box: int) -> bool:
+        return bool(self._faults.boxes >> self._boxes.index(box) & 1)
+
+    def _flags(self) -> int:
+        """Return the modes as MSP_STATUS has them: those of the navigation are what it does, not the switch."""
+        flown = {ARM: self._armed, NAV_WP: self._navigation.is_in_mission, NAV_RTH: self._navigation.is_returning}
+        return sum(flown.get(box, self._is_on(box)) << bit for bit, box in enumerate(self._boxes[:_STATUS_FLAGS]))
+
+    # -- MSP -------------------------------------------------------------------------------------------------
+
+    def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
+        """Return the reply's frame: an error for what is refused or not known."""
+        self._fly_until(now)
+        match command:
+            case InavCommand.SET_WP:
+                return self._set_waypoint(payload)
+            case InavCommand.WP:
+                return reply(command, self._waypoint(payload))
+            case InavCommand.WP_GETINFO:
+                known = self._mission.known(self._armed)
+                return reply(command, bytes((0, CAPACITY, self._mission.is_valid, known)))
+            case InavCommand.WP_MISSION_SAVE:
+                return self._when_disarmed(command, len(payload) == 1 and not self._armed and self._save())
+            case InavCommand.WP_MISSION_LOAD:
+                return self._when_disarmed(command, len(payload) == 1 and not self._armed and self._mission.load())
+            case InavCommand.ACC_CALIBRATION | InavCommand.MAG_CALIBRATION:
+                return self._when_disarmed(command, True)
+            case InavCommand.EEPROM_WRITE:
+                self._busy += 0.0 if self._armed else self._options.eeprom_write_ms / 1000
+                return self._when_disarmed(command, True)
+        answer = self._read(command)
+        return error(command) if answer is None else reply(command, answer)
+
+    def _when_disarmed(self, command: int, done: bool) -> bytes:
+        return reply(command) if done and not self._armed else error(command)
+
+    def _save(self) -> bool:
+        saved = self._mission.save()
+        if saved:
+            self._counters.flash_writes += 1
+            self._busy += self._options.eeprom_write_ms / 1000
+        return saved
+
+    def _set_waypoint(self, payload: bytes) -> bytes:
+        """Acknowledge any waypoint of the right size, whether or not it is stored."""
+        if len(payload) != WAYPOINT_SIZE:
+            return error(InavCommand.SET_WP)
+        closed = self._navigation.is_in_mission if self._version >= (8, 0, 0) else self._armed
+        if not closed:
+            self._mission.write(*unpack_waypoint(payload))
+        return reply(InavCommand.SET_WP)
+
+    def _waypoint(self, payload: bytes) -> bytes:
+        number = payload[0] if payload else _HOME
+        flight = self._craft.state()
+        match number:
+            case 0 if self._home:
+                waypoint = NavWaypoint(FAKE.action, *self._home, 0)
+            case 255 if self._home:
+                waypoint = NavWaypoint(FAKE.action, flight.lat_e7, flight.lon_e7, round(flight.altitude_m * 100))
+            case _:
+                waypoint = self._mission.read(number, self._armed)
+        return waypoint.pack(number)
+
+    def _read(self, command: int) -> bytes | None:
+        craft = Craft(self._craft.state(), self._armed, self._flags(), self._home)
+        flight = craft.flight
+        match command:
+            case InavCommand.API_VERSION:
+                return _API_VERSION
+            case InavCommand.FC_VARIANT:
+                return b"INAV"
+            case InavCommand.FC_VERSION:
+                return bytes(self._version)
+            case InavCommand.BOARD_INFO:
+                return b"SIMU\x00\x00\x02\x00\x04SIMU"
+            case InavCommand.STATUS | InavCommand.STATUS_EX:
+                status = struct.pack("<HHHIB", _CYCLE_TIME_US, 0, _SENSORS, craft.boxes, 0)
+                return status + (bytes(5) if command == InavCommand.STATUS_EX else b"")
+            case InavCommand.RAW_IMU:
+                return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
+            case InavCommand.MOTOR:
+                return struct.pack("<8H", *(_CRUISE if self._armed else _LOWEST,) * 4, *(0,) * 4)
+            case InavCommand.RC:
+                sticks = (_MIDDLE, _MIDDLE, _MIDDLE, _CRUISE if self._armed else _LOWEST)
+                aux = (_HIGHEST if self._armed else _LOWEST, *(_MIDDLE,) * 30)
+                channels = (*sticks, *aux)[: self._options.channels]
+                return struct.pack(f"<{len(channels)}H", *channels)
+            case InavCommand.RAW_GPS:
+                position = (flight.lat_e7, flight.lon_e7, round(flight.altitude_m))
+                motion = (round(flight.speed_ms * 100), round(flight.course * 10) % 3600)
+                return struct.pack("<BBiihHHH", _FIX_3D, flight.satellites, *position, *motion, _HDOP_E2)
+            case InavCommand.COMP_GPS:
+                distance, direction = craft.way_home()
+                return struct.pack("<HHB", round(distance), round(direction) % 360, 1)
+            case InavCommand.ATTITUDE:
+                return struct.pack(
+                    "<hhh", round(flight.roll * 10), round(flight.pitch * 10), round(flight.heading) % 360
+                )
+            case InavCommand.ALTITUDE:
+                height = round(flight.height_m * 100)
+                return struct.pack("<ihi", height, round(flight.climb_ms * 100), height)
+            case InavCommand.ANALOG:
+                current = 1250 if self._armed else 30
+                return struct.pack("<BHHh", round(flight.volts * 10), 120, _RSSI, current)
+            case InavCommand.BOXNAMES:
+                return box_names(self._boxes)
+            case InavCommand.BOXIDS:
+                return bytes(self._boxes)
+            case InavCommand.NAV_STATUS:
+                return self._navigation.status(self._armed).pack()
+        return None

@@ -1,0 +1,133 @@
+"""INAV's waypoint list in RAM and the copy of it in the EEPROM, with all that it acknowledges and does not do.
+
+After setWaypoint, getWaypoint, loadNonVolatileWaypointList and saveNonVolatileWaypointList of INAV 6.1.1 to 9.1.0
+(src/main/navigation/navigation.c).
+"""
+
+from dataclasses import replace
+
+from service.simulator.msp_firmware import CrashError
+from service.simulator.nav_waypoint import FLAG_LAST, WAYPOINT_SIZE, Action, NavWaypoint, unpack_waypoint, wrap16
+
+CAPACITY = 120
+EEPROM_SIZE = CAPACITY * WAYPOINT_SIZE
+_STORED_ACTIONS = frozenset(Action) - {Action.POSHOLD_UNLIM}
+_GEO_ACTIONS = frozenset((Action.WAYPOINT, Action.POSHOLD_TIME, Action.LAND))
+#: Reading past the end gives this, and so does home until it is known.
+FAKE = NavWaypoint()
+
+
+class InavMission:
+    """`eeprom`: EEPROM_SIZE bytes; blank ones are zeros, an action that INAV does not take."""
+
+    def __init__(self, eeprom: memoryview) -> None:
+        self._eeprom = eeprom
+        # Forgotten waypoints stay where they are; the counts say which of them exist.
+        self._list = [NavWaypoint(action=0, flag=0)] * CAPACITY
+        self._forget()
+
+    def _forget(self) -> None:
+        self.count = 0
+        self.is_valid = False
+        self._total = 0
+
+    @property
+    def stored(self) -> bytes:
+        """The waypoints in the EEPROM, each of WAYPOINT_SIZE bytes, up to the one with the flag of the last."""
+        for number in range(1, CAPACITY + 1):
+            if self._saved(number).flag == FLAG_LAST:
+                return bytes(self._eeprom[: number * WAYPOINT_SIZE])
+        return b""
+
+    def known(self, armed: bool) -> int:
+        """Return the count that MSP_WP_GETINFO tells: of all missions of the list while disarmed."""
+        return self._total if self._total and not armed else self.count
+
+    def __getitem__(self, index: int) -> NavWaypoint:
+        """Return a waypoint by its index from 0, as it is flown: a JUMP's p1 is an index, too."""
+        return self._list[index]
+
+    def read(self, number: int, armed: bool) -> NavWaypoint:
+        """Return waypoint 1..255 as MSP_WP does: a fake one where there is none."""
+        if not 1 <= number <= min(self.known(armed), CAPACITY):
+            return FAKE
+        waypoint = self._list[number - 1]
+        return replace(waypoint, p1=wrap16(waypoint.p1 + 1)) if waypoint.action == Action.JUMP else waypoint
+
+    def write(self, number: int, waypoint: NavWaypoint) -> None:
+        """Take over a waypoint, or not: the flight controller acknowledges either way."""
+        if not 1 <= number <= CAPACITY or waypoint.action not in _STORED_ACTIONS:
+            return
+        if number not in (1, self.count + 1):
+            return
+        if number == 1:
+            self._forget()
+        if waypoint.action == Action.JUMP:
+            waypoint = replace(waypoint, p1=wrap16(waypoint.p1 - 1))
+        self._list[number - 1] = waypoint
+        self.count = number
+        self.is_valid = waypoint.flag == FLAG_LAST
+
+    def save(self) -> bool:
+        """Copy the list into the EEPROM; False if it is not complete."""
+        if not self.is_valid:
+            return False
+        for number in range(1, CAPACITY + 1):
+            start = (number - 1) * WAYPOINT_SIZE
+            self._eeprom[start : start + WAYPOINT_SIZE] = self.read(number, armed=False).pack(number)
+        return True
+
+    def load(self) -> bool:
+        """Copy the EEPROM's list into RAM. A blank EEPROM changes nothing, and is an error only if RAM is empty."""
+        missions = 0
+        for number in range(1, CAPACITY + 1):
+            saved = self._saved(number)
+            self.write(number, saved)
+            if saved.flag == FLAG_LAST:
+                missions += 1
+                after = self._saved(number + 1) if number < CAPACITY else None
+                if after and (after.flag, after.action) == (FLAG_LAST, Action.RTH):
+                    break
+        self._total = self.count
+        # The first of several missions is the one that is flown.
+        self.count = next((index for index in range(CAPACITY) if self[index].flag == FLAG_LAST), 0) + 1
+        if not (self.is_valid and self.count):
+            self._forget()
+        return self.is_valid
+
+    def is_flyable(self) -> bool:
+        """Tell whether INAV lets the pilot arm with these JUMPs; it looks whenever it is disarmed. CrashError."""
+        for index in range(self.count):
+            waypoint = self[index]
+            if waypoint.action != Action.JUMP:
+                continue
+            target = waypoint.p1
+            is_near = index - 2 < target < index + 2
+            if index == 0 or target >= self.count or is_near or waypoint.p2 < -1:
+                return False
+            if target < 0:
+                # INAV takes the target for an unsigned number and looks at the waypoint 65,000 places on.
+                raise CrashError
+            if self[target].action not in _GEO_ACTIONS:
+                return False
+        return True
+
+    def start_jumps(self) -> None:
+        """Set each JUMP's counter, which INAV keeps in p3."""
+        for index in range(self.count):
+            if self[index].action == Action.JUMP:
+                self.set_jump(index, self[index].p2)
+
+    def end_jumps(self) -> None:
+        """Clear the counters at the mission's end."""
+        for index in range(self.count):
+            if self[index].action == Action.JUMP:
+                self.set_jump(index, 0)
+
+    def set_jump(self, index: int, repeats: int) -> None:
+        """Set the counter of one JUMP."""
+        self._list[index] = replace(self[index], p3=repeats)
+
+    def _saved(self, number: int) -> NavWaypoint:
+        start = (number - 1) * WAYPOINT_SIZE
+        return unpack_waypoint(bytes(self._eeprom[start : start + WAYPOINT_SIZE]))[1]

@@ -1,0 +1,172 @@
+"""INAV's waypoint mode as a copter flies it: the states of its navigation that a mission goes through.
+
+After navOnEnteringState_NAV_STATE_WAYPOINT_... of INAV 9.1.0 (src/main/navigation/navigation.c). Not simulated: the
+pilot's sticks, safe distances, and the climb before a return home.
+"""
+
+from enum import Enum
+
+from service.simulator.inav_mission import InavMission
+from service.simulator.nav_status import Error, Mode, NavStatus, State
+from service.simulator.nav_waypoint import FLAG_LAST, Action
+from service.simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
+
+_CRUISE_MS = 3.0
+_MAX_MS = 10.0
+_MIN_MISSION_CMS = 50
+_HOVER_HEIGHT_M = 10.0
+_RTH_HEIGHT_M = 10.0
+_MEAN_SEA_LEVEL = 1
+
+
+class Phase(Enum):
+    """What it does, and how MSP_NAV_STATUS tells it: mode, state, error."""
+
+    IDLE = (Mode.NONE, State.NONE, Error.NONE)
+    PRE_ACTION = (Mode.NAV, State.PROCESS_NEXT, Error.NONE)
+    ENROUTE = (Mode.NAV, State.WP_ENROUTE, Error.NONE)
+    HOLD = (Mode.NAV, State.HOLD_TIMED, Error.NONE)
+    LANDING = (Mode.NAV, State.LAND_IN_PROGRESS, Error.LANDING)
+    FINISHED = (Mode.NAV, State.WP_ENROUTE, Error.FINISH)
+    RTH_ENROUTE = (Mode.RTH, State.RTH_ENROUTE, Error.NONE)
+    RTH_HOVER = (Mode.RTH, State.HOVER_ABOVE_HOME, Error.NONE)
+    RTH_LANDING = (Mode.RTH, State.LAND_IN_PROGRESS, Error.LANDING)
+    RTH_LANDED = (Mode.RTH, State.LANDED, Error.NONE)
+
+
+_RETURNING = frozenset((Phase.RTH_ENROUTE, Phase.RTH_HOVER, Phase.RTH_LANDING, Phase.RTH_LANDED))
+
+
+class InavNavigation:
+    """Flies `craft`. An index is a waypoint's number less 1."""
+
+    def __init__(self, mission: InavMission, craft: WaypointCraft) -> None:
+        self._mission = mission
+        self._craft = craft
+        self._home = craft.position
+        self._restarts = True
+        self._held_s = 0.0
+        self.phase = Phase.IDLE
+        self.index = 0
+
+    @property
+    def is_in_mission(self) -> bool:
+        """Whether the flight mode is NAV WP; on the way home of a mission it is NAV RTH."""
+        return self.phase is not Phase.IDLE and not self.is_returning
+
+    @property
+    def is_returning(self) -> bool:
+        """Whether the flight mode is NAV RTH."""
+        return self.phase in _RETURNING
+
+    def arm(self) -> None:
+        """Take off: home is here."""
+        self._home = self._craft.position
+
+    def disarm(self) -> None:
+        """End whatever it does; the mission begins anew after the next arming."""
+        self.phase = Phase.IDLE
+        self._restarts = True
+        self.index = 0
+
+    def status(self, armed: bool) -> NavStatus:
+        """Return what MSP_NAV_STATUS tells, which names a waypoint at all times."""
+        mode, state, error = self.phase.value
+        if mode is Mode.NONE and armed:
+            mode = Mode.HOLD
+        number = self.index + 1
+        return NavStatus(mode, state, self._mission[self.index].action, number, error, round(self._craft.heading))
+
+    def step(self, seconds: float, is_wished: bool) -> None:
+        """Let time pass in flight; `is_wished`: the pilot's switch NAV WP is on."""
+        if not is_wished:
+            self.phase = Phase.IDLE
+        elif self.phase is Phase.IDLE and self._mission.is_valid and self._mission.count:
+            self._begin()
+        match self.phase:
+            case Phase.IDLE:
+                self._craft.hover(_HOVER_HEIGHT_M, seconds)
+            case Phase.PRE_ACTION:
+                self._pre_action()
+            case Phase.ENROUTE:
+                self._fly_leg(seconds)
+            case Phase.HOLD:
+                self._hold(seconds)
+            case Phase.LANDING | Phase.RTH_LANDING:
+                self._land(seconds)
+            case Phase.FINISHED | Phase.RTH_HOVER:
+                self._craft.hover(self._craft.height_m, seconds)
+            case Phase.RTH_ENROUTE:
+                if self._craft.fly_to(self._home, _RTH_HEIGHT_M, _CRUISE_MS, seconds):
+                    lands = self._mission[self.index].p1 > 0
+                    self.phase = Phase.RTH_LANDING if lands else Phase.RTH_HOVER
+
+    def _begin(self) -> None:
+        if self._restarts or self.index == 0:
+            self._mission.start_jumps()
+            self.index = 0
+        self._restarts = False
+        self.phase = Phase.PRE_ACTION
+
+    def _pre_action(self) -> None:
+        waypoint = self._mission[self.index]
+        match waypoint.action:
+            case Action.RTH:
+                self._restarts = True
+                self.phase = Phase.RTH_ENROUTE
+            case Action.JUMP if waypoint.p3:
+                if waypoint.p3 > 0:
+                    self._mission.set_jump(self.index, waypoint.p3 - 1)
+                self.index = waypoint.p1
+            case Action.JUMP:
+                self._mission.set_jump(self.index, waypoint.p2)
+                self._next()
+            case Action.SET_POI | Action.SET_HEAD:
+                self._next()
+            case _:
+                self.phase = Phase.ENROUTE
+
+    def _fly_leg(self, seconds: float) -> None:
+        waypoint = self._mission[self.index]
+        height = waypoint.alt_cm / 100
+        if waypoint.p3 & _MEAN_SEA_LEVEL:
+            height -= FIELD_ALTITUDE_M
+        target = (waypoint.lat_e7, waypoint.lon_e7) if waypoint.lat_e7 or waypoint.lon_e7 else self._home
+        wanted = waypoint.p2 if waypoint.action == Action.POSHOLD_TIME else waypoint.p1
+        speed = min(wanted / 100, _MAX_MS) if wanted >= _MIN_MISSION_CMS else _CRUISE_MS
+        if not self._craft.fly_to(target, height, speed, seconds):
+            return
+        match waypoint.action:
+            case Action.LAND:
+                self.phase = Phase.LANDING
+            case Action.POSHOLD_TIME:
+                self.phase = Phase.HOLD
+                self._held_s = 0.0
+            case _:
+                self._next()
+
+    def _hold(self, seconds: float) -> None:
+        self._held_s += seconds
+        self._craft.hover(self._craft.height_m, seconds)
+        if self._held_s >= self._mission[self.index].p1:
+            self._next()
+
+    def _land(self, seconds: float) -> None:
+        self._craft.hover(0.0, seconds)
+        if self._craft.height_m <= 0:
+            if self.is_returning:
+                self.phase = Phase.RTH_LANDED
+            else:
+                self._finish()
+
+    def _next(self) -> None:
+        if self.index >= self._mission.count - 1 or self._mission[self.index].flag == FLAG_LAST:
+            self._finish()
+        else:
+            self.index += 1
+            self.phase = Phase.PRE_ACTION
+
+    def _finish(self) -> None:
+        self._mission.end_jumps()
+        self._restarts = True
+        self.phase = Phase.FINISHED

@@ -1,0 +1,234 @@
+"""A simulated board with MSP that is no Harakiri: power, wires and EEPROM around a firmware, without a clock.
+
+As SimulatedNaze is, but simpler: these boards speak nothing but MSP, at one speed.
+"""
+
+import random
+from enum import Enum, auto
+from math import ceil, inf
+
+from service.simulator.flight import Craft
+from service.simulator.msp_firmware import Boot, BootFirmware, CrashError, MspFirmware
+from service.simulator.msp_options import MspOptions
+from service.simulator.msp_port import MspReceiver
+from service.simulator.options import Counters, Faults
+from service.simulator.serial_ring import SerialRing
+
+_CLI_PROMPT = b"\r\n# "
+_CLI_BANNER = b"\r\nEntering CLI Mode, type 'exit' to reboot" + _CLI_PROMPT
+_NO_SPEED = 115200
+#: A pilot whom the firmware does not let arm tries again after this long.
+_PILOTS_PATIENCE_S = 0.1
+
+
+class MspPower(Enum):
+    """What the CPU is doing. Out of CRASHED and BOOTLOADER only a switch of the power leads."""
+
+    OFF = auto()
+    BOOTING = auto()
+    RUNNING = auto()
+    CLI = auto()
+    CRASHED = auto()
+    BOOTLOADER = auto()
+
+
+class MspBoard:
+    """A board made without power: see `power_on`. `faults` may be changed and `counters` read at any time.
+
+    `eeprom` outlives resets and power cuts.
+    """
+
+    def __init__(
+        self, boot: BootFirmware, eeprom: memoryview, options: MspOptions | None = None, faults: Faults | None = None
+    ) -> None:
+        self.options = options or MspOptions()
+        self.faults = faults or Faults()
+        self.counters = Counters()
+        self.power = MspPower.OFF
+        self._boot_firmware = boot
+        self._eeprom = eeprom
+        self._random = random.Random(self.options.seed)
+        self._ring = SerialRing(self.options.baud, self.options.ring_size, self.counters)
+        self._firmware: MspFirmware | None = None
+        self._receiver = MspReceiver()
+        self._boots_at = self._next_task = self._next_look = 0.0
+        # How long the present run of the task takes longer than usual.
+        self._busy = 0.0
+        # An unserved '#' or 'R', and when the last byte was read.
+        self._pending: str | None = None
+        self._last_byte = 0.0
+
+    @property
+    def baud(self) -> int:
+        """The speed of its port; a socket has none, so any will do."""
+        return self.options.baud or _NO_SPEED
+
+    @property
+    def armed(self) -> bool:
+        """Whether the craft is armed, which `faults.armed` only wishes."""
+        return self._firmware is not None and self._firmware.armed
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether its port would be there if the board were a program."""
+        return self.power not in (MspPower.OFF, MspPower.CRASHED, MspPower.BOOTLOADER)
+
+    @property
+    def stored_records(self) -> list[bytes]:
+        """The waypoints that the next boot would find."""
+        return self._boot_firmware(self._boot_at(self._next_task)).stored
+
+    def truth(self, now: float) -> Craft | None:
+        """Return what the craft is doing; None while no firmware runs."""
+        self._run_until(now)
+        return self._firmware.craft_at(now) if self._firmware else None
+
+    def power_on(self, now: float) -> None:
+        """Supply the board; it boots."""
+        if self.power is MspPower.OFF:
+            self.power = MspPower.BOOTING
+            self._boots_at = now + self.options.boot_ms / 1000
+
+    def power_on_booted(self, now: float) -> None:
+        """Supply the board as if long enough ago that it has booted by `now`."""
+        self.power_on(now - self.options.boot_ms / 1000)
+
+    def power_off(self, now: float) -> None:
+        """Cut the supply: RAM and everything under way is lost."""
+        self._run_until(now)
+        self._ring.clear()
+        self._stop(MspPower.OFF)
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Put bytes on the wire to the board."""
+        self._run_until(now)
+        if self.power not in (MspPower.OFF, MspPower.CRASHED):
+            self._ring.receive(self._disturb(data), now)
+
+    def advance(self, now: float) -> bytes:
+        """Return the frames that have left until `now` and were not returned before."""
+        self._run_until(now)
+        return self._disturb(self._ring.sent(now))
+
+    def next_wakeup(self, now: float) -> float:
+        """Tell when it is next worth calling `advance`; infinity if nothing will happen by itself."""
+        due = self._next_event()
+        departure = self._ring.next_departure()
+        if due is not None and self._firmware:
+            due = max(due, min(self._ring.last_arrival(), due + 0.004))
+        return max(now, min(inf if due is None else due, inf if departure is None else departure))
+
+    # -- time ------------------------------------------------------------------------------------------------
+
+    def _next_event(self) -> float | None:
+        if self.power is MspPower.BOOTING:
+            return self._boots_at
+        firmware = self._firmware
+        if firmware is None or self.faults.hang:
+            return None
+        wanted = [self._ring.next_arrival()]
+        if self.faults.armed != firmware.armed:
+            wanted.append(self._next_look)
+        if self._pending and self.power is MspPower.RUNNING:
+            wanted.append(self._last_byte + (firmware.habits.cli_guard_s or 0.0))
+        earliest = min((at for at in wanted if at is not None), default=None)
+        return None if earliest is None else self._task_at(earliest)
+
+    def _task_at(self, earliest: float) -> float:
+        period = self.options.serial_task_ms / 1000
+        return self._next_task + max(ceil((earliest - self._next_task) / period - 1e-6), 0) * period
+
+    def _run_until(self, now: float) -> None:
+        while (at := self._next_event()) is not None and at <= now:
+            if self.power is MspPower.BOOTING:
+                self._start(at)
+            else:
+                self._run_task(at)
+        if self._firmware and self._next_task <= now:
+            # Nothing waits: the runs in between need not be simulated.
+            self._next_task = self._task_at(now) + self.options.serial_task_ms / 1000
+
+    def _start(self, at: float) -> None:
+        self._ring.arrive(at)
+        while self._ring.read() is not None:
+            """Nobody listened while it booted."""
+        self.power = MspPower.RUNNING
+        self._firmware = self._boot_firmware(self._boot_at(at))
+        self._receiver = MspReceiver(self._firmware.habits.buffer_size)
+        self._pending = None
+        self._next_task = self._next_look = self._last_byte = at
+
+    def _boot_at(self, at: float) -> Boot:
+        return Boot(self.options, self.faults, self.counters, self._eeprom, at)
+
+    def _stop(self, power: MspPower) -> None:
+        self._firmware = None
+        self.power = power
+
+    # -- one run of the serial task --------------------------------------------------------------------------
+
+    def _run_task(self, at: float) -> None:
+        firmware = self._firmware
+        assert firmware is not None
+        self._busy = 0.0
+        try:
+            firmware.follow_pilot(at)
+            if self.power is MspPower.CLI:
+                self._serve_cli(at)
+            elif self._ring.arrive(at):
+                self._last_byte = at
+                self._pending = None
+                self._serve_msp(firmware, at)
+                firmware.follow_pilot(at)
+            elif self._pending:
+                self._serve_letter(at)
+        except CrashError:
+            self.counters.crashes += 1
+            self._stop(MspPower.CRASHED)
+        self._next_look = at + _PILOTS_PATIENCE_S
+        self._next_task = at + self.options.serial_task_ms / 1000 + self._busy
+
+    def _serve_msp(self, firmware: MspFirmware, at: float) -> None:
+        """Read until a request is complete: one each time."""
+        while (byte := self._ring.read()) is not None:
+            is_frames = self._receiver.in_frame or byte == ord("$")
+            request = self._receiver.push(byte)
+            if request:
+                answer = firmware.answer(*request, at)
+                self._busy = firmware.take_busy_seconds()
+                if answer is not None:
+                    self._ring.write(answer, at + (self._busy if firmware.habits.writes_first else 0.0))
+                return
+            if not is_frames and not firmware.armed:
+                self._hear_letter(firmware, chr(byte))
+
+    def _hear_letter(self, firmware: MspFirmware, letter: str) -> None:
+        habits = firmware.habits
+        if (letter == "#" and habits.cli_guard_s is not None) or (letter == "R" and habits.obeys_r):
+            self._pending = letter
+
+    def _serve_letter(self, at: float) -> None:
+        if self._pending == "#":
+            self.power = MspPower.CLI
+            self.counters.cli_entered = True
+            self._ring.write(_CLI_BANNER, at)
+        else:
+            self.counters.bootloader_entered = True
+            self._stop(MspPower.BOOTLOADER)
+
+    def _serve_cli(self, at: float) -> None:
+        self._ring.arrive(at)
+        while (byte := self._ring.read()) is not None:
+            if byte == ord("\r"):
+                self._ring.write(_CLI_PROMPT, at)
+            elif ord(" ") <= byte <= ord("~"):
+                self._ring.write(bytes((byte,)), at)
+
+    def _disturb(self, data: bytes) -> bytes:
+        """Lose bytes and flip bits as the faults say."""
+        lost, flipped = self.faults.lost_byte_rate, self.faults.bit_error_rate
+        if not (data and (lost or flipped)):
+            return data
+        chance = self._random.random
+        kept = (byte for byte in data if chance() >= lost) if lost else data
+        return bytes(byte ^ sum((chance() < flipped) << bit for bit in range(8)) for byte in kept)

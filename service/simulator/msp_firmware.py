@@ -1,0 +1,87 @@
+"""The seam between a simulated board with MSP and its firmware: INAV, MultiWii, and those with telemetry only."""
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from protocols.msp.frame import Direction, MspFrame
+from service.simulator.flight import Craft
+from service.simulator.msp_options import MspOptions
+from service.simulator.options import Counters, Faults
+
+_JUMBO = 255
+
+
+class CrashError(Exception):
+    """The firmware has run into memory that is not there: the board is dead until its power is switched."""
+
+
+@dataclass(frozen=True, slots=True)
+class PortHabits:
+    """What a firmware does with bytes from the wire.
+
+    `buffer_size`: the largest payload. `cli_guard_s`: the silence after a '#' that opens the CLI; None without a CLI.
+    `obeys_r`: an 'R' restarts it into its bootloader. `writes_first`: an answer waits until the EEPROM is written.
+    """
+
+    buffer_size: int
+    cli_guard_s: float | None = None
+    obeys_r: bool = False
+    writes_first: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Boot:
+    """What a firmware finds when it starts. `now` in seconds."""
+
+    options: MspOptions
+    faults: Faults
+    counters: Counters
+    eeprom: memoryview
+    now: float
+
+
+class MspFirmware(Protocol):
+    """The firmware from one boot to the next: a new object is a reset. Times are seconds and never go back."""
+
+    habits: PortHabits
+
+    @property
+    def armed(self) -> bool:
+        """Whether the craft is armed."""
+
+    @property
+    def stored(self) -> list[bytes]:
+        """The waypoints that outlive a reset, each as the firmware keeps it."""
+
+    def follow_pilot(self, now: float) -> None:
+        """Fly until `now` and do what the pilot wishes. CrashError."""
+
+    def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
+        """Return the reply's frame, or None for silence."""
+
+    def take_busy_seconds(self) -> float:
+        """Return for how long, since the last call, the firmware has done nothing else."""
+
+    def craft_at(self, now: float) -> Craft:
+        """Return what the sensors would say."""
+
+
+BootFirmware = Callable[[Boot], MspFirmware]
+
+
+def reply(command: int, payload: bytes = b"") -> bytes:
+    """Encode a reply frame; from 255 bytes on it is a jumbo frame: size 255, command, the real size as 16 bits."""
+    if len(payload) < _JUMBO:
+        return MspFrame(Direction.REPLY, command, payload).encode()
+    body = struct.pack("<BBH", _JUMBO, command, len(payload)) + payload
+    checksum = 0
+    for byte in body:
+        checksum ^= byte
+    return b"$M>" + body + bytes((checksum,))
+
+
+def error(command: int) -> bytes:
+    """Encode an error frame."""
+    return MspFrame(Direction.ERROR, command).encode()

@@ -1,0 +1,199 @@
+"""A model of MultiWii 2.4.1 with navigation, as a quadrocopter on an AVR (Protocol.cpp)."""
+
+import struct
+from dataclasses import replace
+from enum import IntEnum
+
+from service.simulator.flight import Craft
+from service.simulator.msp_firmware import Boot, PortHabits, error, reply
+from service.simulator.multiwii_mission import MultiWiiMission
+from service.simulator.multiwii_navigation import MultiWiiNavigation
+from service.simulator.nav_status import State
+from service.simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from service.simulator.waypoint_craft import WaypointCraft
+
+_STEP_S = 0.05
+_VERSION, _QUADX, _MSP_VERSION = 241, 3, 0
+_CAPABILITY = 0x7000_0010  # version of the navigation 7, and that there is one
+_SENSORS = 0b1111
+_EEPROM_BYTE_S = 0.0033
+_BOX_NAMES = {
+    0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "BARO", 5: "MAG", 6: "HEADFREE", 7: "HEADADJ", 10: "GPS HOME",
+    11: "GPS HOLD", 13: "BEEPER", 20: "MISSION", 21: "LAND",
+}  # fmt: skip
+_BOXES = tuple(_BOX_NAMES)
+_ARM, _MISSION = _BOXES.index(0), _BOXES.index(20)
+_FLAG_CRC_ERROR, _FLAG_HOME, _FLAG_HOLD, _FLAG_IN_PROGRESS = 0xFE, 0x01, 0x02, 0xFF
+_HOME, _HOLD = 0, 255
+
+
+class MultiWiiCommand(IntEnum):
+    """The commands that are simulated."""
+
+    IDENT = 100
+    STATUS = 101
+    RAW_IMU = 102
+    MOTOR = 104
+    RC = 105
+    RAW_GPS = 106
+    COMP_GPS = 107
+    ATTITUDE = 108
+    ALTITUDE = 109
+    ANALOG = 110
+    BOXNAMES = 116
+    WP = 118
+    BOXIDS = 119
+    NAV_STATUS = 121
+    NAV_CONFIG = 122
+    ACC_CALIBRATION = 205
+    MAG_CALIBRATION = 206
+    SET_WP = 209
+    EEPROM_WRITE = 250
+
+
+_ACKNOWLEDGED = frozenset(
+    (MultiWiiCommand.ACC_CALIBRATION, MultiWiiCommand.MAG_CALIBRATION, MultiWiiCommand.EEPROM_WRITE)
+)
+
+
+class MultiWiiFirmware:
+    """See MspFirmware. The bits of `faults.boxes` are in the order of MSP_BOXIDS."""
+
+    habits = PortHabits(buffer_size=64, writes_first=True)
+
+    def __init__(self, boot: Boot) -> None:
+        self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
+        self._mission = MultiWiiMission(boot.eeprom, boot.options.capacity)
+        self._craft = WaypointCraft()
+        self._navigation = MultiWiiNavigation(self._mission, self._craft)
+        self._clock = boot.now
+        self._busy = 0.0
+        self._armed = False
+        self._home: tuple[int, int] | None = None
+
+    @property
+    def armed(self) -> bool:
+        """Whether the craft is armed."""
+        return self._armed
+
+    @property
+    def stored(self) -> list[bytes]:
+        """The waypoints in the EEPROM."""
+        return self._mission.stored
+
+    def take_busy_seconds(self) -> float:
+        """Return how long the EEPROM has held the CPU since the last call."""
+        busy, self._busy = self._busy, 0.0
+        return busy
+
+    def follow_pilot(self, now: float) -> None:
+        """Fly until `now`, arm and disarm."""
+        self._fly_until(now)
+        if self._faults.armed == self._armed:
+            return
+        self._armed = self._faults.armed
+        if self._armed:
+            self._home = self._navigation.home = self._craft.position
+        else:
+            self._navigation.end()
+            self._craft.rest()
+
+    def craft_at(self, now: float) -> Craft:
+        """Return what the sensors say."""
+        self._fly_until(now)
+        return Craft(self._craft.state(), self._armed, self._flags(), self._home)
+
+    def _fly_until(self, now: float) -> None:
+        if not self._armed:
+            self._clock = now
+        while self._clock + _STEP_S <= now:
+            self._clock += _STEP_S
+            self._navigation.fly(_STEP_S, bool(self._faults.boxes >> _MISSION & 1))
+
+    def _flags(self) -> int:
+        kept = self._faults.boxes & ~(1 << _ARM | 1 << _MISSION)
+        return kept | self._armed << _ARM | (self._navigation.state is not State.NONE) << _MISSION
+
+    def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
+        """Return the reply's frame; silence for a waypoint while a mission is flown."""
+        self._fly_until(now)
+        match command:
+            case MultiWiiCommand.SET_WP:
+                return self._set_waypoint(payload.ljust(WAYPOINT_SIZE, b"\0")[:WAYPOINT_SIZE])
+            case MultiWiiCommand.WP:
+                return reply(command, self._waypoint(payload[0] if payload else _HOME))
+        if command in _ACKNOWLEDGED:
+            return reply(command)
+        answer = self._read(command)
+        return error(command) if answer is None else reply(command, answer)
+
+    def _set_waypoint(self, payload: bytes) -> bytes | None:
+        navigation = self._navigation
+        if navigation.state is not State.NONE:
+            return None
+        navigation.number, navigation.step = unpack_waypoint(payload)
+        if navigation.number == _HOME:
+            self._home = navigation.home = (navigation.step.lat_e7, navigation.step.lon_e7)
+        elif self._mission.store(navigation.number, navigation.step):
+            self._counters.flash_writes += 1
+            self._busy += WAYPOINT_SIZE * _EEPROM_BYTE_S
+        return reply(MultiWiiCommand.SET_WP)
+
+    def _waypoint(self, number: int) -> bytes:
+        """Answer with the step that was touched last, of which only some fields are replaced."""
+        navigation = self._navigation
+        home = self._home or (0, 0)
+        if number in (_HOME, _HOLD):
+            lat, lon = home if number == _HOME else self._craft.position
+            flag = _FLAG_HOME if number == _HOME else _FLAG_HOLD
+            return self._told(navigation.step, navigation.step.action, (lat, lon), flag).pack(number)
+        if navigation.state is not State.NONE:
+            return self._told(navigation.step, 0, home, _FLAG_IN_PROGRESS).pack(number)
+        navigation.step, is_sound = self._mission.recall(number)
+        navigation.number = number
+        return (navigation.step if is_sound else replace(navigation.step, flag=_FLAG_CRC_ERROR)).pack(number)
+
+    @staticmethod
+    def _told(step: NavWaypoint, action: int, position: tuple[int, int], flag: int) -> NavWaypoint:
+        return replace(step, action=action, lat_e7=position[0], lon_e7=position[1], flag=flag)
+
+    def _read(self, command: int) -> bytes | None:
+        craft = Craft(self._craft.state(), self._armed, self._flags(), self._home)
+        flight = craft.flight
+        match command:
+            case MultiWiiCommand.IDENT:
+                return struct.pack("<BBBI", _VERSION, _QUADX, _MSP_VERSION, _CAPABILITY)
+            case MultiWiiCommand.STATUS:
+                return struct.pack("<HHHIB", 2800, 0, _SENSORS, craft.boxes, 0)
+            case MultiWiiCommand.RAW_IMU:
+                return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
+            case MultiWiiCommand.MOTOR:
+                return struct.pack("<8H", *(1450 if self._armed else 1000,) * 4, *(0,) * 4)
+            case MultiWiiCommand.RC:
+                throttle, aux = (1450, 2000) if self._armed else (1000, 1000)
+                return struct.pack("<8H", 1500, 1500, 1500, throttle, aux, 1500, 1500, 1500)
+            case MultiWiiCommand.RAW_GPS:
+                position = (flight.lat_e7, flight.lon_e7, round(flight.altitude_m))
+                motion = (round(flight.speed_ms * 100), round(flight.course * 10) % 3600)
+                return struct.pack("<BBiihHH", 1, flight.satellites, *position, *motion)
+            case MultiWiiCommand.COMP_GPS:
+                distance, direction = craft.way_home()
+                return struct.pack("<HhB", round(distance), round((direction + 180) % 360 - 180), 1)
+            case MultiWiiCommand.ATTITUDE:
+                heading = round((flight.heading + 180) % 360 - 180)
+                return struct.pack("<hhh", round(flight.roll * 10), round(flight.pitch * 10), heading)
+            case MultiWiiCommand.ALTITUDE:
+                return struct.pack("<ih", round(flight.height_m * 100), round(flight.climb_ms * 100))
+            case MultiWiiCommand.ANALOG:
+                return struct.pack("<BHHH", round(flight.volts * 10), 120, 920, 0)
+            case MultiWiiCommand.BOXNAMES:
+                return "".join(f"{name};" for name in _BOX_NAMES.values()).encode()
+            case MultiWiiCommand.BOXIDS:
+                return bytes(_BOXES)
+            case MultiWiiCommand.NAV_STATUS:
+                return self._navigation.status().pack()
+            case MultiWiiCommand.NAV_CONFIG:
+                speeds = (200, 500, 100, 400, 100)
+                limits = (40, 3000, 20, 100, 600)
+                return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
+        return None

@@ -1,0 +1,54 @@
+"""MultiWii's waypoints: each has its place in the EEPROM, with a checksum of its own (EEPROM.cpp)."""
+
+import struct
+
+from service.simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+
+SLOT_SIZE = WAYPOINT_SIZE + 1
+_BLANK = NavWaypoint(action=0, flag=0)
+
+
+def blank_eeprom(capacity: int) -> bytearray:
+    """Return an EEPROM as it leaves the factory: no waypoint's checksum is right."""
+    return bytearray(b"\xff" * (SLOT_SIZE * (capacity + 1)))
+
+
+class MultiWiiMission:
+    """Waypoints 1 to `capacity`. There is no list: a mission is what is found at 1, 2, 3, ... when it is flown."""
+
+    def __init__(self, eeprom: memoryview, capacity: int) -> None:
+        self._eeprom = eeprom
+        self._capacity = capacity
+
+    @property
+    def stored(self) -> list[bytes]:
+        """The waypoints from number 1 on whose checksum is right."""
+        found = []
+        for number in range(1, self._capacity + 1):
+            slot = self._slot(number)
+            if not _is_sound(slot):
+                break
+            found.append(slot[:-1])
+        return found
+
+    def recall(self, number: int) -> tuple[NavWaypoint, bool]:
+        """Return a waypoint, and whether its checksum is right."""
+        if number > self._capacity:
+            return _BLANK, False
+        slot = self._slot(number)
+        return unpack_waypoint(slot[:-1])[1], _is_sound(slot)
+
+    def store(self, number: int, waypoint: NavWaypoint) -> bool:
+        """Write one; False if there is no place with this number."""
+        if not 1 <= number <= self._capacity:
+            return False
+        packed = waypoint.pack(number)
+        self._eeprom[number * SLOT_SIZE : (number + 1) * SLOT_SIZE] = packed + struct.pack("B", sum(packed) % 256)
+        return True
+
+    def _slot(self, number: int) -> bytes:
+        return bytes(self._eeprom[number * SLOT_SIZE : (number + 1) * SLOT_SIZE])
+
+
+def _is_sound(slot: bytes) -> bool:
+    return len(slot) == SLOT_SIZE and sum(slot[:-1]) % 256 == slot[-1]

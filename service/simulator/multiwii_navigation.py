@@ -1,0 +1,128 @@
+"""MultiWii 2.4's mission mode (GPS.cpp): it fetches one step after the other out of the EEPROM.
+
+Not simulated: safe distances, the settling before a landing, and a mission that goes on where it was interrupted.
+"""
+
+from service.simulator.multiwii_mission import MultiWiiMission
+from service.simulator.nav_status import Error, Mode, NavStatus, State
+from service.simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
+from service.simulator.waypoint_craft import WaypointCraft
+
+_CRUISE_MS = 3.0
+_HOVER_HEIGHT_M = 10.0
+_NO_JUMP = -10
+
+
+class MultiWiiNavigation:
+    """Flies `craft`. `step` is the waypoint that was touched last, by the mission or by MSP."""
+
+    def __init__(self, mission: MultiWiiMission, craft: WaypointCraft) -> None:
+        self._mission = mission
+        self._craft = craft
+        self._error = Error.NONE
+        self._next_step = 1
+        self._jumps = _NO_JUMP
+        self._held_s = 0.0
+        self.home = craft.position
+        self.state = State.NONE
+        self.step = NavWaypoint(action=0, flag=0)
+        self.number = 0
+
+    def end(self) -> None:
+        """Give up whatever it does: disarmed, or the switch is off."""
+        self.state = State.NONE
+        self._error = Error.NONE
+
+    def status(self) -> NavStatus:
+        """Return what MSP_NAV_STATUS tells."""
+        mode = Mode.NONE if self.state is State.NONE else Mode.NAV
+        return NavStatus(mode, self.state, self.step.action, self.number, self._error, round(self._craft.heading))
+
+    def fly(self, seconds: float, is_wished: bool) -> None:
+        """Let time pass in flight; `is_wished`: the pilot's switch MISSION is on."""
+        if not is_wished:
+            self.end()
+        elif self.state is State.NONE:
+            self._next_step, self._jumps = 1, _NO_JUMP
+            self.state = State.PROCESS_NEXT
+        match self.state:
+            case State.NONE:
+                self._craft.hover(_HOVER_HEIGHT_M, seconds)
+            case State.PROCESS_NEXT:
+                self._process_next()
+            case State.DO_JUMP:
+                self._jump()
+            case State.WP_ENROUTE:
+                self._fly_leg(seconds)
+            case State.RTH_START:
+                self.state = State.RTH_ENROUTE
+            case State.RTH_ENROUTE:
+                if self._craft.fly_to(self.home, self._craft.height_m, _CRUISE_MS, seconds):
+                    self.state = State.LAND_IN_PROGRESS if self.step.p1 else State.HOLD_INFINIT
+            case State.HOLD_TIMED:
+                self._hold(seconds)
+            case State.HOLD_INFINIT:
+                self._craft.hover(self._craft.height_m, seconds)
+            case State.LAND_IN_PROGRESS:
+                self._craft.hover(0.0, seconds)
+                if self._craft.height_m <= 0:
+                    self.state = State.LANDED
+
+    def _abort(self, error: Error) -> None:
+        self._error = error
+        self.state = State.HOLD_INFINIT
+
+    def _process_next(self) -> None:
+        self._error = Error.NONE
+        self.number = self._next_step
+        self.step, is_sound = self._mission.recall(self.number)
+        if not is_sound:
+            self._abort(Error.WP_CRC)
+            return
+        match self.step.action:
+            case Action.WAYPOINT | Action.POSHOLD_TIME | Action.POSHOLD_UNLIM | Action.LAND:
+                self.state = State.WP_ENROUTE
+            case Action.RTH:
+                self.state = State.RTH_START
+            case Action.JUMP if 0 < self.step.p1 < self.number:
+                self._jumps = self.step.p2 if self._jumps == _NO_JUMP else self._jumps
+                self.state = State.DO_JUMP
+            case Action.JUMP:
+                self._abort(Error.INVALID_JUMP)
+            case Action.SET_HEAD | Action.SET_POI:
+                pass
+            case _:
+                self._abort(Error.INVALID_DATA)
+        self._next_step += 1
+
+    def _jump(self) -> None:
+        if self._jumps == 0:
+            self._jumps = _NO_JUMP
+            if self.step.flag == FLAG_LAST:
+                self._abort(Error.FINISH)
+                return
+        else:
+            self._jumps -= self._jumps > 0
+            self._next_step = self.step.p1
+        self.state = State.PROCESS_NEXT
+
+    def _fly_leg(self, seconds: float) -> None:
+        target = (self.step.lat_e7, self.step.lon_e7)
+        if not self._craft.fly_to(target, self.step.alt_cm / 100, _CRUISE_MS, seconds):
+            return
+        if self.step.action == Action.LAND:
+            self.state = State.LAND_IN_PROGRESS
+        elif self.step.flag == FLAG_LAST or self.step.action == Action.POSHOLD_UNLIM:
+            self._abort(Error.FINISH)
+        elif self.step.action == Action.POSHOLD_TIME:
+            self._held_s = 0.0
+            self.state = State.HOLD_TIMED
+        else:
+            self.state = State.PROCESS_NEXT
+
+    def _hold(self, seconds: float) -> None:
+        self._held_s += seconds
+        self._craft.hover(self._craft.height_m, seconds)
+        if self._held_s >= self.step.p1:
+            self._error = Error.TIMEWAIT
+            self.state = State.PROCESS_NEXT

@@ -1,0 +1,52 @@
+"""A waypoint as MSP_WP and MSP_SET_WP carry it (inav.md "Layouts")."""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+_LAYOUT = struct.Struct("<BBiiihhhB")
+WAYPOINT_SIZE = _LAYOUT.size
+FLAG_LAST = 0xA5
+
+
+class Action(IntEnum):
+    """What a waypoint asks for; the numbers are MultiWii's."""
+
+    WAYPOINT = 1
+    POSHOLD_UNLIM = 2
+    POSHOLD_TIME = 3
+    RTH = 4
+    SET_POI = 5
+    JUMP = 6
+    SET_HEAD = 7
+    LAND = 8
+
+
+@dataclass(frozen=True, slots=True)
+class NavWaypoint:
+    """`action` may be any byte. Degrees * 1e7 and centimetres; what p1 to p3 mean hangs on the action."""
+
+    action: int = Action.RTH
+    lat_e7: int = 0
+    lon_e7: int = 0
+    alt_cm: int = 0
+    p1: int = 0
+    p2: int = 0
+    p3: int = 0
+    flag: int = FLAG_LAST
+
+    def pack(self, number: int) -> bytes:
+        """Return the 21 bytes of the wire."""
+        position = (self.lat_e7, self.lon_e7, self.alt_cm)
+        return _LAYOUT.pack(number, self.action, *position, self.p1, self.p2, self.p3, self.flag)
+
+
+def unpack_waypoint(payload: bytes) -> tuple[int, NavWaypoint]:
+    """Return number and waypoint; struct.error unless there are 21 bytes."""
+    number, *fields = _LAYOUT.unpack(payload)
+    return number, NavWaypoint(*fields)
+
+
+def wrap16(value: int) -> int:
+    """Return what a signed 16-bit field makes of a number."""
+    return (value + 0x8000) % 0x10000 - 0x8000

@@ -1,0 +1,116 @@
+"""A test bench: a simulated board that is no Naze, a client at its port, and a clock that only the test moves."""
+
+from dataclasses import replace
+from functools import reduce
+from operator import xor
+from typing import NamedTuple
+
+from protocols.msp.frame import request
+from service.simulator.fc_kinds import make_board
+from service.simulator.msp_options import MspOptions
+from service.simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint, unpack_waypoint
+from service.simulator.options import Faults
+
+SET_WP, WP, GETINFO, SAVE, LOAD = 209, 118, 20, 19, 18
+
+
+class Frame(NamedTuple):
+    """A reply; `direction` is '>' or '!'."""
+
+    direction: str
+    command: int
+    payload: bytes
+
+
+class MspBench:
+    """The board has just booted at time 0. `heard` keeps all bytes that came from it."""
+
+    def __init__(
+        self, kind: str, options: MspOptions | None = None, faults: Faults | None = None, eeprom: bytes | None = None
+    ) -> None:
+        self.board = make_board(kind, options, faults, None if eeprom is None else memoryview(bytearray(eeprom)))
+        self.board.power_on_booted(0.0)
+        self.board.advance(0.0)
+        self.now = 0.0
+        self.heard = bytearray()
+
+    @property
+    def faults(self) -> Faults:
+        return self.board.faults
+
+    def send(self, data: bytes) -> None:
+        self.board.receive(data, self.now)
+
+    def run(self, seconds: float) -> bytes:
+        """Let time pass as a link would; return what was heard meanwhile."""
+        end, before = self.now + seconds, len(self.heard)
+        while self.now < end:
+            self._step(end)
+        return bytes(self.heard[before:])
+
+    def ask(self, command: int, payload: bytes = b"", timeout: float = 0.5) -> Frame | None:
+        """Send a request and return the next frame that comes; None after `timeout` seconds."""
+        before, end = len(self.heard), self.now + timeout
+        self.send(request(command, payload))
+        while self.now < end:
+            self._step(end)
+            frames = take_apart(bytes(self.heard[before:]))
+            if frames:
+                return frames[0]
+        return None
+
+    def payload(self, command: int, payload: bytes = b"") -> bytes:
+        """The payload of a reply that is no error."""
+        frame = self.ask(command, payload)
+        assert frame is not None
+        assert (frame.direction, frame.command) == (">", command)
+        return frame.payload
+
+    def write(self, number: int, waypoint: NavWaypoint) -> None:
+        assert self.payload(SET_WP, waypoint.pack(number)) == b""
+
+    def read(self, number: int) -> NavWaypoint:
+        found, waypoint = unpack_waypoint(self.payload(WP, bytes((number,))))
+        assert found == number
+        return waypoint
+
+    def info(self) -> tuple[int, bool, int]:
+        """Capacity, valid, count."""
+        _, capacity, valid, count = self.payload(GETINFO)
+        return capacity, bool(valid), count
+
+    def upload(self, waypoints: list[NavWaypoint]) -> None:
+        """Write a list, stop and wait, the last with its flag."""
+        for number, waypoint in enumerate(waypoints, 1):
+            self.write(number, replace(waypoint, flag=FLAG_LAST if number == len(waypoints) else waypoint.flag))
+
+    def restart(self) -> None:
+        self.board.power_off(self.now)
+        self.board.power_on_booted(self.now)
+        self.run(0.01)
+
+    def _step(self, end: float) -> None:
+        self.now = min(max(self.board.next_wakeup(self.now), self.now + 1e-6), end)
+        self.heard += self.board.advance(self.now)
+
+
+def take_apart(data: bytes) -> list[Frame]:
+    """Return the whole frames, jumbo ones too; each must be sound."""
+    frames = []
+    while len(data) >= 6:
+        assert data[:2] == b"$M", data.hex()
+        size, body = data[3], 5
+        if size == 255:
+            size, body = int.from_bytes(data[5:7], "little"), 7
+        if len(data) <= body + size:
+            break
+        assert reduce(xor, data[3 : body + size + 1]) == 0
+        frames.append(Frame(chr(data[2]), data[4], data[body : body + size]))
+        data = data[body + size + 1 :]
+    return frames
+
+
+def waypoint(index: int = 0, action: int = Action.WAYPOINT, **fields: int) -> NavWaypoint:
+    """A waypoint near the field, another one for each index."""
+    usual = {"lat_e7": 453838000 + 900 * index, "lon_e7": 84733000 + 700 * (index % 7), "alt_cm": 2000, "flag": 0}
+    return NavWaypoint(action, **usual | fields)

@@ -1,0 +1,156 @@
+"""The simulated INAV flies its mission, and MSP_NAV_STATUS tells of it as INAV's does."""
+
+import struct
+from collections.abc import Callable
+from itertools import groupby
+from math import hypot
+
+import pytest
+from msp_bench import MspBench, waypoint
+
+from service.simulator.nav_waypoint import Action, NavWaypoint
+from service.simulator.options import Faults
+
+NAV_WP = 1 << 13
+NAV, RTH, HOLD, NONE = 3, 2, 1, 0
+
+
+class Flight:
+    """A mission that is flown from now on; `seen` has (mode, state, action, number, error) four times a second."""
+
+    def __init__(self, *waypoints: NavWaypoint) -> None:
+        self.bench = MspBench("inav", faults=Faults(boxes=0))
+        self.bench.upload(list(waypoints))
+        self.bench.faults.armed = True
+        self.bench.faults.boxes = NAV_WP
+        self.seen: list[tuple[int, ...]] = []
+
+    def status(self) -> tuple[int, ...]:
+        return struct.unpack("<5Bh", self.bench.payload(121))[:5]
+
+    def until(self, done: Callable[[tuple[int, ...]], bool], seconds: float = 600.0) -> None:
+        end = self.bench.now + seconds
+        while not self.seen or not done(self.seen[-1]):
+            assert self.bench.now < end, self.seen[-1]
+            self.bench.run(0.25)
+            self.seen.append(self.status())
+
+    def numbers(self) -> list[int]:
+        """The waypoints in the order in which they were active."""
+        return [number for number, _ in groupby(status[3] for status in self.seen)]
+
+    def away_from(self, target: NavWaypoint) -> float:
+        truth = self.bench.board.truth(self.bench.now)
+        assert truth is not None
+        north = (truth.flight.lat_e7 - target.lat_e7) / 1e7 * 111320
+        east = (truth.flight.lon_e7 - target.lon_e7) / 1e7 * 78200
+        return hypot(north, east)
+
+
+def is_finished(status: tuple[int, ...]) -> bool:
+    return status[4] == 4
+
+
+def test_on_the_ground_the_first_waypoint_is_named_and_the_mode_is_none() -> None:
+    bench = MspBench("inav")
+    assert bench.payload(121) == bytes((NONE, 0, 0, 1, 0, 0, 0))
+    bench.upload([waypoint(1)])
+    assert bench.payload(121) == bytes((NONE, 0, 1, 1, 0, 0, 0))
+
+
+def test_a_circuit_is_flown_to_its_end_and_stays_there() -> None:
+    legs = [waypoint(10), waypoint(20), waypoint(30)]
+    flight = Flight(*legs)
+    flight.until(is_finished)
+    assert flight.numbers() == [1, 2, 3]
+    assert flight.seen[-1] == (NAV, 5, 1, 3, 4)
+    assert flight.away_from(legs[2]) < 1
+    flight.bench.run(30)
+    assert flight.away_from(legs[2]) < 1
+
+
+@pytest.mark.parametrize(("speed", "seconds"), [(0, 33), (500, 20), (20, 33), (2000, 10)])
+def test_the_speed_of_a_leg(speed: int, seconds: int) -> None:
+    flight = Flight(waypoint(100, lat_e7=453838000 + 8983, lon_e7=84733000, p1=speed))  # 100 m to the north
+    flight.until(is_finished)
+    assert flight.bench.now == pytest.approx(seconds, abs=1.5)
+
+
+def test_a_hold_takes_its_seconds() -> None:
+    flight = Flight(waypoint(3, Action.POSHOLD_TIME, p1=20, p2=400), waypoint(6))
+    flight.until(is_finished)
+    held = [status for status in flight.seen if status[1] == 4]
+    assert {status[3] for status in held} == {1}
+    assert len(held) / 4 == pytest.approx(20, abs=1)
+
+
+def test_a_jump_is_flown_as_often_as_it_says() -> None:
+    flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=Action.JUMP, p1=1, p2=2), waypoint(17))
+    flight.until(is_finished)
+    geo = [number for number in flight.numbers() if number != 4]
+    assert geo == [1, 2, 3, 1, 2, 3, 1, 2, 3, 5]
+
+
+def test_a_jump_for_ever_never_ends() -> None:
+    flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=Action.JUMP, p1=1, p2=-1))
+    with pytest.raises(AssertionError):
+        flight.until(is_finished, 200)
+
+
+def test_what_is_no_place_is_passed_by() -> None:
+    flight = Flight(waypoint(3), waypoint(action=Action.SET_HEAD, p1=90), waypoint(6, Action.SET_POI), waypoint(9))
+    flight.until(is_finished)
+    assert flight.numbers()[0] == 1
+    assert flight.numbers()[-1] == 4
+
+
+@pytest.mark.parametrize(("p1", "state"), [(0, 13), (1, 10)])
+def test_a_return_home_ends_above_it_or_on_it(p1: int, state: int) -> None:
+    flight = Flight(waypoint(10), waypoint(action=Action.RTH, p1=p1))
+    flight.until(lambda status: status[1] == state)
+    assert flight.seen[-1][:2] == (RTH, state)
+    assert flight.away_from(waypoint(0)) < 1
+    # The flight mode is NAV RTH then, not NAV WP.
+    flags = struct.unpack_from("<I", flight.bench.payload(101), 6)[0]
+    assert flags & (NAV_WP | 1 << 12) == 1 << 12
+
+
+def test_a_landing_ends_the_mission_on_the_ground() -> None:
+    flight = Flight(waypoint(10), waypoint(14, Action.LAND))
+    flight.until(is_finished)
+    truth = flight.bench.board.truth(flight.bench.now)
+    assert truth is not None
+    assert truth.flight.height_m == 0
+
+
+@pytest.mark.parametrize(("alt_cm", "p3"), [(3000, 0), (16100, 1)])
+def test_heights_are_above_home_or_above_the_sea(alt_cm: int, p3: int) -> None:
+    flight = Flight(waypoint(100, alt_cm=alt_cm, p3=p3))
+    flight.until(is_finished)
+    assert struct.unpack_from("<ih", flight.bench.payload(109))[0] == 3000
+    assert struct.unpack_from("<h", flight.bench.payload(106), 10)[0] == 161
+
+
+def test_the_nose_is_down_and_the_sign_is_plus() -> None:
+    flight = Flight(waypoint(100))
+    flight.bench.run(5)
+    assert struct.unpack("<hhh", flight.bench.payload(108))[1] > 0
+
+
+def test_the_switch_stops_the_mission_and_goes_on_with_it() -> None:
+    flight = Flight(waypoint(20), waypoint(40), waypoint(60))
+    flight.until(lambda status: status[3] == 2)
+    flight.bench.faults.boxes = 0
+    flight.bench.run(1)
+    assert flight.status() == (HOLD, 0, 1, 2, 0)
+    flight.bench.faults.boxes = NAV_WP
+    flight.until(is_finished)
+    assert flight.numbers() == [1, 2, 3]
+
+
+def test_disarming_ends_it() -> None:
+    flight = Flight(waypoint(20), waypoint(40))
+    flight.until(lambda status: status[3] == 2)
+    flight.bench.faults.armed = False
+    flight.bench.run(1)
+    assert flight.status()[:2] == (NONE, 0)

@@ -1,0 +1,330 @@
+"""The simulated INAV has every trap of inav.md; what is asserted here was seen on INAV's own simulator, too."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msp_bench import GETINFO, LOAD, SAVE, SET_WP, WP, MspBench, waypoint
+
+from protocols.msp.frame import request
+from service.simulator.msp_board import MspPower
+from service.simulator.msp_options import MspOptions
+from service.simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
+from service.simulator.options import Faults
+
+VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")
+FAKE = NavWaypoint(Action.RTH, 0, 0, 0, 0, 0, 0, FLAG_LAST)
+THREE = [waypoint(0), waypoint(1), waypoint(2)]
+NAV_WP_BIT = 13  # of 9.1.0's BOXIDS
+
+
+def test_a_list_is_stored_and_read_back() -> None:
+    bench = MspBench("inav")
+    assert bench.info() == (120, False, 0)
+    bench.upload(THREE)
+    assert bench.info() == (120, True, 3)
+    assert [bench.read(number) for number in (1, 2, 3)] == [*THREE[:2], replace(THREE[2], flag=FLAG_LAST)]
+
+
+def test_the_example_of_the_specification_is_acknowledged() -> None:
+    bench = MspBench("inav")
+    bench.send(bytes.fromhex("244d3c15d101018768111ff99254ff88130000000000000000007e"))
+    assert bench.run(0.1).hex() == "244d3e00d1d1"
+    assert bench.read(1).lat_e7 == 521234567
+
+
+@pytest.mark.parametrize(
+    ("number", "wrong"),
+    [
+        (5, waypoint(9)),  # a gap
+        (2, waypoint(9)),  # written already
+        (4, waypoint(9, action=2)),  # POSHOLD_UNLIM
+        (4, waypoint(9, action=0)),
+        (4, waypoint(9, action=9)),
+        (0, waypoint(9)),
+        (121, waypoint(9)),
+        (255, waypoint(9)),
+    ],
+)
+def test_what_is_acknowledged_and_not_stored(number: int, wrong: NavWaypoint) -> None:
+    bench = MspBench("inav")
+    bench.upload(THREE)
+    bench.write(number, wrong)
+    assert bench.info() == (120, True, 3)
+    assert bench.read(2) == THREE[1]
+
+
+def test_number_1_wipes_the_list_and_valid_comes_back_with_the_last() -> None:
+    bench = MspBench("inav")
+    bench.upload(THREE)
+    bench.write(1, waypoint(7))
+    assert bench.info() == (120, False, 1)
+    bench.write(2, waypoint(8, flag=FLAG_LAST))
+    assert bench.info() == (120, True, 2)
+
+
+def test_a_repeated_number_is_harmless() -> None:
+    bench = MspBench("inav")
+    for number in (1, 2, 2, 3, 3):
+        bench.write(number, waypoint(number))
+    assert bench.info() == (120, False, 3)
+    assert bench.read(3) == waypoint(3)
+
+
+@pytest.mark.parametrize("number", [0, 4, 120, 121, 200, 254, 255])
+def test_reading_past_the_end_gives_a_fake_waypoint(number: int) -> None:
+    bench = MspBench("inav")
+    bench.upload(THREE)
+    assert bench.read(number) == FAKE
+
+
+def test_the_capacity_is_120() -> None:
+    bench = MspBench("inav")
+    for number in range(1, 122):
+        bench.write(number, waypoint(number))
+    assert bench.info() == (120, False, 120)
+
+
+@pytest.mark.parametrize("size", [0, 20, 22])
+def test_a_waypoint_of_another_size_is_an_error(size: int) -> None:
+    frame = MspBench("inav").ask(SET_WP, bytes(size))
+    assert frame is not None
+    assert frame.direction == "!"
+
+
+def test_a_flag_in_mid_list_makes_several_missions_of_it() -> None:
+    bench = MspBench("inav")
+    bench.write(1, waypoint(1, flag=FLAG_LAST))
+    bench.write(2, waypoint(2))
+    assert bench.info() == (120, False, 2)
+    bench.write(3, waypoint(3, flag=FLAG_LAST))
+    assert bench.info() == (120, True, 3)
+
+
+# -- the EEPROM ------------------------------------------------------------------------------------------------
+
+
+def answer(bench: MspBench, command: int, payload: bytes = b"\0") -> str:
+    frame = bench.ask(command, payload)
+    assert frame is not None
+    return frame.direction
+
+
+@pytest.mark.parametrize("command", [SAVE, LOAD])
+@pytest.mark.parametrize("size", [0, 2])
+def test_save_and_load_take_exactly_one_byte(command: int, size: int) -> None:
+    bench = MspBench("inav")
+    bench.upload(THREE)
+    assert answer(bench, SAVE) == ">"
+    assert answer(bench, command, bytes(size)) == "!"
+
+
+def test_a_saved_list_is_there_after_a_restart_only_once_it_is_loaded() -> None:
+    bench = MspBench("inav")
+    bench.upload(THREE)
+    assert answer(bench, SAVE) == ">"
+    bench.restart()
+    assert bench.info() == (120, False, 0)
+    assert bench.read(1) == FAKE
+    assert answer(bench, LOAD) == ">"
+    assert bench.info() == (120, True, 3)
+    assert bench.read(2) == THREE[1]
+
+
+def test_what_was_not_saved_is_lost_with_a_restart() -> None:
+    bench = MspBench("inav")
+    bench.upload(THREE)
+    bench.restart()
+    assert bench.info() == (120, False, 0)
+
+
+def test_save_of_an_incomplete_list_is_an_error() -> None:
+    bench = MspBench("inav")
+    assert answer(bench, SAVE) == "!"
+    bench.write(1, waypoint(1))
+    assert answer(bench, SAVE) == "!"
+
+
+def test_load_with_nothing_saved_is_an_error_only_if_ram_is_empty() -> None:
+    bench = MspBench("inav")
+    assert answer(bench, LOAD) == "!"
+    bench.upload(THREE)
+    assert answer(bench, LOAD) == ">"
+    assert bench.info() == (120, True, 3)
+
+
+@given(
+    st.lists(
+        st.builds(
+            NavWaypoint,
+            st.sampled_from((1, 3, 4, 5, 7, 8)),
+            *[st.integers(-(2**31), 2**31 - 1)] * 3,
+            *[st.integers(-(2**15), 2**15 - 1)] * 3,
+            st.sampled_from((0, 0x48)),
+        ),
+        min_size=1,
+        max_size=12,
+    )
+)
+def test_any_list_outlives_a_restart(waypoints: list[NavWaypoint]) -> None:
+    bench = MspBench("inav")
+    bench.upload(waypoints)
+    assert answer(bench, SAVE) == ">"
+    bench.restart()
+    assert answer(bench, LOAD) == ">"
+    assert bench.info() == (120, True, len(waypoints))
+    held = [bench.read(number) for number in range(1, len(waypoints) + 1)]
+    assert held == [*waypoints[:-1], replace(waypoints[-1], flag=FLAG_LAST)]
+
+
+# -- JUMP --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("p1", [0, -1, -32767])
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_jump_to_nowhere_is_acknowledged_and_kills_the_board(version: str, p1: int) -> None:
+    bench = MspBench("inav", MspOptions(version=version))
+    bench.upload(THREE)
+    bench.write(1, waypoint(0))
+    bench.write(2, waypoint(action=Action.JUMP, p1=p1))
+    assert bench.board.power is MspPower.CRASHED
+    assert not bench.board.is_alive
+    assert bench.ask(GETINFO, timeout=5.0) is None
+    bench.restart()
+    assert bench.info() == (120, False, 0)
+    assert bench.board.counters.crashes == 1
+
+
+def test_a_jump_is_read_back_as_it_was_written() -> None:
+    bench = MspBench("inav")
+    jump = waypoint(action=Action.JUMP, p1=1, p2=2)
+    bench.upload([*THREE, jump])
+    assert bench.read(4) == replace(jump, flag=FLAG_LAST)
+
+
+@pytest.mark.parametrize(
+    ("jump", "arms"),
+    [
+        ({"p1": 1, "p2": -1}, True),
+        ({"p1": 2, "p2": 0}, True),
+        ({"p1": 3, "p2": 1}, False),  # the waypoint before it
+        ({"p1": 4, "p2": 1}, False),  # itself
+        ({"p1": 5, "p2": 1}, False),  # the next
+        ({"p1": 6, "p2": 1}, False),  # there is none
+        ({"p1": 1, "p2": -2}, False),
+    ],
+)
+def test_a_jump_that_inav_does_not_like_keeps_the_craft_on_the_ground(jump: dict[str, int], arms: bool) -> None:
+    bench = MspBench("inav")
+    bench.upload([*THREE, waypoint(action=Action.JUMP, **jump), waypoint(4)])
+    bench.faults.armed = True
+    bench.run(1.0)
+    assert bench.board.armed is arms
+
+
+# -- armed -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_armed_version_7_stores_nothing_and_8_everything(version: str) -> None:
+    bench = MspBench("inav", MspOptions(version=version))
+    bench.upload(THREE)
+    bench.faults.armed = True
+    bench.run(0.5)
+    bench.write(1, waypoint(9))
+    assert bench.info() == ((120, True, 3) if version[0] < "8" else (120, False, 1))
+
+
+def test_version_9_stores_nothing_while_it_flies_a_mission() -> None:
+    bench = MspBench("inav", faults=Faults(armed=True, boxes=0))
+    bench.upload([waypoint(100), waypoint(200)])
+    bench.faults.boxes = 1 << NAV_WP_BIT
+    bench.run(1.0)
+    bench.write(1, waypoint(9))
+    assert bench.info() == (120, True, 2)
+    bench.faults.boxes = 0
+    bench.run(1.0)
+    bench.write(1, waypoint(9))
+    assert bench.info() == (120, False, 1)
+
+
+@pytest.mark.parametrize("command", [SAVE, LOAD])
+def test_save_and_load_are_errors_while_armed(command: int) -> None:
+    bench = MspBench("inav")
+    bench.upload(THREE)
+    assert answer(bench, SAVE) == ">"
+    bench.faults.armed = True
+    bench.run(0.5)
+    assert answer(bench, command) == "!"
+
+
+# -- the port ----------------------------------------------------------------------------------------------------
+
+
+def test_120_frames_at_once_overrun_the_ring() -> None:
+    """INAV's own simulator has a ring of 2048 bytes, in which the last 44 of 120 frames are left."""
+    bench = MspBench("inav", MspOptions(baud=None, ring_size=2048))
+    bench.send(b"".join(request(WP, waypoint(n).pack(n)) for n in range(1, 121)))
+    assert bench.run(2.0).count(b"$M>") == 44
+
+
+def test_after_half_a_frame_the_next_requests_are_swallowed_however_late_they_come() -> None:
+    bench = MspBench("inav")
+    bench.send(request(SET_WP, bytes(21))[:10])
+    bench.run(60.0)
+    # 16 payload bytes and the checksum were owed: two requests of 6 bytes pay 12, the third 5.
+    for _ in range(3):
+        assert bench.ask(GETINFO) is None
+    assert bench.info() == (120, False, 0)
+
+
+def test_a_number_sign_and_silence_open_the_command_line_and_msp_is_dead() -> None:
+    bench = MspBench("inav")
+    bench.send(b"#")
+    assert b"CLI" in bench.run(0.2)
+    assert bench.ask(GETINFO) is None
+    assert bench.board.counters.cli_entered
+
+
+def test_a_number_sign_with_a_frame_soon_after_does_nothing() -> None:
+    bench = MspBench("inav")
+    bench.send(b"#")
+    bench.run(0.05)
+    assert bench.info() == (120, False, 0)
+    bench.run(1.0)
+    assert not bench.board.counters.cli_entered
+
+
+def test_a_number_sign_within_a_frame_is_data() -> None:
+    bench = MspBench("inav")
+    bench.write(1, waypoint(0, lat_e7=0x23232323))
+    bench.run(1.0)
+    assert not bench.board.counters.cli_entered
+
+
+def test_a_number_sign_is_not_heard_while_armed() -> None:
+    bench = MspBench("inav", faults=Faults(armed=True))
+    bench.run(0.2)
+    bench.send(b"#")
+    bench.run(1.0)
+    assert not bench.board.counters.cli_entered
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_lone_r_is_the_way_into_the_bootloader_up_to_8_0_1(version: str) -> None:
+    bench = MspBench("inav", MspOptions(version=version))
+    bench.send(b"R")
+    bench.run(0.5)
+    falls = version < "9"
+    assert bench.board.counters.bootloader_entered is falls
+    assert (bench.ask(GETINFO) is None) is falls
+
+
+@given(st.binary(max_size=300))
+def test_no_input_breaks_the_board(data: bytes) -> None:
+    bench = MspBench("inav")
+    bench.send(data)
+    bench.run(1.0)
+    bench.restart()
+    assert bench.info()[0] == 120

@@ -1,0 +1,93 @@
+"""The simulated INAV's telemetry: lengths and signs of the versions, as their own simulators have them."""
+
+import struct
+
+import pytest
+from msp_bench import MspBench
+
+from service.simulator.msp_options import MspOptions
+from service.simulator.options import Faults
+
+VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")
+LENGTHS = {
+    1: 3,
+    2: 4,
+    3: 3,
+    20: 4,
+    101: 11,
+    102: 18,
+    104: 16,
+    106: 18,
+    107: 5,
+    108: 6,
+    109: 10,
+    110: 7,
+    121: 7,
+    150: 16,
+}
+BOXES = {"6.1.1": (29, 300), "7.1.2": (35, 387), "8.0.1": (37, 426), "9.0.1": (38, 442), "9.1.0": (38, 442)}
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_lengths(version: str) -> None:
+    bench = MspBench("inav", MspOptions(version=version))
+    assert {command: len(bench.payload(command)) for command in LENGTHS} == LENGTHS
+    assert (len(bench.payload(119)), len(bench.payload(116))) == BOXES[version]
+
+
+def test_who_it_is() -> None:
+    bench = MspBench("inav", MspOptions(version="7.1.2"))
+    assert (bench.payload(1), bench.payload(2), bench.payload(3)) == (b"\x00\x02\x05", b"INAV", b"\x07\x01\x02")
+
+
+@pytest.mark.parametrize("command", [100, 112, 122, 199, 253])
+def test_what_inav_does_not_know_is_an_error(command: int) -> None:
+    frame = MspBench("inav").ask(command)
+    assert frame is not None
+    assert (frame.direction, frame.command, frame.payload) == ("!", command, b"")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_names_of_the_modes_need_a_jumbo_frame(version: str) -> None:
+    bench = MspBench("inav", MspOptions(version=version))
+    names = bench.payload(116).split(b";")
+    assert bytes(bench.heard[3:5]) == b"\xff\x74"
+    assert len(names) == len(bench.payload(119)) + 1
+
+
+@pytest.mark.parametrize("channels", [0, 8, 18, 34])
+def test_channels(channels: int) -> None:
+    bench = MspBench("inav", MspOptions(channels=channels))
+    assert len(bench.payload(105)) == 2 * channels
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_the_arm_flag_is_where_the_box_ids_have_0(armed: bool) -> None:
+    bench = MspBench("inav", faults=Faults(armed=armed))
+    bench.run(0.2)
+    flags = struct.unpack_from("<I", bench.payload(101), 6)[0]
+    assert bool(flags >> bench.payload(119).index(0) & 1) is armed
+
+
+def test_a_box_whose_bit_is_beyond_the_32_is_not_told() -> None:
+    bench = MspBench("inav", faults=Faults(boxes=1 << 36 | 1 << 4))
+    assert struct.unpack_from("<I", bench.payload(101), 6)[0] == 1 << 4
+
+
+def test_home_is_known_once_armed() -> None:
+    bench = MspBench("inav")
+    assert bench.read(0).lat_e7 == 0
+    bench.faults.armed = True
+    bench.run(0.5)
+    assert (bench.read(0).lat_e7, bench.read(0).lon_e7) == (453838000, 84733000)
+
+
+def test_a_question_for_a_waypoint_without_its_number_is_answered_with_home() -> None:
+    assert MspBench("inav").payload(118)[0] == 0
+
+
+def test_a_paced_line_takes_its_time() -> None:
+    bench = MspBench("inav", MspOptions(baud=9600, serial_task_ms=10))
+    bench.payload(106)
+    # 6 bytes there, the task's turn, 24 bytes back.
+    assert bench.now == pytest.approx(30 * 10 / 9600, abs=0.011)

@@ -1,0 +1,128 @@
+"""The simulated MultiWii 2.4.1 with navigation: waypoints go straight into the EEPROM, one by one."""
+
+import struct
+
+import pytest
+from msp_bench import SET_WP, MspBench, waypoint
+
+from service.simulator.msp_options import MspOptions
+from service.simulator.nav_waypoint import FLAG_LAST, Action
+from service.simulator.options import Faults
+
+LENGTHS = {
+    100: 7,
+    101: 11,
+    102: 18,
+    104: 16,
+    105: 16,
+    106: 16,
+    107: 5,
+    108: 6,
+    109: 6,
+    110: 7,
+    119: 12,
+    121: 7,
+    122: 22,
+}
+MISSION = 1 << 10
+CRC_ERROR, IN_PROGRESS = 0xFE, 0xFF
+
+
+@pytest.mark.parametrize(("command", "length"), LENGTHS.items())
+def test_lengths(command: int, length: int) -> None:
+    assert len(MspBench("multiwii").payload(command)) == length
+
+
+def test_it_says_that_it_can_navigate() -> None:
+    version, _, _, capability = struct.unpack("<BBBI", MspBench("multiwii").payload(100))
+    assert (version, capability >> 4 & 1) == (241, 1)
+
+
+@pytest.mark.parametrize("command", [1, 2, 3, 18, 19, 20])
+def test_what_only_inav_knows_is_an_error(command: int) -> None:
+    frame = MspBench("multiwii").ask(command, b"\0")
+    assert frame is not None
+    assert frame.direction == "!"
+
+
+def test_the_capacity_is_in_the_navigations_settings() -> None:
+    assert MspBench("multiwii", MspOptions(capacity=30)).payload(122)[-2] == 30
+
+
+def test_a_waypoint_outlives_a_restart() -> None:
+    bench = MspBench("multiwii")
+    bench.upload([waypoint(1), waypoint(2)])
+    bench.restart()
+    assert [bench.read(number) for number in (1, 2)] == [waypoint(1), waypoint(2, flag=FLAG_LAST)]
+    assert len(bench.board.stored_records) == 2
+
+
+def test_a_place_that_was_never_written_has_a_wrong_checksum() -> None:
+    bench = MspBench("multiwii", MspOptions(capacity=30))
+    bench.write(31, waypoint(1))
+    assert {bench.read(number).flag for number in (1, 30, 31)} == {CRC_ERROR}
+
+
+def test_waypoints_may_be_written_in_any_order_and_shorter_lists_leave_the_rest() -> None:
+    bench = MspBench("multiwii")
+    for number in (3, 1, 2, 1):
+        bench.write(number, waypoint(number))
+    assert [bench.read(number) for number in (1, 2, 3)] == [waypoint(1), waypoint(2), waypoint(3)]
+
+
+def test_the_acknowledgement_waits_for_the_eeprom() -> None:
+    bench = MspBench("multiwii")
+    bench.write(1, waypoint(1))
+    assert bench.now > 0.06
+
+
+def test_half_a_frame_swallows_the_next() -> None:
+    bench = MspBench("multiwii")
+    bench.send(b"$M<\x06")
+    bench.run(10)
+    assert bench.ask(100) is None
+    assert bench.ask(100) is None
+    assert bench.ask(100) is not None
+
+
+def flying() -> MspBench:
+    bench = MspBench("multiwii", faults=Faults(boxes=0))
+    bench.upload([waypoint(10), waypoint(20, Action.POSHOLD_TIME, p1=5), waypoint(30), waypoint(action=4, p1=1)])
+    bench.faults.armed, bench.faults.boxes = True, MISSION
+    bench.run(2)
+    return bench
+
+
+def status(bench: MspBench) -> tuple[int, ...]:
+    return struct.unpack("<5Bh", bench.payload(121))[:5]
+
+
+def test_a_mission_is_flown_home_and_landed() -> None:
+    bench = flying()
+    numbers = []
+    while status(bench)[1] != 10:
+        numbers.append(status(bench)[3])
+        bench.run(0.5)
+        assert bench.now < 300
+    assert sorted(set(numbers)) == [1, 2, 3, 4]
+    assert numbers == sorted(numbers)
+
+
+def test_while_a_mission_is_flown_a_waypoint_gets_no_answer_and_none_is_told() -> None:
+    bench = flying()
+    assert status(bench)[:2] == (3, 5)
+    assert bench.ask(SET_WP, waypoint(9).pack(1)) is None
+    told = bench.read(2)
+    assert (told.action, told.flag) == (0, IN_PROGRESS)
+    bench.faults.armed = False
+    bench.run(1)
+    assert bench.read(1) == waypoint(10)
+
+
+@pytest.mark.parametrize(("target", "error"), [(3, 6), (0, 6), (-1, 6), (1, 4)])
+def test_a_jump_goes_back_or_ends_the_mission(target: int, error: int) -> None:
+    bench = MspBench("multiwii", faults=Faults(boxes=0))
+    bench.upload([waypoint(5), waypoint(9), waypoint(action=Action.JUMP, p1=target, p2=1)])
+    bench.faults.armed, bench.faults.boxes = True, MISSION
+    bench.run(120)
+    assert status(bench)[4] == error
