@@ -18,7 +18,7 @@ from math import inf
 from bridge.commands import Commands
 from bridge.dialects import Surroundings, dialect_of
 from bridge.fc_actions import FcActions
-from bridge.fc_session import Autopilot, FcSession
+from bridge.fc_session import Autopilot, FcSession, State
 from bridge.flight_controller import FlightController, Kind
 from bridge.ground import Ground, Tap
 from bridge.guard import Guard, LinkAccess, Refused, denial
@@ -113,7 +113,7 @@ class Bridge:
     @property
     def is_passing_through(self) -> bool:
         """Tell whether an autopilot speaks MAVLink for itself, so that nobody here waits for the next byte."""
-        return self._pass_through is not None
+        return self._pass_through is not None and self.session.state is State.MAVLINK
 
     def fc_opened(self, now: float) -> None:
         """Take note that the port is open."""

@@ -15,6 +15,8 @@ from protocols.mavlink.target import target_of, without_target
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
+#: Who is heard behind one peer: a router may carry a fleet, but who makes numbers up shall not fill the memory.
+_MAX_SPEAKERS = 64
 #: Carries a signing key in the clear. From ground stations the guard does not let it in.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
 
@@ -25,7 +27,7 @@ class PassThrough:
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
         self._aboard: set[tuple[int, int]] = set()
-        self._heard: dict[tuple[int, int], set[Peer]] = {}
+        self._heard: dict[Peer, set[tuple[int, int]]] = {}
 
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
         """Send the autopilot's frames on."""
@@ -47,7 +49,9 @@ class PassThrough:
         if speaker in self._aboard:
             # The autopilot's own frame, come back by a router that sends everything everywhere.
             return False
-        self._heard.setdefault(speaker, set()).add(peer)
+        behind = self._heard.setdefault(peer, set())
+        if len(behind) < _MAX_SPEAKERS:
+            behind.add(speaker)
         system, component = target_of(frame)
         if system == 0:
             self._ground.forward([frame.raw], [other for other in self._ground.everyone() if other != peer])
@@ -58,17 +62,14 @@ class PassThrough:
 
     def forget(self, peer: Peer) -> None:
         """A ground station is gone."""
-        for who, peers in list(self._heard.items()):
-            peers.discard(peer)
-            if not peers:
-                del self._heard[who]
+        self._heard.pop(peer, None)
 
     def _peers_of(self, system: int, component: int) -> list[Peer]:
-        found: set[Peer] = set()
-        for (sysid, compid), peers in self._heard.items():
-            if sysid == system and component in (0, compid):
-                found |= peers
-        return [peer for peer in self._ground.peers() if peer in found]
+        def is_there(peer: Peer) -> bool:
+            behind = self._heard.get(peer, ())
+            return any(sysid == system and component in (0, compid) for sysid, compid in behind)
+
+        return [peer for peer in self._ground.peers() if is_there(peer)]
 
     def _send_alone(self, frame: MavlinkFrame) -> None:
         self._aboard.add((frame.sysid, frame.compid))

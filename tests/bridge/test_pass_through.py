@@ -193,7 +193,10 @@ def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
 def test_an_autopilot_that_is_gone_is_not_played() -> None:
     """Its silence is the truth: a heartbeat of ours would be a vehicle that is not there."""
     world, _autopilot, (station, _) = passing()
+    assert world.bridge.is_passing_through
     world.unplug()
+    # The search that follows waits for bytes.
+    assert not world.bridge.is_passing_through
     station.take()
     world.run(10)
     assert station.said() == []
@@ -232,3 +235,21 @@ def test_a_companion_of_the_autopilots_own_system_is_heard_and_echoes_are_not() 
     world.spoken_by(one, autopilot.sent[-1])
     world.run(0.1)
     assert bytes(autopilot.received) == b""
+
+
+def test_who_speaks_as_everybody_takes_no_frames_from_those_who_are() -> None:
+    """Sixty thousand made-up numbers from one address: it is sent no more than its share, and others are heard."""
+    world, autopilot, (one, _) = passing()
+    liar = GroundStation(world, "liar", sysid=99)
+    for sysid in range(2, 200):
+        for compid in (1, 2, 3):
+            frame = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+            liar._mavlink.srcSystem, liar._mavlink.srcComponent = sysid, compid
+            world.spoken_by(liar, liar.pack(frame))
+    liar.frames_heard.clear()
+    for sysid in range(2, 200):
+        autopilot.say(mavlink.MAVLink_mission_ack_message(sysid, 0, 0, 0))
+    autopilot.say(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
+    world.run(0.5)
+    assert 0 < len(liar.said("MISSION_ACK")) <= 64
+    assert len(one.said("MISSION_ACK")) == 1
