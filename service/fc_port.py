@@ -77,11 +77,13 @@ class FcPort:
             self._shut(STOPPED)
 
     def set_speed(self, baud: int | None) -> None:
-        """Run the port at another speed, baud."""
+        """Run the port at another speed, baud. What still waits is dropped: at this one it would be other bytes."""
         if baud is None or baud == self._speed or not isinstance(self._device, serial.Serial):
             return
         self._speed = baud
+        self._unsent.clear()
         try:
+            self._device.reset_output_buffer()
             self._device.baudrate = baud
         except (OSError, serial.SerialException, termios.error) as error:
             self._shut(str(error))

@@ -202,3 +202,23 @@ async def test_a_stuck_uart_goes_on_with_whole_frames_as_it_takes_them(line: Lin
     numbers = [sent.index(frame) for frame in frames]
     assert numbers == sorted(numbers)
     await line.stop()
+
+
+async def test_what_waits_when_the_speed_changes_is_not_sent_at_another(line: Line) -> None:
+    """It would be garbage to the flight controller, and garbage can be anything."""
+    port = line.start()
+    await until(lambda: line.opened, "the port")
+    port.set_speed(9600)
+    await until(lambda: port.write(bytes(4000)) or port.dropped_bytes, "a full port")  # type: ignore[func-returns-value]
+    port.set_speed(57600)
+    while line.take():
+        """That was on the wire already."""
+    port.write(b"for the new speed")
+    came = bytearray()
+
+    def has_come() -> bool:
+        came.extend(line.take())
+        return came.endswith(b"speed")
+
+    await until(has_come, "what was written afterwards")
+    assert bytes(came) == b"for the new speed"
