@@ -1,44 +1,29 @@
-"""`naze-bridge sim`: the simulated Naze alone, behind a link that looks like a serial port."""
+"""`naze-bridge sim`: a simulated flight controller alone, behind a link that looks like a serial port, or a socket."""
 
 import asyncio
-import mmap
-import signal
 from pathlib import Path
 
 import click
 
 from service.simulator.compiled_core import CORE_CAPACITY, load_core
-from service.simulator.control import Control
+from service.simulator.fc_kinds import KINDS
 from service.simulator.flash import ERASED
+from service.simulator.inav_boxes import BOXES
+from service.simulator.memory_file import open_memory
 from service.simulator.mission_commands import MissionCommands
 from service.simulator.mission_slots import flash_size
 from service.simulator.missions import BootMissions
+from service.simulator.msp_options import MspOptions
 from service.simulator.naze import SimulatedNaze
 from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from service.simulator.other_boards import run_other_board
 from service.simulator.playback_command import play_capture
-from service.simulator.pty_link import PlugError, PtyLink
+from service.simulator.run_board import Running, run_board
 
 _BAUD = click.Choice(["1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200"])
 _RATE = click.FloatRange(0, 1)
 _PERIOD = click.FloatRange(0)
 _PATH = click.Path(path_type=Path)
-
-
-def _open_flash(path: Path, size: int) -> memoryview:
-    """Map the file that holds the flash; a new one is blank."""
-    try:
-        if not path.exists():
-            path.write_bytes(bytes((ERASED,)) * size)
-        with path.open("r+b") as file:
-            found = path.stat().st_size
-            if found == size:
-                return memoryview(mmap.mmap(file.fileno(), size))
-    except OSError as error:
-        raise click.ClickException(f"Cannot use the state file {path}: {error.strerror}.") from error
-    raise click.ClickException(
-        f"The state file {path} has {found} bytes, but this board's flash has {size}: "
-        "give the same --capacity as before, or another file."
-    )
 
 
 def _load_core(path: Path, capacity: int) -> BootMissions:
@@ -50,37 +35,20 @@ def _load_core(path: Path, capacity: int) -> BootMissions:
         raise click.ClickException(f"Cannot load the core: {error}. Make it with: make -C firmware sim") from error
 
 
-async def _run(
-    naze: SimulatedNaze, path: Path, control: Path | None, hang_after: float | None, power_cut_after: float | None
-) -> None:
-    loop = asyncio.get_running_loop()
-    stop = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
-    naze.power_on_booted(loop.time())
-    link = PtyLink(naze, path, loop)
-    obedience = Control(naze, link, loop)
-    if hang_after is not None:
-        loop.call_later(hang_after, obedience.obey, "hang 1")
-    if power_cut_after is not None:
-        loop.call_later(power_cut_after, obedience.obey, "power off")
-    try:
-        link.plug()
-        if control:
-            await obedience.listen(control)
-        click.echo(f"Simulated Naze at {path}, {naze.baud} baud. Ctrl-C ends it.")
-        await stop.wait()
-    except PlugError as error:
-        raise click.ClickException(f"{error}.") from error
-    except OSError as error:
-        raise click.ClickException(f"Cannot make {control}: {error.strerror}.") from error
-    finally:
-        link.unplug()
-        obedience.close()
+def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[str, int] | None:
+    if value is None:
+        return None
+    host, _colon, port = value.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise click.BadParameter(f"{value!r} is not HOST:PORT, for instance 127.0.0.1:5760.")
+    return host, int(port)
 
 
 @click.command()
-@click.option("--link", required=True, type=_PATH, help="Symbolic link to make to the port.")
+@click.option("--kind", type=click.Choice(["naze", *KINDS]), default="naze", help="Which flight controller.")
+@click.option("--inav-version", type=click.Choice(list(BOXES)), default="9.1.0", help="With --kind inav.")
+@click.option("--link", type=_PATH, help="Symbolic link to make to the port.")
+@click.option("--tcp", metavar="HOST:PORT", callback=_address, help="Listen there instead: one client at a time.")
 @click.option("--baud", type=_BAUD, default="115200", show_default=True, help="Speed while disarmed.")
 @click.option("--armed", is_flag=True, help="Begin armed.")
 @click.option(
@@ -94,7 +62,7 @@ async def _run(
 @click.option("--lost-bytes", type=_RATE, default=0.0, help="Probability that a byte is lost.")
 @click.option("--flash-stall", type=_PERIOD, default=100.0, show_default=True, help="Time to erase a slot, ms.")
 @click.option("--program-stall", type=_PERIOD, default=0.45, show_default=True, help="Time to program a record, ms.")
-@click.option("--capacity", type=click.IntRange(2, 1000), default=146, show_default=True, help="Records that fit.")
+@click.option("--capacity", type=click.IntRange(2, 1000), help="Records that fit: 146 on a Naze, 120 on a MultiWii.")
 @click.option(
     "--wp-radius-cm", type=click.IntRange(0, 2000), default=200, show_default=True, help="gps_wp_radius, if blank."
 )
@@ -115,7 +83,10 @@ async def _run(
 )
 @click.option("--speed", type=click.FloatRange(0.01, 100), default=1.0, help="How many times as fast to play it.")
 def sim(
-    link: Path,
+    kind: str,
+    inav_version: str,
+    link: Path | None,
+    tcp: tuple[str, int] | None,
     baud: str,
     armed: bool,
     tele_prot: int,
@@ -124,7 +95,7 @@ def sim(
     lost_bytes: float,
     flash_stall: float,
     program_stall: float,
-    capacity: int,
+    capacity: int | None,
     wp_radius_cm: int,
     seed: int,
     hang_after: float | None,
@@ -135,21 +106,31 @@ def sim(
     play: Path | None,
     speed: float,
 ) -> None:
-    """Simulate a Naze with Harakiri, on a pseudo-terminal, until Ctrl-C."""
+    """Simulate a Naze with Harakiri, or another flight controller, until Ctrl-C."""
+    if (link is None) == (tcp is None):
+        raise click.UsageError("Say where: either --link PATH or --tcp HOST:PORT.")
+    faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
+    running = Running(link, tcp, control, hang_after, power_cut_after)
+    if kind != "naze":
+        line = MspOptions(version=inav_version, baud=int(baud), capacity=capacity or 120, seed=seed)
+        run_other_board(kind, line, faults, running, state)
+        return
     if play is not None:
+        if link is None:
+            raise click.UsageError("--play needs --link.")
         play_capture(play, link, speed)
         return
     options = SimOptions(
         seed=seed,
         baud=int(baud),
         tele_prot=TelemetryProtocol(tele_prot),
-        capacity=capacity,
+        capacity=capacity or 146,
         wp_radius_cm=wp_radius_cm,
         flash_erase_ms=flash_stall,
         record_program_ms=program_stall,
     )
-    faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
-    memory = _open_flash(state, flash_size(options)) if state else None
-    missions = _load_core(core, capacity) if core else MissionCommands
+    blank = bytes((ERASED,)) * flash_size(options)
+    memory = open_memory(state, blank, "give the same --capacity as before, or another file") if state else None
+    missions = _load_core(core, options.capacity) if core else MissionCommands
     naze = SimulatedNaze(options, faults, memory, missions)
-    asyncio.run(_run(naze, link, control, hang_after, power_cut_after))
+    asyncio.run(run_board(naze, "Naze", running, lambda: True))

@@ -12,21 +12,68 @@ The answer is `ok`, the JSON, or `error: ...`.
 import asyncio
 import json
 from dataclasses import asdict
+from enum import Enum
 from pathlib import Path
+from typing import Protocol
 
-from protocols.wp_record import RECORD_SIZE
-from service.simulator.naze import SimulatedNaze
-from service.simulator.options import Faults
-from service.simulator.pty_link import PlugError, PtyLink
+from service.simulator.far_end import FarEnd
+from service.simulator.flight import Craft
+from service.simulator.options import Counters, Faults
+from service.simulator.pty_link import PlugError
 
 _FAULTS = {name: type(value) for name, value in asdict(Faults()).items()}
+
+
+class ControlledBoard(FarEnd, Protocol):
+    """A simulated board with switches and counters."""
+
+    faults: Faults
+    counters: Counters
+
+    @property
+    def armed(self) -> bool:
+        """Return whether the craft is armed."""
+
+    @property
+    def power(self) -> Enum:
+        """Return what the CPU is doing."""
+
+    @property
+    def protocol(self) -> Enum | None:
+        """Return what the firmware believes to be spoken; None if it speaks one only, or does not run."""
+
+    @property
+    def stored_records(self) -> list[bytes]:
+        """Return the mission that outlives a power cut."""
+
+    def truth(self, now: float) -> Craft | None:
+        """Return what the craft is doing; None while no firmware runs."""
+
+    def power_on(self, now: float) -> None:
+        """Supply it."""
+
+    def power_off(self, now: float) -> None:
+        """Cut the supply."""
+
+
+class Plug(Protocol):
+    """Where a client finds the board."""
+
+    def plug(self) -> None:
+        """Make the place. PlugError if it is not to be had."""
+
+    def unplug(self) -> None:
+        """Take it away."""
+
+    def poke(self) -> None:
+        """Make a fault that was just switched count at once."""
 
 
 class Control:
     """Obeys control lines."""
 
-    def __init__(self, naze: SimulatedNaze, link: PtyLink, loop: asyncio.AbstractEventLoop) -> None:
-        self._naze = naze
+    def __init__(self, board: ControlledBoard, link: Plug, loop: asyncio.AbstractEventLoop) -> None:
+        self._board = board
         self._link = link
         self._loop = loop
         self._server: asyncio.Server | None = None
@@ -49,12 +96,12 @@ class Control:
             case ["stats"]:
                 return json.dumps(self._stats())
             case ["truth"]:
-                craft = self._naze.truth(now)
+                craft = self._board.truth(now)
                 return json.dumps(None if craft is None else asdict(craft))
             case ["power", "on"]:
-                self._naze.power_on(now)
+                self._board.power_on(now)
             case ["power", "off"]:
-                self._naze.power_off(now)
+                self._board.power_off(now)
             case ["plug"]:
                 try:
                     self._link.plug()
@@ -64,7 +111,7 @@ class Control:
                 self._link.unplug()
             case [name, value] if name in _FAULTS:
                 try:
-                    setattr(self._naze.faults, name, _FAULTS[name](float(value)))
+                    setattr(self._board.faults, name, _FAULTS[name](float(value)))
                 except ValueError:
                     return f"error: {name} takes a number, not {value!r}"
             case _:
@@ -73,13 +120,13 @@ class Control:
         return "ok"
 
     def _stats(self) -> dict[str, object]:
-        naze, stored = self._naze, self._naze.stored
-        return asdict(naze.counters) | {
-            "armed": naze.armed,
-            "baud": naze.baud,
-            "power": naze.power.name,
-            "protocol": naze.protocol.name if naze.protocol else None,
-            "records": [stored[at : at + RECORD_SIZE].hex() for at in range(0, len(stored), RECORD_SIZE)],
+        board = self._board
+        return asdict(board.counters) | {
+            "armed": board.armed,
+            "baud": board.baud,
+            "power": board.power.name,
+            "protocol": board.protocol.name if board.protocol else None,
+            "records": [record.hex() for record in board.stored_records],
         }
 
     async def _converse(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -69,6 +69,11 @@ class MspBoard:
         return self._firmware is not None and self._firmware.armed
 
     @property
+    def protocol(self) -> None:
+        """It speaks MSP and nothing else."""
+        return None
+
+    @property
     def is_alive(self) -> bool:
         """Whether its port would be there if the board were a program."""
         return self.power not in (MspPower.OFF, MspPower.CRASHED, MspPower.BOOTLOADER)

@@ -8,6 +8,7 @@ import random
 from enum import Enum, auto
 from math import inf
 
+from protocols.wp_record import RECORD_SIZE
 from service.simulator.firmware import Firmware, Protocol, ResetError
 from service.simulator.flash import ERASED, NorFlash, PowerCutError
 from service.simulator.flight import Craft
@@ -87,6 +88,12 @@ class SimulatedNaze:
     def stored(self) -> bytes:
         """The mission records that are valid in flash, as the next boot would find them."""
         return self._boot_missions(self._flash, Board(self.options, self.faults, self.options.wp_radius_cm)).stored
+
+    @property
+    def stored_records(self) -> list[bytes]:
+        """The same, record by record."""
+        stored = self.stored
+        return [stored[at : at + RECORD_SIZE] for at in range(0, len(stored), RECORD_SIZE)]
 
     @property
     def flash_operations(self) -> int:

@@ -90,17 +90,21 @@ class Program:
 
 
 class Board(Program):
-    """`naze-bridge sim`. `line` obeys its control socket (service/simulator/control.py)."""
+    """`naze-bridge sim`. `line` obeys its control socket (service/simulator/control.py).
 
-    def __init__(self, directory: Path, *options: str) -> None:
+    `fc` is what a daemon's --fc takes. With `tcp` that is a socket instead of a pseudo-terminal.
+    """
+
+    def __init__(self, directory: Path, *options: str, tcp: bool = False) -> None:
         self.link = directory / "naze"
+        address = f"127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+        self.fc = f"tcp:{address}" if tcp else str(self.link)
         self._control = directory / "naze.sock"
-        super().__init__(
-            directory / "board.log", "sim", "--link", str(self.link), "--control", str(self._control), *options
-        )
+        place = ("--tcp", address) if tcp else ("--link", str(self.link))
+        super().__init__(directory / "board.log", "sim", *place, "--control", str(self._control), *options)
 
     def wait(self) -> None:
-        until(lambda: "Simulated Naze at" in self.printed or not self.is_alive, "the simulated board")
+        until(lambda: "Simulated " in self.printed or not self.is_alive, "the simulated board")
         assert self.is_alive, self.printed
 
     def line(self, line: str) -> str:

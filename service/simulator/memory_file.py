@@ -1,0 +1,22 @@
+"""A file that keeps what a simulated board's flash or EEPROM holds."""
+
+import mmap
+from pathlib import Path
+
+import click
+
+
+def open_memory(path: Path, blank: bytes, hint: str) -> memoryview:
+    """Map the file; a new one is `blank`. click.ClickException, with a hint if it is another board's."""
+    try:
+        if not path.exists():
+            path.write_bytes(blank)
+        with path.open("r+b") as file:
+            found = path.stat().st_size
+            if found == len(blank):
+                return memoryview(mmap.mmap(file.fileno(), found))
+    except OSError as error:
+        raise click.ClickException(f"Cannot use the state file {path}: {error.strerror}.") from error
+    raise click.ClickException(
+        f"The state file {path} has {found} bytes, but this board's memory has {len(blank)}: {hint}."
+    )

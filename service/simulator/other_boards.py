@@ -1,0 +1,32 @@
+"""`naze-bridge sim --kind`: a flight controller with MSP that is no Naze."""
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from service.simulator.fc_kinds import make_board, new_eeprom
+from service.simulator.memory_file import open_memory
+from service.simulator.msp_options import MspOptions
+from service.simulator.options import Faults
+from service.simulator.run_board import Running, run_board
+
+_NAMES = {"inav": "INAV", "multiwii": "MultiWii", "betaflight": "Betaflight", "baseflight": "baseflight"}
+#: These are about Harakiri and its mission extension.
+_OF_THE_NAZE = ("tele_prot", "no_extension", "flash_stall", "program_stall", "wp_radius_cm", "core", "play", "speed")
+
+
+def run_other_board(kind: str, options: MspOptions, faults: Faults, running: Running, state: Path | None) -> None:
+    """Run one until Ctrl-C. `state`: the file that keeps its EEPROM."""
+    context = click.get_current_context()
+    for name in _OF_THE_NAZE:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name.replace('_', '-')} is for a Naze; leave it away with --kind {kind}")
+    if running.tcp:
+        # A socket is served at once, and its ring is that of INAV's own simulator.
+        options = replace(options, baud=None, ring_size=2048, serial_task_ms=0.01)
+    eeprom = open_memory(state, bytes(new_eeprom(kind, options)), "name another file") if state else None
+    board = make_board(kind, options, faults, eeprom)
+    name = f"INAV {options.version}" if kind == "inav" else _NAMES[kind]
+    asyncio.run(run_board(board, name, running, lambda: board.is_alive))

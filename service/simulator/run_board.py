@@ -1,0 +1,62 @@
+"""A simulated board behind its plug, from its first moment to Ctrl-C."""
+
+import asyncio
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from service.simulator.control import Control, ControlledBoard, Plug
+from service.simulator.pty_link import PlugError, PtyLink
+from service.simulator.tcp_link import TcpLink
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """Where the board is to be found, and what is to happen to it. Times in seconds.
+
+    `link`: of a pseudo-terminal; `tcp`: host and port; one of them is there. `control`: a Unix socket.
+    """
+
+    link: Path | None = None
+    tcp: tuple[str, int] | None = None
+    control: Path | None = None
+    hang_after: float | None = None
+    power_cut_after: float | None = None
+
+
+async def run_board(board: ControlledBoard, name: str, running: Running, is_alive: Callable[[], bool]) -> None:
+    """Run it. click.ClickException if its place cannot be had."""
+    loop = asyncio.get_running_loop()
+    stop = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    board.power_on_booted(loop.time())
+    plug: Plug
+    if running.tcp:
+        plug = TcpLink(board, running.tcp, loop, is_alive)
+        place = "{}:{}".format(*running.tcp)
+    else:
+        assert running.link is not None
+        plug = PtyLink(board, running.link, loop)
+        place = f"{running.link}, {board.baud} baud"
+    obedience = Control(board, plug, loop)
+    if running.hang_after is not None:
+        loop.call_later(running.hang_after, obedience.obey, "hang 1")
+    if running.power_cut_after is not None:
+        loop.call_later(running.power_cut_after, obedience.obey, "power off")
+    try:
+        plug.plug()
+        if running.control:
+            await obedience.listen(running.control)
+        click.echo(f"Simulated {name} at {place}. Ctrl-C ends it.")
+        await stop.wait()
+    except PlugError as error:
+        raise click.ClickException(f"{error}.") from error
+    except OSError as error:
+        raise click.ClickException(f"Cannot make {running.control}: {error.strerror}.") from error
+    finally:
+        plug.unplug()
+        obedience.close()

@@ -1,0 +1,199 @@
+"""`naze-bridge sim --kind`: other flight controllers on a pseudo-terminal and on a socket, as programs."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+import serial
+from msp_bench import Frame, take_apart, waypoint
+
+from protocols.msp.frame import request
+from service.simulator.nav_waypoint import FLAG_LAST, Action
+
+PATIENCE = 20.0
+REPOSITORY = Path(__file__).resolve().parents[2]
+NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')"]
+T = TypeVar("T")
+
+
+def until(condition: Callable[[], T | None]) -> T:
+    deadline = time.monotonic() + PATIENCE
+    while not (found := condition()):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    return found
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port: int = probe.getsockname()[1]
+        return port
+
+
+class Simulator:
+    """A simulator of its own; on a socket at `port` unless it has a link."""
+
+    def __init__(self, directory: Path, *options: str, link: Path | None = None) -> None:
+        self.port = free_port()
+        self._control = directory / "control"
+        place = ("--link", str(link)) if link else ("--tcp", f"127.0.0.1:{self.port}")
+        arguments = ["sim", *place, "--control", str(self._control), *options]
+        self.process = subprocess.Popen([*NAZE_BRIDGE, *arguments], cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout
+        self.greeting = self.process.stdout.readline()
+
+    def line(self, line: str) -> str:
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(self._control))
+            connection.sendall(f"{line}\n".encode())
+            with connection.makefile() as answers:
+                return answers.readline().strip()
+
+    def client(self) -> "Client":
+        return Client(self.port)
+
+    def end(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(PATIENCE)
+
+
+class Client:
+    """A TCP client that asks one question at a time."""
+
+    def __init__(self, port: int) -> None:
+        self.socket = socket.create_connection(("127.0.0.1", port), PATIENCE)
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def ask(self, command: int, payload: bytes = b"", timeout: float = PATIENCE) -> Frame | None:
+        """None after the time-out; ConnectionError if it was hung up."""
+        self.socket.sendall(request(command, payload))
+        self.socket.settimeout(timeout)
+        heard = b""
+        while not (frames := take_apart(heard)):
+            try:
+                data = self.socket.recv(4096)
+            except TimeoutError:
+                return None
+            if not data:
+                raise ConnectionError
+            heard += data
+        return frames[0]
+
+    def payload(self, command: int, payload: bytes = b"") -> bytes:
+        frame = self.ask(command, payload)
+        assert frame is not None
+        assert frame.direction == ">"
+        return frame.payload
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
+    started: list[Simulator] = []
+
+    def make(*options: str, link: Path | None = None) -> Simulator:
+        started.append(Simulator(tmp_path, *options, link=link))
+        return started[-1]
+
+    yield make
+    for simulator in started:
+        simulator.process.kill()
+        # Closes its output, too.
+        simulator.process.communicate()
+
+
+def test_an_inav_on_a_socket(start: Callable[..., Simulator]) -> None:
+    simulator = start("--kind", "inav", "--inav-version", "8.0.1")
+    assert simulator.greeting == f"Simulated INAV 8.0.1 at 127.0.0.1:{simulator.port}. Ctrl-C ends it.\n"
+    with simulator.client() as client:
+        assert client.payload(3) == bytes((8, 0, 1))
+    assert simulator.end() == 0
+
+
+def test_a_multiwii_on_a_pseudo_terminal(start: Callable[..., Simulator], tmp_path: Path) -> None:
+    simulator = start("--kind", "multiwii", "--baud", "57600", link=tmp_path / "tty")
+    assert simulator.greeting == f"Simulated MultiWii at {tmp_path / 'tty'}, 57600 baud. Ctrl-C ends it.\n"
+    with serial.Serial(str(tmp_path / "tty"), 57600, timeout=PATIENCE) as port:
+        port.write(request(100))
+        assert port.read(13)[:6] == bytes((*b"$M>", 7, 100, 241))
+
+
+def test_a_naze_on_a_socket(start: Callable[..., Simulator]) -> None:
+    with start().client() as client:
+        assert client.payload(100)[0] == 211
+
+
+def test_a_second_client_waits_for_its_turn(start: Callable[..., Simulator]) -> None:
+    simulator = start("--kind", "inav")
+    with simulator.client() as first, simulator.client() as second:
+        assert first.payload(2) == b"INAV"
+        assert second.ask(2, timeout=0.3) is None
+        first.socket.close()
+        # The answer to the first question comes now.
+        assert second.payload(3) == b"INAV"
+
+
+def test_a_crash_takes_the_port_away_until_the_power_was_switched(start: Callable[..., Simulator]) -> None:
+    simulator = start("--kind", "inav")
+    with simulator.client() as client:
+        client.payload(209, waypoint(1).pack(1))
+        client.payload(209, waypoint(action=Action.JUMP, p1=0).pack(2))
+        with pytest.raises(ConnectionError):
+            client.ask(20)
+    with pytest.raises(ConnectionRefusedError):
+        simulator.client()
+    assert json.loads(simulator.line("stats"))["power"] == "CRASHED"
+    assert [simulator.line("power off"), simulator.line("power on")] == ["ok", "ok"]
+    # Until it has booted nothing is heard.
+    with simulator.client() as client:
+        assert until(lambda: client.ask(20, timeout=0.5)) == (">", 20, bytes((0, 120, 0, 0)))
+
+
+def test_the_eeprom_is_kept_in_a_file(start: Callable[..., Simulator], tmp_path: Path) -> None:
+    state = tmp_path / "eeprom"
+    simulator = start("--kind", "inav", "--state", str(state))
+    with simulator.client() as client:
+        client.payload(209, waypoint(1, flag=FLAG_LAST).pack(1))
+        client.payload(19, b"\0")
+    assert json.loads(simulator.line("stats"))["records"] == [waypoint(1, flag=FLAG_LAST).pack(1).hex()]
+    simulator.end()
+    with start("--kind", "inav", "--state", str(state)).client() as client:
+        client.payload(18, b"\0")
+        assert client.payload(20) == bytes((0, 120, 1, 1))
+
+
+def test_the_truth_of_a_flight(start: Callable[..., Simulator]) -> None:
+    simulator = start("--kind", "inav")
+    assert simulator.line("armed 1") == "ok"
+    until(lambda: json.loads(simulator.line("truth"))["flight"]["height_m"] > 0.1)
+    assert json.loads(simulator.line("truth"))["armed"] is True
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--kind", "inav"), "either --link PATH or --tcp HOST:PORT"),
+        (("--tcp", "5760"), "'5760' is not HOST:PORT"),
+        (("--kind", "inav", "--tcp", "127.0.0.1:1", "--tele-prot", "1"), "--tele-prot is for a Naze"),
+        (("--kind", "inav", "--tcp", "192.0.2.1:5760"), "192.0.2.1:5760 cannot be listened on"),
+        (("--kind", "inav", "--tcp", "127.0.0.1:5760", "--state", "pyproject.toml"), "name another file"),
+    ],
+)
+def test_bad_options_are_one_sentence(options: tuple[str, ...], says: str) -> None:
+    ended = subprocess.run(
+        [*NAZE_BRIDGE, "sim", *options], cwd=REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert ended.returncode != 0
+    assert says in ended.stderr
+    assert "Traceback" not in ended.stderr
