@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
+from typing import Any
 
 from bridge.commands import Commands
 from bridge.dialects import Surroundings, dialect_of
@@ -38,6 +39,8 @@ from bridge.presence import Presence
 from bridge.procedure import Procedure, StoreEffect
 from bridge.runner import Runner
 from bridge.station import Peer, Severity, Station
+from bridge.vehicle_report import VehicleReporter
+from bridge.verdict import Verdict
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame
@@ -90,11 +93,13 @@ class Bridge:
             journal,
             self._controller_changed,
             self._mavlink_received,
-            lambda command, at: self._vehicle.answered(command, at),
+            self._answered,
             config.autopilot,
         )
-        self.desk = MissionDesk()
+        self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
+        self.desk = MissionDesk(lambda mission, delivery: self._mission_endings.append((mission, delivery)))
         self._vehicle = OwnVehicle(self.session, self.desk, self.ground, now)
+        self.report = VehicleReporter(self.session, self.desk, self.ground, self._vehicle.also_want)
         home = self._vehicle.home
         self._uploads = MissionUploads(self.desk, self.runner, self.ground, journal, home, self.ground.moved_to)
         self._downloads = MissionDownloads(self.desk, self.runner, self.ground, self._is_armed, home)
@@ -179,6 +184,11 @@ class Bridge:
         self._now = now
         self.runner.store_answered(answer, now)
 
+    def take_mission_endings(self) -> list[tuple[ArrivedMission, Delivery]]:
+        """Return the missions that were dealt with to their end, and how."""
+        endings, self._mission_endings = self._mission_endings, []
+        return endings
+
     # The command line's side.
 
     def push_locally(
@@ -218,6 +228,18 @@ class Bridge:
         """Read what the flight controller holds."""
         self._now = now
         self.runner.start(self.desk.read_back(), lambda held, _at: on_done(held), now)
+
+    def check_locally(
+        self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
+    ) -> None:
+        """Tell what would become of a list on the present flight controller, which is not touched."""
+        self._now = now
+
+        def procedure() -> Procedure[Verdict[Any] | Refusal]:
+            rules = yield from self.desk.rules()
+            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._vehicle.home())
+
+        self.runner.start(procedure(), lambda verdict, _at: on_done(verdict), now)
 
     # The end.
 
@@ -306,6 +328,7 @@ class Bridge:
         dialect = None if controller is None else dialect_of(controller, around)
         self.desk.controller_changed(controller, dialect)
         self._downloads.forget_all()
+        self.report.controller_changed()
         if controller is None:
             self._relay = None
             self._uploads.link_lost(now)
@@ -318,7 +341,12 @@ class Bridge:
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
             self.runner.start(self.desk.read_back(), lambda _held, _at: None, now)
 
+    def _answered(self, command: int, now: float) -> None:
+        self._vehicle.answered(command, now)
+        self.report.answered(command)
+
     def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
+        self.report.mavlink_received(frames)
         if self._pass_through is not None:
             self._pass_through.from_autopilot(frames)
         elif self._relay is not None:

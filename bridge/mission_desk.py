@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bridge.flight_controller import FlightController, Kind
+from bridge.mission_check import MissionRules
 from bridge.mission_dialect import AnyDialect, PushFailure, StoreReport, StoreState
 from bridge.mission_log import ArrivedMission, Conclusion, Outcome
 from bridge.procedure import LinkLost, Procedure, Stopped, conclude, pause, recall, save
@@ -59,9 +60,13 @@ _OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
 class MissionDesk:
-    """Holds the lock of the one transfer, the dialect of the present flight controller, and the list it holds."""
+    """Holds the lock of the one transfer, the dialect of the present flight controller, and the list it holds.
 
-    def __init__(self) -> None:
+    `on_ending` is told of each mission that was dealt with.
+    """
+
+    def __init__(self, on_ending: Callable[[ArrivedMission, Delivery], None]) -> None:
+        self._on_ending = on_ending
         self._dialect: AnyDialect | None = None
         self._refusal = _NO_LINK
         self._owner: object | None = None
@@ -120,8 +125,23 @@ class MissionDesk:
         except LinkLost:
             return _NO_LINK
 
+    def rules(self) -> Procedure[MissionRules | Refusal]:
+        """Return by which rules the present flight controller's lists are judged, armed or not."""
+        if self._dialect is None:
+            return self._refusal
+        try:
+            report = yield from self._dialect.report()
+        except LinkLost:
+            return _NO_LINK
+        return _NO_LINK if report is None else report.rules
+
     def deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Procedure[Delivery]:
         """Store the mission, bring it to the flight controller if the rules let it, store how that ended."""
+        delivery = yield from self._deliver(arrived, progress)
+        self._on_ending(arrived, delivery)
+        return delivery
+
+    def _deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Procedure[Delivery]:
         number = yield from save(arrived)
         verdict = arrived.verdict
         if verdict.result is Result.REJECTED:

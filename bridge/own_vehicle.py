@@ -4,7 +4,7 @@ It is there from the start and keeps its ids whatever the flight controller does
 the craft was armed and speaks another protocol now.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import inf
 
@@ -45,6 +45,7 @@ class OwnVehicle:
         self._tick_due = now
         self._rates = MessageRates(_DEFAULTS)
         self._announced_home: tuple[int, int] | None = None
+        self._also_wanted: Mapping[Msp, float] = {}
         self._announced: tuple[bool | None, FlightMode | None] | None = None
 
     def newcomer(self) -> None:
@@ -83,6 +84,11 @@ class OwnVehicle:
                     self._ground.multicast(pack(message), peers)
         if command == Msp.STATUS and self._announced != (vehicle.armed, vehicle.mode):
             self._heartbeat()
+
+    def also_want(self, polls: Mapping[Msp, float]) -> None:
+        """Poll for others than ground stations, too: seconds by command."""
+        self._also_wanted = polls
+        self._set_polls(self._ground.everyone())
 
     def home(self) -> tuple[int, int] | None:
         """Return where home is, degrees * 1e7."""
@@ -127,7 +133,7 @@ class OwnVehicle:
 
     def _set_polls(self, everyone: Sequence[Peer]) -> None:
         """Poll as often as somebody wants to hear of it."""
-        wanted: dict[Msp, float] = {}
+        wanted = dict(self._also_wanted)
         for row in TELEMETRY:
             wanted[row.poll] = min(wanted.get(row.poll, inf), self._rates.fastest_s(row.msgid, everyone))
         self._session.polls.want(wanted)

@@ -4,7 +4,20 @@ None means "not known". The notes beside the fields are part of the published sc
 """
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Annotated
+
+
+class Group(Enum):
+    """What is told of together."""
+
+    ATTITUDE = "attitude"
+    POSITION = "position"
+    GPS = "gps"
+    BATTERY = "battery"
+    RC = "rc"
+    STATUS = "status"
+    LINK = "link"
 
 
 @dataclass(frozen=True, slots=True)

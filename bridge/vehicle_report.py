@@ -1,0 +1,92 @@
+"""One place to ask what is known of the vehicle, whatever protocol its flight controller speaks now. Sans-IO."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from bridge.fc_session import FcSession, State
+from bridge.ground import Ground
+from bridge.mavlink_groups import MavlinkGroups
+from bridge.mission_desk import MissionDesk
+from bridge.msp_groups import POLLED_FOR, TOLD_BY, MspGroups
+from bridge.vehicle_groups import Group, Link, MissionIdentity, VehicleReport
+from protocols.mavlink.frame import MavlinkFrame
+from protocols.msp.commands import Msp
+
+_NOTHING: frozenset[Group] = frozenset()
+
+
+class VehicleReporter:
+    """Tells groups when it is asked to. `want`: sets how often the flight controller is to be asked what, seconds."""
+
+    def __init__(
+        self, session: FcSession, desk: MissionDesk, ground: Ground, want: Callable[[dict[Msp, float]], None]
+    ) -> None:
+        self._session = session
+        self._desk = desk
+        self._ground = ground
+        self._want = want
+        self._fresh: set[Group] = set()
+        self._watched: frozenset[Group] = frozenset()
+        self._mavlink = MavlinkGroups(self._fresh)
+
+    # What the bridge tells.
+
+    def answered(self, command: int) -> None:
+        """The flight controller has answered a poll."""
+        if self._watched:
+            self._fresh.update(TOLD_BY.get(command, ()))
+
+    def mavlink_received(self, frames: Sequence[MavlinkFrame]) -> None:
+        """The flight controller speaks MAVLink, and has sent this."""
+        self._mavlink.take(frames)
+
+    def controller_changed(self) -> None:
+        """It is another flight controller, or none, or it speaks otherwise."""
+        self._mavlink = MavlinkGroups(self._fresh)
+        self._mavlink.is_watched = bool(self._watched)
+
+    # What others ask.
+
+    def watch(self, groups: Iterable[Group]) -> None:
+        """Follow these groups from now on: they are polled for, and `take_fresh` tells of them."""
+        self._watched = frozenset(groups)
+        self._mavlink.is_watched = bool(self._watched)
+        polls: dict[Msp, float] = {}
+        for group in self._watched:
+            for poll, interval_s in POLLED_FOR[group].items():
+                polls[poll] = min(polls.get(poll, interval_s), interval_s)
+        self._want(polls)
+
+    def take_fresh(self) -> frozenset[Group]:
+        """Return the watched groups that there is news of since the last time."""
+        if not self._fresh:
+            return _NOTHING
+        fresh = self._watched & self._fresh
+        self._fresh.clear()
+        return fresh
+
+    def group(self, group: Group) -> Any:
+        """Return one group as it is now: an instance of its class in bridge.vehicle_groups."""
+        if group is Group.LINK:
+            return self._link()
+        source = self._mavlink if self._session.state is State.MAVLINK else MspGroups(self._session.vehicle)
+        return getattr(source, group.value)()
+
+    def whole(self) -> VehicleReport:
+        """Return everything."""
+        held = self._desk.held
+        mission = None if held is None else MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}")
+        return VehicleReport(**{group.value: self.group(group) for group in Group}, mission=mission)
+
+    def _link(self) -> Link:
+        session, controller = self._session, self._session.controller
+        msp = session.link
+        return Link(
+            state=session.state.value,
+            flight_controller=None if controller is None else controller.name,
+            speed_baud=None if controller is None else session.speed,
+            round_trip_ms=None if msp is None else round(msp.round_trip_s * 1000, 1),
+            requests_lost=None if msp is None else msp.requests_lost,
+            bad_checksums=None if msp is None else msp.bad_checksums,
+            ground_stations=tuple(str(peer) for peer in self._ground.peers()),
+        )
