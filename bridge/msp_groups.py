@@ -1,4 +1,4 @@
-"""A vehicle's groups from what MSP telemetry has told. The same values as in docs/telemetry.md, without MAVLink's units."""
+"""A vehicle's groups from what MSP telemetry has told: the values of docs/telemetry.md, not in MAVLink's units."""
 
 from bridge.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from bridge.vehicle_state import Fix, VehicleState

@@ -1,7 +1,6 @@
 """`naze-bridge check`: what would become of a mission file, offline."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from bridge.mission_check import MissionRules, check_list
 from bridge.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem
-from service.mission_data import Json
+from service.mission_data import verdict_data
 from service.mission_source import load_mission
 from service.mission_table import mission_table
 from service.printing import print_json, print_table
@@ -72,21 +71,11 @@ def _check_file(path: Path, rules: MissionRules, strict: bool, as_json: bool) ->
         return ExitCode.UNREADABLE
     verdict = check_list(sent, rules)
     if as_json:
-        print_json({"file": name, **_verdict_data(verdict)})
+        print_json({"file": name, **verdict_data(verdict)})
     else:
         _print_verdict(name, sent, verdict)
     rejected = verdict.result is Result.REJECTED or (strict and bool(verdict.findings))
     return ExitCode.REJECTED if rejected else ExitCode.ACCEPTED
-
-
-def _verdict_data(verdict: Verdict[Any]) -> Json:
-    return {
-        "result": verdict.result.name,
-        "ack": f"MAV_MISSION_{verdict.ack.name}",
-        "items": [asdict(item) for item in verdict.items],
-        "records": [record.pack().hex() for record in verdict.records],
-        "findings": [asdict(finding) for finding in verdict.findings],
-    }
 
 
 def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]) -> None:

@@ -11,17 +11,18 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import structlog
 
 from bridge.mission_desk import Delivery, HeldMission, Refusal
 from bridge.mission_log import ArrivedMission
+from bridge.verdict import Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import pack_records
 from service.control_socket import find_socket
 from service.daemon import Daemon
-from service.mission_data import Json, mission_items, to_json, whole_number
+from service.mission_data import Json, mission_items, to_json, verdict_data, whole_number
 from service.store_worker import as_dicts
 from storage.mission_store import StoreError
 
@@ -86,6 +87,16 @@ class MissionJobs:
         self._daemon.flush()
         return await future
 
+    async def check(self, items: list[MissionItem]) -> Json:
+        """Tell what would become of a list on the present flight controller."""
+        future: asyncio.Future[Verdict[Any] | Refusal] = self._loop.create_future()
+        self._daemon.bridge.check_locally(items, lambda verdict: _resolve(future, verdict), self._loop.time())
+        self._daemon.flush()
+        verdict = await future
+        if isinstance(verdict, Refusal):
+            raise ControlError(verdict.text)
+        return verdict_data(verdict)
+
     async def pull(self) -> Json:
         """Read what the flight controller holds."""
         future: asyncio.Future[HeldMission | Refusal] = self._loop.create_future()
@@ -124,6 +135,7 @@ class MissionJobs:
             "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),
             "requests_lost": None if link is None else link.requests_lost,
             "bad_checksums": None if link is None else link.bad_checksums,
+            **self._daemon.followers_status(),
         }
 
     async def list_missions(self, limit: int) -> Json:

@@ -1,19 +1,24 @@
 """The running bridge: its links, its store and its clock, on one event loop."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from typing import Protocol
 
 import structlog
 
 from bridge.autosense import SPEEDS
 from bridge.bridge import Bridge, BridgeConfig
 from bridge.journal import Level
+from bridge.mission_desk import Delivery
+from bridge.mission_log import ArrivedMission
 from bridge.procedure import StoreEffect
 from bridge.station import Peer
+from bridge.vehicle_groups import Group
 from service.connection import FcAddress, SerialFc
 from service.fc_port import STOPPED
 from service.gcs_links import GcsLink, open_link
+from service.mission_data import Json
 from service.recording import Recording
 from service.settings import Settings
 from service.signing_state import SigningState
@@ -32,6 +37,22 @@ _WHO_MAY_WRITE = "whoever reaches it may write missions and parameters; docs/sig
 _log = structlog.get_logger()
 
 
+class Follower(Protocol):
+    """Somebody in this process who wants to know what happens. Nothing here may wait."""
+
+    def telemetry(self, groups: frozenset[Group]) -> None:
+        """There is news of these groups, which were asked for with `bridge.report.watch`."""
+
+    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
+        """Something was noted in the journal."""
+
+    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+        """A mission that came in was dealt with."""
+
+    def status(self) -> Json:
+        """What `naze-bridge status` is to tell of it."""
+
+
 class Daemon:
     """Feeds the bridge and carries out what it wants. Must be made on a running event loop."""
 
@@ -48,7 +69,7 @@ class Daemon:
                 autopilot=settings.autopilot,
                 links=self._signing.links,
             ),
-            _journal,
+            self._journal,
             self._loop.time(),
             self._recording.tap,
         )
@@ -57,6 +78,7 @@ class Daemon:
         self.started = asyncio.Event()
         self._port = self._recording.port(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
         self._links: dict[str, GcsLink] = {}
+        self._followers: list[Follower] = []
         self._timer: asyncio.TimerHandle | None = None
         self._search_report: asyncio.TimerHandle | None = None
 
@@ -83,9 +105,9 @@ class Daemon:
                 fc=str(self.settings.fc),
                 gcs=[str(address) for address in self.settings.gcs],
             )
-            for name in self._links:
-                if name not in self.settings.access:
-                    _log.warning("gcs.open", link=name, what=_WHO_MAY_WRITE)
+            for address in self.settings.gcs:
+                if str(address) not in self.settings.access:
+                    _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
             self._signing.start()
             self.started.set()
             port = self._loop.create_task(self._port.run())
@@ -107,6 +129,18 @@ class Daemon:
             self._signing.close()
             self._recording.close()
 
+    def add_follower(self, follower: Follower) -> None:
+        """Tell somebody of everything from now on."""
+        self._followers.append(follower)
+
+    def followers_status(self) -> Json:
+        """Return what the followers tell of themselves."""
+        return {key: value for follower in self._followers for key, value in follower.status().items()}
+
+    def add_link(self, link: GcsLink) -> None:
+        """Serve ground stations over one more link; it is closed with the others."""
+        self._links[link.name] = link
+
     def flush(self) -> None:
         """Carry out what the bridge wants after it was told something."""
         bridge = self.bridge
@@ -117,6 +151,7 @@ class Daemon:
         self._send_datagrams()
         for effect in bridge.take_store_effects():
             self._carry_out(effect)
+        self._tell_followers()
         deadline = bridge.next_deadline()
         if self._timer is not None:
             if self._timer.when() <= deadline:
@@ -180,12 +215,28 @@ class Daemon:
         if bridge.is_passing_through:
             # Then it makes datagrams and nothing else: no more is looked at, thousands of times a second.
             self._send_datagrams()
+            if self._followers:
+                self._tell_followers()
         else:
             self.flush()
 
     def _fc_closed(self, why: str) -> None:
         self.bridge.fc_closed(self._loop.time(), None if why == STOPPED else why)
         self.flush()
+
+    def _tell_followers(self) -> None:
+        fresh = self.bridge.report.take_fresh()
+        endings = self.bridge.take_mission_endings()
+        for follower in self._followers:
+            if fresh:
+                follower.telemetry(fresh)
+            for mission, delivery in endings:
+                follower.mission_ended(mission, delivery)
+
+    def _journal(self, level: Level, event: str, /, **facts: object) -> None:
+        getattr(_log, level)(event, **facts)
+        for follower in self._followers:
+            follower.event(level, event, facts)
 
     def _report_search(self) -> None:
         if self._search_report is not None:
@@ -211,7 +262,3 @@ def _speeds(address: FcAddress) -> Sequence[int | None]:
     if not isinstance(address, SerialFc):
         return (None,)
     return SPEEDS if address.baud is None else (address.baud,)
-
-
-def _journal(level: Level, event: str, /, **facts: object) -> None:
-    getattr(_log, level)(event, **facts)

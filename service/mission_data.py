@@ -2,8 +2,10 @@
 
 import json
 import math
+from dataclasses import asdict
 from typing import Any
 
+from bridge.verdict import Verdict
 from protocols.mission_item import MissionItem
 
 Json = dict[str, Any]
@@ -22,6 +24,17 @@ def mission_items(data: object) -> list[MissionItem]:
     if not isinstance(data, list):
         raise ValueError("items must be a list")
     return [_item(entry) for entry in data]
+
+
+def verdict_data(verdict: Verdict[Any]) -> Json:
+    """Return what the rules say of a list."""
+    return {
+        "result": verdict.result.name,
+        "ack": f"MAV_MISSION_{verdict.ack.name}",
+        "items": [asdict(item) for item in verdict.items],
+        "records": [record.pack().hex() for record in verdict.records],
+        "findings": [asdict(finding) for finding in verdict.findings],
+    }
 
 
 def whole_number(data: Json, key: str, least: int, most: int) -> int:

@@ -9,7 +9,7 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.bounded_file import read_bounded
 
-_MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
+MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
 
 
 def load_mission(path: Path) -> list[MissionItem]:
@@ -20,7 +20,7 @@ def load_mission(path: Path) -> list[MissionItem]:
 def mission_bytes(path: Path) -> bytes:
     """Return what is in the mission file at `path`, not yet understood; MissionFileError where the disk says no."""
     try:
-        return read_bounded(path, _MAX_BYTES)
+        return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:
         name = click.format_filename(path)
         raise MissionFileError(name, "", _reason(error), "check the path and its permissions") from None

@@ -4,6 +4,7 @@ import asyncio
 import logging
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -17,8 +18,12 @@ from service.log_setup import set_up_logging
 from service.notify import Notifier
 from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
 from service.uart_recorder import UartFileError
+from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 from storage.state_lock import StateLock
 from storage.store_error import StoreError
+
+if TYPE_CHECKING:
+    from service.zenoh_link.node import Node
 
 
 @click.command()
@@ -44,7 +49,7 @@ def run(
         raise click.UsageError(str(error)) from error
     try:
         _serve(settings)
-    except (ControlError, LinkError, StoreError, UartFileError) as error:
+    except (ControlError, LinkError, StoreError, UartFileError, ZenohSettingsError) as error:
         click.echo(f"naze-bridge: {error}", err=True)
         sys.exit(1)
 
@@ -58,8 +63,19 @@ def _serve(settings: Settings) -> None:
 async def _main(settings: Settings, socket_path: Path) -> None:
     daemon = Daemon(settings)
     control = ControlServer(daemon, socket_path)
+    zenoh_node = None if settings.zenoh is None else _zenoh_node(settings.zenoh, daemon)
     await control.start()
+    if zenoh_node is not None:
+        zenoh_node.start()
     try:
         await run_until_signal(daemon, Notifier())
     finally:
         await control.close()
+        if zenoh_node is not None:
+            await zenoh_node.close()
+
+
+def _zenoh_node(settings: ZenohSettings, daemon: Daemon) -> "Node":
+    from service.zenoh_link.node import Node  # 10 MB that only its users pay for
+
+    return Node(settings, daemon)

@@ -6,6 +6,8 @@ A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*
 from dataclasses import dataclass
 from enum import Enum
 
+from bridge.vehicle_groups import Group
+
 #: The version of keys and payloads. One that a reader of this version would misread gets another.
 VERSION = 1
 #: A verbatim chunk: no wildcard of a subscriber or a query matches it, so nobody sends a command by accident.
@@ -33,8 +35,7 @@ class Key:
     is_queryable: bool = False
 
 
-GROUPS = ("attitude", "position", "gps", "battery", "rc", "status", "link")
-TELEMETRY = {group: Key(f"telemetry/{group}", group, Delivery.DROP) for group in GROUPS}
+TELEMETRY = {group: Key(f"telemetry/{group.value}", group.value, Delivery.DROP) for group in Group}
 STATE = Key("state", "state", Delivery.DROP, is_queryable=True)
 EVENT = Key("event", "event", Delivery.RELIABLE)
 MISSION_CURRENT = Key("mission/current", "mission_current", Delivery.RELIABLE, is_queryable=True)
@@ -66,6 +67,6 @@ KEYS = (
 ALIVE = "alive"
 
 
-def full(prefix: str, vehicle: str, suffix: str) -> str:
-    """Return a key's whole name."""
-    return f"{prefix}/{vehicle}/{suffix}"
+def vehicle_key(prefix: str, vehicle: str) -> str:
+    """Return what all keys of a vehicle begin with."""
+    return f"{prefix}/{vehicle}"

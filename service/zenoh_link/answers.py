@@ -1,0 +1,47 @@
+"""Queries for what is the case now: state, mission/current and mission/list."""
+
+from service.control import MOST, MissionJobs
+from service.mission_data import Json
+from service.zenoh_link import keys
+from service.zenoh_link.payload import Payloads, strict
+from service.zenoh_link.queries import Answerer, QueryRefused, Question
+from service.zenoh_link.vehicle_data import VehicleData
+
+_USUAL_LIMIT = 20
+_TIMES = ("received_at", "concluded_at")
+
+
+class Answers:
+    """Answers in the encoding of the samples."""
+
+    def __init__(self, data: VehicleData, jobs: MissionJobs, payloads: Payloads) -> None:
+        self._data = data
+        self._jobs = jobs
+        self._payloads = payloads
+        self.answerers: dict[keys.Key, Answerer] = {
+            keys.STATE: self._state,
+            keys.MISSION_CURRENT: self._mission_current,
+            keys.MISSION_LIST: self._mission_list,
+        }
+
+    async def _state(self, question: Question) -> None:
+        self._tell(question, keys.STATE, self._data.state())
+
+    async def _mission_current(self, question: Question) -> None:
+        self._tell(question, keys.MISSION_CURRENT, self._data.mission_current())
+
+    async def _mission_list(self, question: Question) -> None:
+        limit = question.parameter("limit") or str(_USUAL_LIMIT)
+        if not (limit.isascii() and limit.isdigit() and 0 < int(limit) <= MOST):
+            raise QueryRefused("limit must be a whole number, as in mission/list?limit=5")
+        found = (await self._jobs.list_missions(int(limit)))["missions"]
+        self._tell(question, keys.MISSION_LIST, {"missions": [_with_units(mission) for mission in found]})
+
+    def _tell(self, question: Question, key: keys.Key, body: Json) -> None:
+        question.tell(self._payloads.answer(key, body), self._payloads.encoding)
+
+
+def _with_units(mission: Json) -> Json:
+    named = {f"{name}_s" if name in _TIMES else name: value for name, value in mission.items()}
+    clean: Json = strict(named)
+    return clean

@@ -1,0 +1,81 @@
+"""The commands below @cmd: what the command line can do, asked for by a query."""
+
+import asyncio
+from collections.abc import Callable
+
+import zenoh
+
+from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.mission_item import MissionItem
+from service.control import MOST, MissionJobs
+from service.mission_data import Json, to_json
+from service.mission_source import MAX_BYTES
+from service.zenoh_link import keys
+from service.zenoh_link.queries import Answerer, QueryRefused, Question
+
+_ACCEPTED = "MAV_MISSION_ACCEPTED"
+_PAYLOAD = "the query's payload"
+
+
+class Commands:
+    """Carries them out as MissionJobs does for everybody."""
+
+    def __init__(self, jobs: MissionJobs) -> None:
+        self._jobs = jobs
+        self.answerers: dict[keys.Key, Answerer] = {
+            keys.UPLOAD: self._upload,
+            keys.CHECK: self._check,
+            keys.CLEAR: self._clear,
+            keys.RESTORE: self._restore,
+            keys.STATUS: self._status,
+        }
+
+    async def _upload(self, question: Question) -> None:
+        items = await _items(question)
+        _end(question, await self._jobs.push(items, "zenoh upload", _teller(question, len(items))))
+
+    async def _check(self, question: Question) -> None:
+        _tell(question, {"result": await self._jobs.check(await _items(question))})
+
+    async def _clear(self, question: Question) -> None:
+        _end(question, await self._jobs.push([], "zenoh clear", lambda _: None))
+
+    async def _restore(self, question: Question) -> None:
+        number = question.parameter("number")
+        if number is None or not number.isascii() or not number.isdigit() or not 0 < int(number) <= MOST:
+            raise QueryRefused("say which mission: restore?number=3; mission/list tells the numbers")
+        data = await self._jobs.show_mission(int(number))
+        count = len(data["received"]["items"])
+        _end(question, await self._jobs.restore(int(number), _teller(question, count)))
+
+    async def _status(self, question: Question) -> None:
+        _tell(question, {"result": self._jobs.status()})
+
+
+async def _items(question: Question) -> list[MissionItem]:
+    """Return the mission in the payload: the formats, the reader and its words are those of `naze-bridge check`."""
+    if question.size > MAX_BYTES:
+        raise QueryRefused(f"{_PAYLOAD} is larger than {MAX_BYTES >> 20} MB: send a mission file")
+    try:
+        # A file of 65,535 items takes a second.
+        items = await asyncio.to_thread(read_mission_file, question.payload(), _PAYLOAD)
+    except MissionFileError as error:
+        raise QueryRefused(str(error)) from None
+    if not items:
+        raise QueryRefused(f"{_PAYLOAD} holds no mission; mission/clear clears the one on the craft")
+    return items
+
+
+def _teller(question: Question, count: int) -> Callable[[Json], None]:
+    """Return what tells the progress towards `count` records."""
+    return lambda progress: _tell(question, progress | {"of": count})
+
+
+def _end(question: Question, answer: Json) -> None:
+    if answer["ack"] != _ACCEPTED:
+        raise QueryRefused(answer["text"], answer)
+    _tell(question, {"result": answer})
+
+
+def _tell(question: Question, body: Json) -> None:
+    question.tell(to_json(body).encode(), zenoh.Encoding.APPLICATION_JSON)

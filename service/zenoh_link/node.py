@@ -1,0 +1,166 @@
+"""The bridge as one vehicle in zenoh: puts the parts together and hands each what is its business.
+
+A sample's way from the UART:
+    Daemon.flush -> Node.telemetry -> Publisher.put -> zenoh
+What may wait goes over the session's thread:
+    Daemon._journal -> Node.event -> SessionThread -> zenoh
+    zenoh -> Queries -> Answers or Commands -> MissionJobs -> Question -> SessionThread -> zenoh
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+
+import structlog
+import zenoh
+
+from bridge.journal import Level
+from bridge.mission_desk import Delivery, HeldMission
+from bridge.mission_log import ArrivedMission
+from bridge.vehicle_groups import Group
+from service.control import MissionJobs
+from service.daemon import Daemon
+from service.mission_data import Json
+from service.zenoh_link import keys, vehicle_data
+from service.zenoh_link.answers import Answers
+from service.zenoh_link.commands import Commands
+from service.zenoh_link.configuration import make_config
+from service.zenoh_link.keys import Delivery as Way
+from service.zenoh_link.keys import Key
+from service.zenoh_link.mavlink_link import MavlinkLink
+from service.zenoh_link.payload import Payloads
+from service.zenoh_link.presence import Presence
+from service.zenoh_link.publisher import Publisher
+from service.zenoh_link.queries import Queries
+from service.zenoh_link.session import SessionThread
+from service.zenoh_link.settings import ZenohSettings
+from service.zenoh_link.vehicle_data import VehicleData
+
+_STATE_INTERVAL_S = 1.0
+#: An autopilot may send faster than this; nobody reads it so.
+_LEAST_INTERVAL_S = 0.004
+_GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
+
+_log = structlog.get_logger()
+
+
+class Node:
+    """Implements service.daemon.Follower. Must be made on the daemon's event loop; ZenohSettingsError."""
+
+    def __init__(self, settings: ZenohSettings, daemon: Daemon) -> None:
+        self._settings = settings
+        self._daemon = daemon
+        self._loop = asyncio.get_running_loop()
+        self._prefix = keys.vehicle_key(settings.prefix, settings.vehicle)
+        self._thread = SessionThread(make_config(settings), self._declare)
+        self._payloads = Payloads(settings.encoding)
+        self._publisher = Publisher(self._payloads, self._readers_changed)
+        self._mavlink = MavlinkLink(self._publisher, daemon)
+        self._presence = Presence(settings.vehicle, self._note)
+        self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others)
+        self._queries = Queries(self._thread)
+        jobs = MissionJobs(daemon)
+        self._answerers = Answers(self._data, jobs, self._payloads).answerers
+        if settings.commands:
+            self._answerers |= Commands(jobs).answerers
+        self._sent_at: dict[Group, float] = {}
+        self._held: HeldMission | None = None
+        self._soon: asyncio.Handle | None = None
+        self._tick: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        """Join, as soon as there is somebody to join."""
+        self._daemon.add_link(self._mavlink)
+        self._daemon.add_follower(self)
+        self._thread.start()
+        self._every_second()
+
+    async def close(self) -> None:
+        """Leave, within a second."""
+        if self._tick is not None:
+            self._tick.cancel()
+        await self._queries.close()
+        self._thread.close()
+
+    # What the daemon tells.
+
+    def telemetry(self, groups: frozenset[Group]) -> None:
+        """Publish groups."""
+        now = self._loop.time()
+        for group in groups:
+            if now >= self._sent_at.get(group, 0.0) + _LEAST_INTERVAL_S:
+                self._sent_at[group] = now
+                self._publish(group)
+
+    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
+        """Publish an event, and soon after it the state: something has changed."""
+        self._send_surely(keys.EVENT, lambda: vehicle_data.event(level, event, facts))
+        if level != "debug":
+            self._news()
+
+    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+        """Publish the report."""
+        self._send_surely(keys.MISSION_REPORT, lambda: vehicle_data.mission_report(mission, delivery))
+        self._news()
+
+    def status(self) -> Json:
+        """Tell how things stand."""
+        return self._presence.status()
+
+    # On the session's thread.
+
+    def _declare(self, session: zenoh.Session) -> None:
+        for key in keys.KEYS:
+            if key.delivery is not Way.REPLY and key is not keys.MAVLINK_IN:
+                self._publisher.declare(session, key, self._name(key))
+        for key, answerer in self._answerers.items():
+            self._queries.declare(session, self._name(key), answerer)
+        if self._settings.mavlink_in:
+            self._mavlink.declare_input(session, self._name(keys.MAVLINK_IN))
+        self._presence.declare(session, self._prefix)
+
+    # On the event loop.
+
+    def _name(self, key: Key) -> str:
+        return f"{self._prefix}/{key.suffix}"
+
+    def _note(self, level: Level, event: str, /, **facts: object) -> None:
+        getattr(_log, level)(event, **facts)
+        self.event(level, event, facts)
+
+    def _readers_changed(self, key: Key, is_read: bool) -> None:
+        _log.debug("zenoh.readers", key=key.suffix, is_read=is_read)
+        if key is keys.MAVLINK_OUT:
+            self._mavlink.read(is_read=is_read)
+        elif key.suffix in _GROUPS:
+            read = [group for group, its_key in keys.TELEMETRY.items() if self._publisher.has_readers(its_key)]
+            self._daemon.bridge.report.watch(read)
+            self._daemon.flush()
+
+    def _publish(self, group: Group) -> None:
+        key = keys.TELEMETRY[group]
+        if self._publisher.has_readers(key):
+            self._publisher.put(key, self._data.group(group))
+
+    def _send_surely(self, key: Key, body: Callable[[], Json]) -> None:
+        if self._publisher.has_readers(key):
+            data = self._payloads.sample(key, body())
+            self._thread.submit(lambda: self._publisher.put_raw(key, data))
+
+    def _news(self) -> None:
+        """Publish what changes as a whole, once for all that changes now."""
+        if self._soon is None:
+            self._soon = self._loop.call_soon(self._publish_whole)
+
+    def _every_second(self) -> None:
+        self._publish_whole()
+        self._tick = self._loop.call_later(_STATE_INTERVAL_S, self._every_second)
+
+    def _publish_whole(self) -> None:
+        self._soon = None
+        self._publish(Group.LINK)
+        if self._publisher.has_readers(keys.STATE):
+            self._publisher.put(keys.STATE, self._data.state())
+        held = self._daemon.bridge.desk.held
+        if held is not self._held:
+            self._held = held
+            self._send_surely(keys.MISSION_CURRENT, self._data.mission_current)

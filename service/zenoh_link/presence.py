@@ -1,0 +1,69 @@
+"""Who is there: our liveliness token, other bridges that use its name by mistake, and what we are joined to."""
+
+import asyncio
+
+import zenoh
+
+from bridge.journal import Journal
+from service.mission_data import Json
+from service.zenoh_link.keys import ALIVE
+from service.zenoh_link.threads import post
+
+
+class Presence:
+    """Shows that the bridge is there. `others`: sessions of other bridges with the same vehicle name."""
+
+    def __init__(self, vehicle: str, note: Journal) -> None:
+        self._vehicle = vehicle
+        self._note = note
+        self._loop = asyncio.get_running_loop()
+        self._own = ""
+        self._token: zenoh.LivelinessToken | None = None
+        self.others: set[str] = set()
+        self._neighbours: dict[str, str] = {}
+
+    def declare(self, session: zenoh.Session, prefix: str) -> None:
+        """Declare the token and look for others; called on the session's thread. `prefix`: the vehicle's key."""
+        self._own = str(session.zid())
+
+        def joined(event: zenoh.TransportEvent) -> None:
+            who, kind = str(event.transport.zid), str(event.transport.whatami)
+            post(self._loop, self._joined, who, kind, event.kind is zenoh.SampleKind.PUT)
+
+        session.info.declare_transport_events_listener(zenoh.handlers.Callback(joined, indirect=False), history=True)
+        liveliness = session.liveliness()
+        # It lives as long as it is held here.
+        self._token = liveliness.declare_token(f"{prefix}/{ALIVE}/{self._own}")
+
+        def seen(sample: zenoh.Sample) -> None:
+            is_there = sample.kind is zenoh.SampleKind.PUT
+            post(self._loop, self._seen, str(sample.key_expr).rpartition("/")[2], is_there)
+
+        liveliness.declare_subscriber(
+            f"{prefix}/{ALIVE}/*", zenoh.handlers.Callback(seen, indirect=False), history=True
+        )
+
+    def _seen(self, who: str, is_there: bool) -> None:
+        if who == self._own or is_there == (who in self.others):
+            return
+        if is_there:
+            self.others.add(who)
+            what = "give one of the two another zenoh.vehicle"
+            self._note("warning", "zenoh.name_taken", vehicle=self._vehicle, by=who, what=what)
+        else:
+            self.others.discard(who)
+            self._note("info", "zenoh.name_free", vehicle=self._vehicle, was=who)
+
+    def status(self) -> Json:
+        """Tell how things stand, for `naze-bridge status`."""
+        return {
+            "zenoh": "not open" if not self._own else f"joined to {len(self._neighbours)}",
+            "zenoh_others_of_this_name": len(self.others),
+        }
+
+    def _joined(self, who: str, kind: str, is_there: bool) -> None:
+        if is_there:
+            self._neighbours[who] = kind
+        else:
+            self._neighbours.pop(who, None)
+        self._note("info", "zenoh.joined" if is_there else "zenoh.left", neighbour=who, kind=kind)

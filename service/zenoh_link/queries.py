@@ -1,0 +1,119 @@
+"""Queries: they come in on zenoh's threads, are dealt with on the event loop, and answered on the session's thread."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import structlog
+import zenoh
+
+from service.control import ControlError
+from service.mission_data import Json, to_json
+from service.zenoh_link.session import SessionThread
+from service.zenoh_link.threads import post
+from storage.store_error import StoreError
+
+#: More at once are refused: each may hold a file of 8 MB.
+_MAX_AT_ONCE = 16
+_STOPPED = (
+    "the daemon was stopped meanwhile; mission/current tells what the flight controller holds, once it runs again"
+)
+
+_log = structlog.get_logger()
+
+
+class QueryRefused(Exception):
+    """Why a query is not answered; one sentence. `result`: what there is to say beyond it."""
+
+    def __init__(self, text: str, result: Json | None = None) -> None:
+        super().__init__(text)
+        self.result = result
+
+
+class Question:
+    """One query that waits for its answer."""
+
+    def __init__(self, query: zenoh.Query, name: str, thread: SessionThread) -> None:
+        self._query = query
+        self._thread = thread
+        #: The key in full.
+        self.name = name
+
+    @property
+    def size(self) -> int:
+        """Bytes of what was sent along."""
+        payload = self._query.payload
+        return 0 if payload is None else len(payload)
+
+    def payload(self) -> bytes:
+        """Return what was sent along."""
+        payload = self._query.payload
+        return b"" if payload is None else payload.to_bytes()
+
+    def parameter(self, name: str) -> str | None:
+        """Return what the selector says after `?`."""
+        return self._query.parameters.get(name)
+
+    def tell(self, data: bytes, encoding: zenoh.Encoding) -> None:
+        """Send one reply; more may follow."""
+        self._thread.submit(lambda: self._query.reply(self.name, data, encoding=encoding))
+
+    def refuse(self, error: QueryRefused) -> None:
+        """Send the error."""
+        body = {"error": str(error)} | ({} if error.result is None else {"result": error.result})
+        data = to_json(body).encode()
+        self._thread.submit(lambda: self._query.reply_err(data, encoding=zenoh.Encoding.APPLICATION_JSON))
+
+    def end(self) -> None:
+        """Say that nothing more follows."""
+        self._thread.submit(self._query.drop)
+
+
+#: Deals with a question; QueryRefused, ControlError, StoreError and ValueError become the error that is sent.
+Answerer = Callable[[Question], Awaitable[None]]
+
+
+class Queries:
+    """Starts a task for each query, so many at once."""
+
+    def __init__(self, thread: SessionThread) -> None:
+        self._thread = thread
+        self._loop = asyncio.get_running_loop()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def declare(self, session: zenoh.Session, name: str, answerer: Answerer) -> None:
+        """Declare the queryable of one key; called on the session's thread."""
+
+        def asked(query: zenoh.Query) -> None:
+            post(self._loop, self._begin, Question(query, name, self._thread), answerer)
+
+        session.declare_queryable(name, zenoh.handlers.Callback(asked, indirect=False))
+
+    async def close(self) -> None:
+        """Tell those who wait that no answer will come."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _begin(self, question: Question, answerer: Answerer) -> None:
+        if len(self._tasks) >= _MAX_AT_ONCE:
+            question.refuse(QueryRefused(f"{_MAX_AT_ONCE} other queries are not answered yet: try again"))
+            question.end()
+            return
+        task = self._loop.create_task(self._answer(question, answerer))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _answer(self, question: Question, answerer: Answerer) -> None:
+        try:
+            await answerer(question)
+        except QueryRefused as error:
+            self._refuse(question, error)
+        except (ControlError, StoreError, ValueError) as error:
+            self._refuse(question, QueryRefused(str(error)))
+        except asyncio.CancelledError:
+            self._refuse(question, QueryRefused(_STOPPED))
+        question.end()
+
+    def _refuse(self, question: Question, error: QueryRefused) -> None:
+        _log.info("zenoh.refused", key=question.name, why=str(error))
+        question.refuse(error)

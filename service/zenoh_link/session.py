@@ -1,0 +1,108 @@
+"""The zenoh session, and the thread on which everything happens that may wait: opening, closing, reliable samples.
+
+zenoh itself connects and connects again, in threads of its own. The event loop never waits for any of it.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+
+import structlog
+import zenoh
+
+from service.zenoh_link.configuration import in_short
+
+Job = Callable[[], None]
+
+#: Samples and replies that wait for a slow receiver; then the oldest give way.
+_MAX_WAITING = 256
+_RETRY_S = 2.0
+#: A receiver that is stalled must not hold the daemon's end up; the process may end without a farewell.
+_FAREWELL_S = 0.8
+
+_log = structlog.get_logger()
+
+
+class SessionThread:
+    """Opens the session again and again until it is open, has `declare` set it up, then does jobs in their order."""
+
+    def __init__(self, config: zenoh.Config, declare: Callable[[zenoh.Session], None]) -> None:
+        self._config = config
+        self._declare = declare
+        self._session: zenoh.Session | None = None
+        self._jobs: deque[Job] = deque()
+        self._wake = threading.Condition()
+        self._is_closing = False
+        self._complaint = ""
+        #: How many samples and replies gave way.
+        self.dropped = 0
+        self._thread = threading.Thread(target=self._run, name="zenoh session", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def submit(self, job: Job) -> None:
+        """Have something done on the thread; if too much waits already, the oldest is left undone."""
+        with self._wake:
+            if len(self._jobs) >= _MAX_WAITING:
+                self._jobs.popleft()
+                self.dropped += 1
+            self._jobs.append(job)
+            self._wake.notify()
+
+    def close(self) -> None:
+        """Close the session, and wait for that only a moment."""
+        with self._wake:
+            self._is_closing = True
+            self._wake.notify()
+        farewell = threading.Thread(target=self._close, name="zenoh farewell", daemon=True)
+        farewell.start()
+        farewell.join(_FAREWELL_S)
+        if farewell.is_alive():
+            _log.warning("zenoh.closed_without_farewell", what="a receiver is stalled")
+
+    def _close(self) -> None:
+        # What was to be said last is said first: the thread ends when nothing waits any more.
+        self._thread.join(_FAREWELL_S / 2)
+        if self._session is not None:
+            try:
+                self._session.close()  # type: ignore[no-untyped-call]
+            except zenoh.ZError as error:
+                _log.debug("zenoh.close_failed", why=in_short(error))
+
+    def _run(self) -> None:
+        self._session = self._open()
+        while self._session is not None:
+            with self._wake:
+                while not self._jobs:
+                    if self._is_closing:
+                        return
+                    self._wake.wait()
+                job = self._jobs.popleft()
+            try:
+                job()
+            except zenoh.ZError as error:
+                self._complain("zenoh.not_sent", error)
+
+    def _open(self) -> zenoh.Session | None:
+        while not self._is_closing:
+            try:
+                session = zenoh.open(self._config)
+                self._declare(session)
+            except zenoh.ZError as error:
+                self._complain("zenoh.not_open", error)
+            else:
+                self._complaint = ""
+                _log.info("zenoh.open", id=str(session.zid()))
+                return session
+            with self._wake:
+                self._wake.wait_for(lambda: self._is_closing, _RETRY_S)
+        return None
+
+    def _complain(self, event: str, error: zenoh.ZError) -> None:
+        """Tell of a fault once, not of each time that it comes again."""
+        why = in_short(error)
+        level = _log.debug if why == self._complaint else _log.warning
+        level(event, why=why)
+        self._complaint = why

@@ -1,0 +1,14 @@
+"""From zenoh's threads to the event loop."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TypeVarTuple
+
+Arguments = TypeVarTuple("Arguments")
+
+
+def post(loop: asyncio.AbstractEventLoop, callback: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
+    """Call back on the loop; nothing comes of it if the loop has ended, as zenoh may notice a moment later."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(callback, *arguments)

@@ -1,0 +1,72 @@
+"""What is said at each key, as plain data: the bodies of docs/zenoh.md's payloads."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+from bridge.bridge import Bridge
+from bridge.journal import Level
+from bridge.mission_desk import Delivery
+from bridge.mission_log import ArrivedMission
+from bridge.vehicle_groups import Group
+from service.mission_data import Json
+from service.zenoh_link.payload import plain, strict
+
+
+class VehicleData:
+    """Asks the bridge. `others`: the bridges of the same name."""
+
+    def __init__(self, vehicle: str, bridge: Bridge, others: set[str]) -> None:
+        self._vehicle = vehicle
+        self._bridge = bridge
+        self._others = others
+
+    def group(self, group: Group) -> Json:
+        """Return one group of telemetry."""
+        return plain(self._bridge.report.group(group))
+
+    def state(self) -> Json:
+        """Return everything that is known."""
+        return {
+            "vehicle": self._vehicle,
+            "others_of_this_name": len(self._others),
+            **plain(self._bridge.report.whole()),
+        }
+
+    def mission_current(self) -> Json:
+        """Return what the flight controller holds."""
+        held = self._bridge.desk.held
+        if held is None:
+            return {"count": None, "checksum": None, "items": None}
+        return {
+            "count": held.identity.count,
+            "checksum": f"{held.identity.checksum:08x}",
+            "items": [strict(asdict(item)) for item in held.items],
+        }
+
+
+def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
+    """Return an event of the journal."""
+    return {"level": level, "event": name, "facts": {key: _fact(value) for key, value in facts.items()}}
+
+
+def mission_report(mission: ArrivedMission, delivery: Delivery) -> Json:
+    """Return how a mission that came in ended."""
+    verdict = mission.verdict
+    body: Json = strict(
+        {
+            "mission": delivery.number,
+            "source": mission.source,
+            "ack": f"MAV_MISSION_{delivery.ack.name}",
+            "text": delivery.text,
+            "verdict": verdict.result.name,
+            "findings": [asdict(finding) for finding in verdict.findings],
+            "sent": [asdict(item) for item in mission.items],
+            "stored": [asdict(item) for item in verdict.items],
+        }
+    )
+    return body
+
+
+def _fact(value: object) -> object:
+    plain_value = value is None or isinstance(value, str | int | float)
+    return strict(value) if plain_value else str(value)
