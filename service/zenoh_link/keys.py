@@ -67,6 +67,6 @@ KEYS = (
 ALIVE = "alive"
 
 
-def vehicle_key(prefix: str, vehicle: str) -> str:
-    """Return what all keys of a vehicle begin with."""
-    return f"{prefix}/{vehicle}"
+def full(prefix: str, vehicle: str, suffix: str) -> str:
+    """Return a key's whole name."""
+    return f"{prefix}/{vehicle}/{suffix}"

@@ -50,7 +50,6 @@ class Node:
         self._settings = settings
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
-        self._prefix = keys.vehicle_key(settings.prefix, settings.vehicle)
         self._thread = SessionThread(make_config(settings), self._declare)
         self._payloads = Payloads(settings.encoding)
         self._publisher = Publisher(self._payloads, self._readers_changed)
@@ -111,17 +110,17 @@ class Node:
     def _declare(self, session: zenoh.Session) -> None:
         for key in keys.KEYS:
             if key.delivery is not Way.REPLY and key is not keys.MAVLINK_IN:
-                self._publisher.declare(session, key, self._name(key))
+                self._publisher.declare(session, key, self._name(key.suffix))
         for key, answerer in self._answerers.items():
-            self._queries.declare(session, self._name(key), answerer)
+            self._queries.declare(session, self._name(key.suffix), answerer)
         if self._settings.mavlink_in:
-            self._mavlink.declare_input(session, self._name(keys.MAVLINK_IN))
-        self._presence.declare(session, self._prefix)
+            self._mavlink.declare_input(session, self._name(keys.MAVLINK_IN.suffix))
+        self._presence.declare(session, self._name(keys.ALIVE))
 
     # On the event loop.
 
-    def _name(self, key: Key) -> str:
-        return f"{self._prefix}/{key.suffix}"
+    def _name(self, suffix: str) -> str:
+        return keys.full(self._settings.prefix, self._settings.vehicle, suffix)
 
     def _note(self, level: Level, event: str, /, **facts: object) -> None:
         getattr(_log, level)(event, **facts)

@@ -6,7 +6,6 @@ import zenoh
 
 from bridge.journal import Journal
 from service.mission_data import Json
-from service.zenoh_link.keys import ALIVE
 from service.zenoh_link.threads import post
 
 
@@ -22,8 +21,8 @@ class Presence:
         self.others: set[str] = set()
         self._neighbours: dict[str, str] = {}
 
-    def declare(self, session: zenoh.Session, prefix: str) -> None:
-        """Declare the token and look for others; called on the session's thread. `prefix`: the vehicle's key."""
+    def declare(self, session: zenoh.Session, alive: str) -> None:
+        """Declare the token and look for others; called on the session's thread. `alive`: the tokens' key."""
         self._own = str(session.zid())
 
         def joined(event: zenoh.TransportEvent) -> None:
@@ -33,15 +32,13 @@ class Presence:
         session.info.declare_transport_events_listener(zenoh.handlers.Callback(joined, indirect=False), history=True)
         liveliness = session.liveliness()
         # It lives as long as it is held here.
-        self._token = liveliness.declare_token(f"{prefix}/{ALIVE}/{self._own}")
+        self._token = liveliness.declare_token(f"{alive}/{self._own}")
 
         def seen(sample: zenoh.Sample) -> None:
             is_there = sample.kind is zenoh.SampleKind.PUT
             post(self._loop, self._seen, str(sample.key_expr).rpartition("/")[2], is_there)
 
-        liveliness.declare_subscriber(
-            f"{prefix}/{ALIVE}/*", zenoh.handlers.Callback(seen, indirect=False), history=True
-        )
+        liveliness.declare_subscriber(f"{alive}/*", zenoh.handlers.Callback(seen, indirect=False), history=True)
 
     def _seen(self, who: str, is_there: bool) -> None:
         if who == self._own or is_there == (who in self.others):
