@@ -9,6 +9,7 @@
 #   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
+#   make config-sample  write systemd/config.toml and the keys of docs/configuration.md anew
 #   make clean          remove everything that the above have made
 
 PYTHON ?= python3
@@ -19,7 +20,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench soak lock message-table clean
+.PHONY: demo test lint bench soak lock message-table config-sample clean
 
 demo: $(VENV)/.demo-ready
 	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
@@ -70,6 +71,13 @@ lock:
 message-table: $(VENV)/.test-ready
 	$(BIN)/python -m protocols.mavlink.make_message_table > $(VENV)/message_table.py
 	mv $(VENV)/message_table.py protocols/mavlink/
+
+# The sample file of all settings, and their reference page.
+config-sample: $(VENV)/.test-ready
+	$(BIN)/python -m service.settings.sample > systemd/config.toml
+	sed -i '/begin: make config-sample/,$$d' docs/configuration.md
+	echo '<!-- begin: make config-sample -->' >> docs/configuration.md
+	$(BIN)/python -m service.settings.sample --page >> docs/configuration.md
 
 clean:
 	rm -rf $(VENV) build dist .demo .hypothesis .mypy_cache .pytest_cache .ruff_cache benchmarks/results

@@ -1,7 +1,6 @@
 """How a command of the command line reaches a bridge: the running daemon's, or one of its own with `--fc`."""
 
 import asyncio
-import logging
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -73,7 +72,7 @@ def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, tot
 
 
 async def _ask_directly(fc: str, request: Json, progress: Callable[[int], None]) -> Json:
-    set_up_logging(logging.ERROR)
+    set_up_logging("error")
     daemon = Daemon(Settings(parse_fc(fc)))
     jobs = MissionJobs(daemon)
     running = asyncio.create_task(daemon.run())

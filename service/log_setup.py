@@ -1,9 +1,23 @@
-"""Logs to standard error: coloured and short on a terminal, one JSON object a line elsewhere."""
+"""Logs to standard error: coloured and short on a terminal, one JSON object a line elsewhere.
 
+For journald each line has its priority in front (sd-daemon(3)).
+"""
+
+import os
 import sys
+import time
+from collections.abc import Mapping
 from contextlib import suppress
+from typing import Any
 
 import structlog
+from structlog.typing import EventDict, Processor
+
+#: The levels by rising weight, and syslog's priority of each.
+_PRIORITIES = {"debug": 7, "info": 6, "warning": 4, "error": 3}
+_WEIGHTS = {level: weight for weight, level in enumerate(_PRIORITIES)}
+#: An event that comes more often than this is left out for the rest of the time, and counted.
+_MOST, _WITHIN_S = 20, 10.0
 
 
 class _StandardError:
@@ -16,20 +30,75 @@ class _StandardError:
     debug = info = warning = error = msg
 
 
-def set_up_logging(level: int) -> None:
-    """Configure structlog for this process: events from `level` (of the logging module) on are shown."""
-    on_terminal = sys.stderr.isatty()
-    renderer: structlog.typing.Processor = (
-        structlog.dev.ConsoleRenderer() if on_terminal else structlog.processors.JSONRenderer()
-    )
+class _LeastLevel:
+    """Drops what is below the level; it may change while the program runs."""
+
+    def __init__(self) -> None:
+        self.level = "info"
+
+    def __call__(self, _logger: object, method: str, event: EventDict) -> EventDict:
+        if _WEIGHTS[method] < _WEIGHTS[self.level]:
+            raise structlog.DropEvent
+        return event
+
+
+class _RateLimit:
+    """Keeps a fault that repeats itself from filling the log: the first line after it tells how many were left out."""
+
+    def __init__(self) -> None:
+        self._seen: dict[str, tuple[float, int]] = {}
+
+    def __call__(self, _logger: object, _method: str, event: EventDict) -> EventDict:
+        now = time.monotonic()
+        began, count = self._seen.get(event["event"], (now, 0))
+        if now >= began + _WITHIN_S:
+            if count > _MOST:
+                event["left_out"] = count - _MOST
+            began, count = now, 0
+        self._seen[event["event"]] = began, count + 1
+        if count >= _MOST:
+            raise structlog.DropEvent
+        return event
+
+
+class _JournalLines:
+    """Renders JSON behind the priority, without the time: journald has its own."""
+
+    def __init__(self) -> None:
+        self._render = structlog.processors.JSONRenderer()
+
+    def __call__(self, logger: object, method: str, event: Mapping[str, Any]) -> str:
+        return f"<{_PRIORITIES[method]}>{self._render(logger, method, dict(event))!s}"
+
+
+_least_level = _LeastLevel()
+
+
+def set_log_level(level: str) -> None:
+    """Show events from this level on: debug, info, warning or error."""
+    _least_level.level = level
+
+
+def set_up_logging(level: str) -> None:
+    """Configure structlog for this process."""
+    set_log_level(level)
     structlog.configure(
         processors=[
+            _least_level,
+            _RateLimit(),
             structlog.processors.add_log_level,
-            structlog.processors.TimeStamper(fmt="%H:%M:%S" if on_terminal else "iso", utc=not on_terminal),
             structlog.processors.format_exc_info,
-            renderer,
+            *_output(),
         ],
-        wrapper_class=structlog.make_filtering_bound_logger(level),
+        wrapper_class=structlog.make_filtering_bound_logger(0),
         logger_factory=lambda *_: _StandardError(),
         cache_logger_on_first_use=True,
     )
+
+
+def _output() -> list[Processor]:
+    if os.environ.get("JOURNAL_STREAM"):
+        return [_JournalLines()]
+    if sys.stderr.isatty():
+        return [structlog.processors.TimeStamper(fmt="%H:%M:%S", utc=False), structlog.dev.ConsoleRenderer()]
+    return [structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.JSONRenderer()]

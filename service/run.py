@@ -1,14 +1,12 @@
 """`naze-bridge run`: the daemon in the foreground."""
 
 import asyncio
-import logging
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from service.connection import AddressError
 from service.control import ControlError, ControlServer
 from service.control_socket import socket_of_daemon
 from service.daemon import Daemon
@@ -17,6 +15,7 @@ from service.lifecycle import run_until_signal
 from service.log_setup import set_up_logging
 from service.notify import Notifier
 from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
+from service.settings.load import CONFIG_VARIABLE
 from service.uart_recorder import UartFileError
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 from storage.state_lock import StateLock
@@ -29,10 +28,16 @@ if TYPE_CHECKING:
 @click.command()
 @click.option("--fc", metavar="FC", help="/dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:")
 @click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; several at once. Default: {DEFAULT_GCS}")
-@click.option("--config", type=click.Path(path_type=Path), help="TOML file with the same settings.")
+@click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    envvar=CONFIG_VARIABLE,
+    help="TOML file with all settings; conf.d/*.toml beside it go over it.",
+)
 @click.option("--state-dir", type=click.Path(path_type=Path), help="Folder for stored missions.")
 @click.option("--record-uart", type=click.Path(path_type=Path), help="File to record the port's traffic into.")
 @click.option("--verbose", is_flag=True, help="Show debug events too.")
+@click.option("--check-config", is_flag=True, help="Say whether the settings can be used, and end.")
 def run(
     fc: str | None,
     gcs: tuple[str, ...],
@@ -40,13 +45,17 @@ def run(
     state_dir: Path | None,
     record_uart: Path | None,
     verbose: bool,
+    check_config: bool,
 ) -> None:
     """Run the bridge between a flight controller and ground stations."""
-    set_up_logging(logging.DEBUG if verbose else logging.INFO)
     try:
-        settings = load_settings(config, fc, gcs, state_dir, record_uart)
-    except (AddressError, SettingsError) as error:
+        settings = load_settings(config, fc, gcs, state_dir, record_uart, verbose=verbose)
+    except SettingsError as error:
         raise click.UsageError(str(error)) from error
+    if check_config:
+        click.echo("The settings can be used.")
+        return
+    set_up_logging(settings.log_level)
     try:
         _serve(settings)
     except (ControlError, LinkError, StoreError, UartFileError, ZenohSettingsError) as error:

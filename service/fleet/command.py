@@ -217,13 +217,12 @@ def _address(
 
 def _daemon_settings(config: Path) -> ZenohSettings:
     # Here, because most commands do without them and without all that they load.
-    from service.connection import AddressError
     from service.settings import SettingsError, load_settings
 
     try:
         # Its flight controller is none of our business, but a file need not name one.
         found = load_settings(config, "sim:", (), None).zenoh
-    except (AddressError, SettingsError) as error:
+    except SettingsError as error:
         raise ZenohSettingsError(str(error)) from error
     if found is None:
         raise ZenohSettingsError(f"{config} has no [zenoh] table")

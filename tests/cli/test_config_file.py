@@ -55,7 +55,7 @@ def test_what_is_wrong_is_told_with_the_file(tmp_path: Path, name: str) -> None:
     ended = run_naze_bridge("run", *fc, "--config", config, "--state-dir", tmp_path / "state")
     assert ended.returncode == 2
     sentence = ended.stderr.splitlines()[-1]
-    assert sentence.startswith(f"Error: {config}: ")
+    assert sentence.startswith(f"Error: {config}:")
     assert not [word for word in words if word not in sentence], sentence
     assert "Traceback" not in ended.stderr
 

@@ -57,7 +57,20 @@ def test_an_answer_that_is_not_accepted_has_failed() -> None:
     assert fleet.vehicles["a"].error == "Too many?[2J items"
 
 
-_ODD = [None, True, 0, -1, 2.5, "", "x", [], {}, {"ack": 3}, {"ack": "MAV_MISSION_DENIED"}, ACCEPTED["result"]]
+_ODD: list[object] = [
+    None,
+    True,
+    0,
+    -1,
+    2.5,
+    "",
+    "x",
+    [],
+    {},
+    {"ack": 3},
+    {"ack": "MAV_MISSION_DENIED"},
+    ACCEPTED["result"],
+]
 _ANSWERS = st.none() | st.dictionaries(
     st.sampled_from(["progress", "of", "result", "error"]), st.sampled_from(_ODD), max_size=4
 )

@@ -35,13 +35,13 @@ def test_the_flag_goes_before_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("record_tlog = 1", "record_tlog must be true or false"),
-        ("tlog_days = true", "tlog_days must be a whole number"),
+        ("record_tlog = 1", "record_tlog is 1, but must be true or false"),
+        ("tlog_days = true", "tlog_days is True, but must be a whole number"),
         ("tlog_days = 0", "tlog_days is 0, but must be 1..3650"),
         ("tlog_file_mb = 2000", "tlog_file_mb is 2000, but must be 1..1024"),
-        ("tlog_total_mb = 20", "tlog_total_mb is 20, but must be 32.."),
+        ("tlog_total_mb = 20", "tlog_total_mb is 20, but must be 32 or more"),
         ("tlog_day = 20", "did you mean 'tlog_days'"),
-        ("record_uart = true", "record_uart must be text in quotes"),
+        ("record_uart = true", "record_uart is True, but must be text in quotes"),
     ],
 )
 def test_what_makes_no_sense_is_refused(tmp_path: Path, text: str, complaint: str) -> None:

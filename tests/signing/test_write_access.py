@@ -8,7 +8,7 @@ import pytest
 from bridge.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
 from service.connection import AddressError
-from service.settings import load_settings
+from service.settings import SettingsError, load_settings
 from service.write_access import WriteAccess, read_key
 
 WORDS = "correct horse"
@@ -30,7 +30,7 @@ def access(tmp_path: Path, gcs: str, *flags: str) -> dict[str, WriteAccess]:
 
 
 def complaint(tmp_path: Path, gcs: str) -> str:
-    with pytest.raises(AddressError) as caught:
+    with pytest.raises(SettingsError) as caught:
         access(tmp_path, gcs)
     text = str(caught.value)
     assert "\n" not in text

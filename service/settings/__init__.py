@@ -1,0 +1,7 @@
+"""Where settings come from: flags over environment over the configuration files over defaults."""
+
+from service.settings.load import default_state_dir, load_settings
+from service.settings.problem import SettingsError
+from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
+
+__all__ = ["DEFAULT_GCS", "Settings", "SettingsError", "TlogLimits", "default_state_dir", "load_settings"]

@@ -1,0 +1,89 @@
+"""The configuration file, and those in `conf.d` beside it: TOML, in the order of their names, the later one wins."""
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from service.bounded_file import read_bounded
+from service.settings.problem import Problem
+from service.settings.table import KEYS, TABLES
+
+DROP_INS = "conf.d"
+_MAX_BYTES = 1 << 20
+_NAMES = frozenset(key.name for key in KEYS)
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A value as it was given: where that was, and the folder by which relative file names there go."""
+
+    value: object
+    where: str
+    folder: Path = Path()
+
+
+def read_files(config: Path, problems: list[Problem]) -> dict[str, Given]:
+    """Read a configuration file and its drop-ins: values by the name of their key, tables that are there as True."""
+    found: dict[str, Given] = {}
+    for path in (config, *sorted((config.parent / DROP_INS).glob("*.toml"))):
+        found |= _read_file(path, problems)
+    return found
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Say what somebody may have meant."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"
+
+
+def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
+    try:
+        text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")
+        tables = tomllib.loads(text)
+    except OSError as error:
+        problems.append(Problem(str(path), f"this cannot be read: {error.strerror}"))
+        return {}
+    except (ValueError, RecursionError) as error:
+        problems.append(Problem(str(path), f"this is no valid TOML: {error}"))
+        return {}
+    found: dict[str, Given] = {}
+    for keys, value in _flat(tables):
+        name = ".".join(keys)
+        where = f"{path}:{_line(text, keys)}"
+        if name in _NAMES or (name in TABLES and isinstance(value, dict)):
+            found[name] = Given(True if name in TABLES else value, where, path.parent)
+        elif name in TABLES:
+            problems.append(Problem(where, f"{name} must be a table: begin it with [{name}]"))
+        else:
+            problems.append(Problem(where, f"{name!r} is no setting; {nearest(name, _NAMES)}"))
+    return found
+
+
+def _flat(tables: Mapping[str, Any]) -> Iterable[tuple[tuple[str, ...], Any]]:
+    for name, value in tables.items():
+        yield (name,), value
+        if name in TABLES and isinstance(value, dict):
+            for key, inner in value.items():
+                yield (name, key), inner
+
+
+def _line(text: str, keys: tuple[str, ...]) -> int:
+    """Return the line in which a key begins: after the longest beginning of the file that is TOML and lacks it."""
+    lines = text.splitlines(keepends=True)
+    before = 0
+    for count in range(len(lines) + 1):
+        try:
+            here: Any = tomllib.loads("".join(lines[:count]))
+        except ValueError:
+            continue
+        for key in keys:
+            if not isinstance(here, dict) or key not in here:
+                before = count
+                break
+            here = here[key]
+        else:
+            break
+    return before + 1

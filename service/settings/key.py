@@ -1,0 +1,155 @@
+"""One setting: its name, what it means, and how a value is read."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+_ENVIRONMENT = "NAZE_BRIDGE_"
+
+
+class Unfit(ValueError):
+    """A value that cannot be used; the text goes on after the key's name: "is 7, but must be ..."."""
+
+
+class Reader(Protocol):
+    """Turns what was given into what is used; Unfit, or another ValueError whose text is a whole sentence."""
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a value of the file in `folder`."""
+
+    def from_text(self, text: str) -> object:
+        """Return what the file would hold for a text of the environment or of a flag."""
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """`name`: with its table's, as "zenoh.prefix". `meaning`: one sentence, with the unit. `default`: as in the file.
+
+    `example`: for the sample file, where there is no default. `is_live`: taken over on a reload.
+    """
+
+    name: str
+    reader: Reader
+    meaning: str
+    default: str = ""
+    example: str = ""
+    is_live: bool = False
+
+    @property
+    def variable(self) -> str:
+        """Return its name in the environment."""
+        return _ENVIRONMENT + self.name.upper().replace(".", "_")
+
+
+def _wrong(value: object, wanted: str) -> Unfit:
+    return Unfit(f"is {value!r}, but must be {wanted}")
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Any text; `wanted` says which, `parse` may refuse it."""
+
+    wanted: str = "text in quotes"
+    parse: Callable[[str], object] = str
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a text."""
+        if not isinstance(value, str) or not value:
+            raise _wrong(value, self.wanted)
+        return self.parse(value)
+
+    def from_text(self, text: str) -> object:
+        """Take it as it is."""
+        return text
+
+
+@dataclass(frozen=True, slots=True)
+class FileName:
+    """The name of a file or folder; if `beside`, a relative one is looked for beside the configuration file."""
+
+    beside: bool = False
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a path."""
+        if not isinstance(value, str) or not value or "\0" in value:
+            raise _wrong(value, "text in quotes: the name of a file or folder")
+        return folder / value if self.beside else Path(value)
+
+    def from_text(self, text: str) -> object:
+        """Take it as it is."""
+        return text
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A whole number from `least` to `most`."""
+
+    least: int
+    most: int
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a number."""
+        if type(value) is not int:
+            raise _wrong(value, f"a whole number, {self.least}..{self.most}")
+        if not self.least <= value <= self.most:
+            raise _wrong(value, f"{self.least}..{self.most}")
+        return value
+
+    def from_text(self, text: str) -> object:
+        """Read its digits."""
+        return int(text) if text.isascii() and text.isdecimal() and len(text) < len(str(self.most)) + 2 else text
+
+
+@dataclass(frozen=True, slots=True)
+class YesNo:
+    """True or false."""
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a truth value."""
+        if type(value) is not bool:
+            raise _wrong(value, "true or false")
+        return value
+
+    def from_text(self, text: str) -> object:
+        """Read the word."""
+        return {"true": True, "false": False}.get(text.lower(), text)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of some words; `parse` makes of it what is used."""
+
+    words: Sequence[str]
+    parse: Callable[[str], object] = str
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a word."""
+        if not isinstance(value, str) or value not in self.words:
+            raise _wrong(value, " or ".join(f'"{word}"' for word in self.words))
+        return self.parse(value)
+
+    def from_text(self, text: str) -> object:
+        """Take it as it is."""
+        return text
+
+
+@dataclass(frozen=True, slots=True)
+class Several:
+    """A list, each entry read by `parse(entry, folder)`."""
+
+    wanted: str
+    parse: Callable[[object, Path], object]
+    may_be_empty: bool = True
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a list."""
+        if not isinstance(value, list):
+            raise _wrong(value, f"a list in brackets, {self.wanted}")
+        if not value and not self.may_be_empty:
+            raise Unfit(f"is empty: write {self.wanted}, or leave it away")
+        return tuple(self.parse(entry, folder) for entry in value)
+
+    def from_text(self, text: str) -> object:
+        """Take its words."""
+        return text.split()

@@ -1,0 +1,139 @@
+"""Puts the settings of a daemon together, and tells of all that is wrong at once."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from service.connection import FcAddress, GcsAddress, parse_gcs
+from service.settings.config_files import Given, nearest, read_files
+from service.settings.key import Unfit
+from service.settings.ports import port_conflicts
+from service.settings.problem import Problem, SettingsError
+from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
+from service.settings.table import KEYS
+from service.write_access import WriteAccess
+from service.zenoh_link.settings import ZenohSettings
+
+#: Names the configuration file itself.
+CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"
+_PREFIX = "NAZE_BRIDGE_"
+
+
+def default_state_dir() -> Path:
+    """Return systemd's StateDirectory, else the user's own folder for state; SettingsError if there is no such user."""
+    given = os.environ.get("STATE_DIRECTORY")
+    if given:
+        return Path(given.split(":")[0])
+    try:
+        base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    except RuntimeError:
+        raise SettingsError("this user has no home folder: name a folder for missions with --state-dir") from None
+    return Path(base) / "naze-bridge"
+
+
+def load_settings(
+    config: Path | None,
+    fc: str | None,
+    gcs: Sequence[str],
+    state_dir: Path | None,
+    record_uart: Path | None = None,
+    *,
+    verbose: bool = False,
+) -> Settings:
+    """Put the settings of `run` together; SettingsError tells everything that is wrong with them."""
+    problems: list[Problem] = []
+    given = {} if config is None else read_files(config, problems)
+    given |= _read_environment(os.environ, problems)
+    flags = {
+        "fc": fc,
+        "state_dir": None if state_dir is None else str(state_dir),
+        "record_uart": None if record_uart is None else str(record_uart),
+        "log_level": "debug" if verbose else None,
+    }
+    given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in flags.items() if value is not None}
+    values = _read_values(given, problems)
+    if "fc" not in given:
+        where = "" if config is None else str(config)
+        problems.append(
+            Problem(where, "name the flight controller: --fc /dev/serial0, or --fc sim: to try it without one")
+        )
+    links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
+    addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
+    tlog = _tlog_limits(values, given, problems)
+    zenoh = _zenoh(values) if "zenoh" in given else None
+    used = Given(None, "--gcs") if gcs else given.get("gcs", Given(None, ""))
+    problems += [Problem(used.where, text) for text in port_conflicts(addresses, zenoh)]
+    if problems:
+        raise SettingsError(problems)
+    chosen: FcAddress = values["fc"]
+    return Settings(
+        fc=chosen,
+        gcs=addresses,
+        # A link that is named by a flag, too, stays as safe as the file says.
+        access={str(address): access for address, access in links if not access.is_open},
+        state_dir=values.pop("state_dir", None) or default_state_dir(),
+        tlog=tlog,
+        zenoh=zenoh,
+        **{name: values[name] for name in _AS_THEY_ARE if name in values},
+    )
+
+
+_AS_THEY_ARE = ("sysid", "takeoff_max_m", "autopilot", "record_uart", "log_level")
+
+
+def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -> dict[str, Given]:
+    keys = {key.variable: key for key in KEYS}
+    given: dict[str, Given] = {}
+    for variable, text in environment.items():
+        if variable in keys:
+            key = keys[variable]
+            given[key.name] = Given(key.reader.from_text(text), variable)
+            table, dot, _ = key.name.partition(".")
+            if dot:
+                given[table] = Given(True, variable)
+        elif variable.startswith(_PREFIX) and variable != CONFIG_VARIABLE:
+            problems.append(Problem(variable, f"this is no setting; {nearest(variable, keys)}"))
+    return given
+
+
+def _read_values(given: Mapping[str, Given], problems: list[Problem]) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for key in KEYS:
+        found = given.get(key.name)
+        if found is None:
+            continue
+        try:
+            values[key.name] = key.reader.read(found.value, found.folder)
+        except Unfit as error:
+            problems.append(Problem(found.where, f"{key.name} {error} ({key.meaning.rstrip('.')})"))
+        except ValueError as error:
+            problems.append(Problem(found.where, str(error)))
+    return values
+
+
+def _named_links(gcs: Sequence[str], problems: list[Problem]) -> list[GcsAddress]:
+    links: list[GcsAddress] = []
+    for text in gcs:
+        try:
+            links.append(parse_gcs(text))
+        except ValueError as error:
+            problems.append(Problem("--gcs", str(error)))
+    return links
+
+
+def _tlog_limits(values: dict[str, Any], given: Mapping[str, Given], problems: list[Problem]) -> TlogLimits | None:
+    default = TlogLimits()
+    file_mb = values.get("tlog_file_mb", default.file_size >> 20)
+    total_mb = values.get("tlog_total_mb", max(default.total_size >> 20, 2 * file_mb))
+    if total_mb < 2 * file_mb:
+        text = f"tlog_total_mb is {total_mb}, but must be {2 * file_mb} or more: twice tlog_file_mb"
+        problems.append(Problem(given["tlog_total_mb"].where, text))
+    if not values.get("record_tlog", True):
+        return None
+    return TlogLimits(file_mb << 20, total_mb << 20, values.get("tlog_days", default.days))
+
+
+def _zenoh(values: Mapping[str, Any]) -> ZenohSettings:
+    mine = {name.removeprefix("zenoh."): value for name, value in values.items() if name.startswith("zenoh.")}
+    return ZenohSettings(**mine)

@@ -1,0 +1,48 @@
+"""Two users of one port: found before either of them has opened it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from ipaddress import ip_address
+from itertools import combinations
+
+from service.connection import GcsAddress
+from service.zenoh_link.settings import ZenohSettings
+
+_TCP_LINKS = ("tcp", "tls", "ws")
+
+
+@dataclass(frozen=True, slots=True)
+class _Use:
+    user: str
+    transport: str
+    host: str
+    port: int
+
+
+def port_conflicts(gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None) -> Iterator[str]:
+    """Yield one sentence for each two of them that listen on one port."""
+    uses = [
+        _Use(f"gcs {address}", "TCP" if address.kind == "tcpin" else "UDP", address.host, address.port)
+        for address in gcs
+        if address.kind in ("udpin", "tcpin")
+    ]
+    for endpoint in () if zenoh is None else zenoh.listen:
+        protocol, _, rest = endpoint.partition("/")
+        host, _, port = rest.partition("#")[0].partition("?")[0].rpartition(":")
+        if port.isdecimal():
+            transport = "TCP" if protocol in _TCP_LINKS else "UDP"
+            uses.append(_Use(f"zenoh.listen {endpoint}", transport, host.strip("[]"), int(port)))
+    for first, second in combinations(uses, 2):
+        if (first.transport, first.port) == (second.transport, second.port) and _overlap(first.host, second.host):
+            yield f"{first.user} and {second.user} would both listen on {first.transport} port {first.port}: change one"
+
+
+def _overlap(first: str, second: str) -> bool:
+    if first == second:
+        return True
+    try:
+        one, other = ip_address(first), ip_address(second)
+    except ValueError:
+        # Names are looked up when they are used.
+        return False
+    return one.version == other.version and (one.is_unspecified or other.is_unspecified)

@@ -1,0 +1,58 @@
+"""The sample configuration file, and the table of the reference page: `python -m service.settings.sample [--page]`.
+
+Both are made from the table of keys, and a test compares them with what is checked in (`make config-sample`).
+"""
+
+import sys
+import textwrap
+
+from service.settings.key import Key
+from service.settings.table import KEYS, TABLES
+
+_HEAD = (
+    "naze-bridge's settings. What is commented out shows the default, or an example.",
+    "Files in conf.d/ beside this one go over it, in the order of their names.",
+    "Environment variables (NAZE_BRIDGE_SYSID, NAZE_BRIDGE_ZENOH_PREFIX) and flags go over all of them.",
+    "`naze-bridge run --check-config --config FILE` tells what is wrong.",
+    '`systemctl reload naze-bridge` takes over what is marked "live"; the rest needs a restart.',
+)
+_WIDTH = 100
+
+
+def sample() -> str:
+    """Return the file. Only `fc` is set."""
+    lines = [_comment(line) for line in _HEAD]
+    table = ""
+    for key in KEYS:
+        before, dot, name = key.name.rpartition(".")
+        if dot and before != table:
+            table = before
+            lines += ["", _comment(TABLES[table]), f"#[{table}]"]
+        note = " (live)" if key.is_live else ""
+        value = key.default or key.example
+        lines += ["", _comment(key.meaning + note), f"{'' if key.name == 'fc' else '#'}{name} = {value}"]
+    return "\n".join(lines) + "\n"
+
+
+def page() -> str:
+    """Return the rows of the reference page."""
+    rows = ["| key | default | meaning |", "|---|---|---|"]
+    rows += [f"| `{key.name}` | {_default(key)} | {_cell(key)} |" for key in KEYS]
+    return "\n".join(rows) + "\n"
+
+
+def _default(key: Key) -> str:
+    return f"`{key.default}`" if key.default else ""
+
+
+def _cell(key: Key) -> str:
+    example = "" if key.default or not key.example else f" Example: `{key.example}`."
+    return key.meaning.replace("|", "\\|") + example + (" *Live.*" if key.is_live else "")
+
+
+def _comment(text: str) -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page() if "--page" in sys.argv else sample())

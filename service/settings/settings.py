@@ -1,0 +1,45 @@
+"""What a daemon is started with."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bridge.fc_session import Autopilot
+from service.connection import FcAddress, GcsAddress
+from service.write_access import WriteAccess
+from service.zenoh_link.settings import ZenohSettings
+
+DEFAULT_GCS = "udpin:0.0.0.0:14550"
+DEFAULT_SYSID = 1
+DEFAULT_TAKEOFF_MAX_M = 15
+DEFAULT_LOG_LEVEL = "info"
+
+
+@dataclass(frozen=True, slots=True)
+class TlogLimits:
+    """Bytes of one telemetry log (a second's records come on top) and of all together; days for which one is kept."""
+
+    file_size: int = 16 << 20
+    total_size: int = 256 << 20
+    days: int = 30
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
+
+    `access`: who may write over a link, by its address as text; over others everyone may. `zenoh` None: it is not
+    joined. `log_level`: debug, info, warning or error.
+    """
+
+    fc: FcAddress
+    gcs: Sequence[GcsAddress] = ()
+    state_dir: Path | None = None
+    sysid: int = DEFAULT_SYSID
+    takeoff_max_m: int = DEFAULT_TAKEOFF_MAX_M
+    tlog: TlogLimits | None = None
+    record_uart: Path | None = None
+    autopilot: Autopilot = Autopilot.AUTO
+    access: Mapping[str, WriteAccess] = field(default_factory=dict)
+    zenoh: ZenohSettings | None = None
+    log_level: str = DEFAULT_LOG_LEVEL

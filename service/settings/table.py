@@ -1,0 +1,147 @@
+"""All settings there are: the one table that reading, the sample file, the reference and the environment go by."""
+
+from pathlib import Path
+
+from bridge.fc_session import Autopilot
+from service.connection import parse_fc
+from service.settings.key import Choice, FileName, Key, Several, Text, Unfit, Whole, YesNo
+from service.settings.settings import (
+    DEFAULT_GCS,
+    DEFAULT_LOG_LEVEL,
+    DEFAULT_SYSID,
+    DEFAULT_TAKEOFF_MAX_M,
+    TlogLimits,
+)
+from service.write_access import parse_link
+from service.zenoh_link.settings import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, check_name
+
+LOG_LEVELS = ("debug", "info", "warning", "error")
+_LIMITS = TlogLimits()
+
+
+def _name(key: str) -> Text:
+    def parse(text: str) -> str:
+        check_name(key, text)
+        return text
+
+    return Text(parse=parse)
+
+
+def _endpoint(entry: object, _folder: Path) -> str:
+    if not isinstance(entry, str) or "/" not in entry:
+        raise Unfit(f'holds {entry!r}, which is no endpoint: write one like "tcp/192.168.4.1:7447"')
+    return entry
+
+
+KEYS = (
+    Key(
+        "fc",
+        Text(parse=parse_fc),
+        "The flight controller: /dev/serial0 (its speed is sensed), /dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim: "
+        "for a simulated one.",
+        example='"/dev/serial0"',
+    ),
+    Key(
+        "gcs",
+        Several(f'as in ["{DEFAULT_GCS}"]', parse_link, may_be_empty=False),
+        "Links to ground stations: udpin:ADDR:PORT, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:ADDR:PORT. As a table, "
+        '{address = "udpin:0.0.0.0:14550", key_file = "gcs.key", writers = ["192.168.4.0/24"]}, a link limits who may '
+        "write.",
+        default=f'["{DEFAULT_GCS}"]',
+        is_live=True,
+    ),
+    Key(
+        "state_dir",
+        FileName(),
+        "Folder for stored missions and telemetry logs. By default systemd's StateDirectory, else "
+        "~/.local/state/naze-bridge.",
+        example='"/var/lib/naze-bridge"',
+    ),
+    Key("sysid", Whole(1, 255), "MAVLink system id of the vehicle, 1..255.", str(DEFAULT_SYSID)),
+    Key(
+        "takeoff_max_m",
+        Whole(2, 255),
+        "Greatest take-off height of a mission, metres, 2..255; a higher one becomes this.",
+        str(DEFAULT_TAKEOFF_MAX_M),
+    ),
+    Key(
+        "autopilot",
+        Choice([each.value for each in Autopilot], Autopilot),
+        'Whose MAVLink is heard on the port: "auto" finds out, "harakiri" is served, "other" is passed through.',
+        f'"{Autopilot.AUTO.value}"',
+    ),
+    Key("record_tlog", YesNo(), "Whether telemetry is recorded, for Mission Planner to replay.", "true"),
+    Key("tlog_file_mb", Whole(1, 1024), "Size of one telemetry log, megabytes, 1..1024.", str(_LIMITS.file_size >> 20)),
+    Key(
+        "tlog_total_mb",
+        Whole(2, 1 << 20),
+        "Size of all telemetry logs together, megabytes, at least twice tlog_file_mb; the oldest give way.",
+        str(_LIMITS.total_size >> 20),
+    ),
+    Key("tlog_days", Whole(1, 3650), "How long a telemetry log is kept, days, 1..3650.", str(_LIMITS.days)),
+    Key(
+        "record_uart",
+        FileName(),
+        "File into which the traffic with the flight controller is recorded, for a bug report; nowhere by default.",
+        example='"/var/lib/naze-bridge/naze.uart"',
+    ),
+    Key(
+        "log_level",
+        Choice(LOG_LEVELS),
+        "The least of what is logged: debug, info, warning or error.",
+        f'"{DEFAULT_LOG_LEVEL}"',
+        is_live=True,
+    ),
+    Key("zenoh.prefix", _name("prefix"), "First chunk of all zenoh keys.", f'"{DEFAULT_PREFIX}"'),
+    Key(
+        "zenoh.vehicle",
+        _name("vehicle"),
+        "This vehicle's name, the second chunk; another one for each of a fleet. By default the host's name.",
+        example='"naze-1"',
+    ),
+    Key(
+        "zenoh.encoding",
+        Choice([each.value for each in PayloadEncoding], PayloadEncoding),
+        "How payloads are written.",
+        f'"{PayloadEncoding.JSON.value}"',
+    ),
+    Key(
+        "zenoh.connect",
+        Several('as in ["tcp/192.168.4.1:7447"]', _endpoint),
+        "Endpoints to join: a router or other peers.",
+        "[]",
+    ),
+    Key(
+        "zenoh.listen",
+        Several('as in ["tcp/0.0.0.0:7447"]', _endpoint),
+        "Endpoints at which others may join.",
+        "[]",
+    ),
+    Key(
+        "zenoh.config_file",
+        FileName(beside=True),
+        "A zenoh configuration file that is passed through: TLS, passwords, access control, namespace.",
+        example='"zenoh.json5"',
+    ),
+    Key(
+        "zenoh.commands",
+        YesNo(),
+        "Whether missions may be written and cleared over zenoh; the transport must be authenticated.",
+        "false",
+    ),
+    Key(
+        "zenoh.commands_without_authentication",
+        Text(f'"{I_KNOW}", or left away'),
+        f'"{I_KNOW}": take commands from whoever reaches the session.',
+        example=f'"{I_KNOW}"',
+    ),
+    Key(
+        "zenoh.mavlink_in",
+        YesNo(),
+        "Whether raw MAVLink frames are taken from zenoh, under the same condition as commands.",
+        "false",
+    ),
+)
+
+#: Tables that switch a part on by being there.
+TABLES = {"zenoh": "Eclipse zenoh: telemetry and missions for subscribers anywhere, off without this table."}

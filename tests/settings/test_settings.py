@@ -1,0 +1,169 @@
+"""Settings from files, drop-ins, environment and flags, and what is said of those that cannot be used."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from programs import run_naze_bridge
+
+from service.settings import Settings, SettingsError, load_settings
+from service.settings.sample import page, sample
+from service.settings.table import KEYS
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "conf.d").mkdir()
+    return tmp_path
+
+
+def load(folder: Path, text: str, **drop_ins: str) -> Settings:
+    config = folder / "naze.toml"
+    config.write_text(text)
+    for name, drop_in in drop_ins.items():
+        (folder / "conf.d" / f"{name}.toml").write_text(drop_in)
+    return load_settings(config, "sim:", (), folder)
+
+
+def problems(folder: Path, text: str, **drop_ins: str) -> list[str]:
+    with pytest.raises(SettingsError) as caught:
+        load(folder, text, **drop_ins)
+    return [str(problem).removeprefix(f"{folder}/") for problem in caught.value.problems]
+
+
+def test_a_drop_in_goes_over_the_file_and_a_later_one_over_it(folder: Path) -> None:
+    settings = load(folder, "sysid = 2\ntakeoff_max_m = 20", a="sysid = 3\nlog_level = 'debug'", b="sysid = 4")
+    assert (settings.sysid, settings.takeoff_max_m, settings.log_level) == (4, 20, "debug")
+
+
+def test_a_drop_in_adds_to_a_table(folder: Path) -> None:
+    zenoh = load(folder, "[zenoh]\nvehicle = 'one'\nprefix = 'club'", a="[zenoh]\nvehicle = 'two'").zenoh
+    assert zenoh is not None
+    assert (zenoh.vehicle, zenoh.prefix) == ("two", "club")
+    assert load(folder, "", a="").zenoh is None
+
+
+def test_the_environment_goes_over_files_and_flags_over_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NAZE_BRIDGE_SYSID", "9")
+    monkeypatch.setenv("NAZE_BRIDGE_FC", "/dev/ttyUSB7")
+    monkeypatch.setenv("NAZE_BRIDGE_GCS", "udpin:127.0.0.1:1 tcpin:127.0.0.1:2")
+    monkeypatch.setenv("NAZE_BRIDGE_RECORD_TLOG", "false")
+    monkeypatch.setenv("NAZE_BRIDGE_ZENOH_VEHICLE", "three")
+    settings = load(folder, "sysid = 2\nrecord_tlog = true")
+    assert (settings.sysid, str(settings.fc), settings.tlog) == (9, "sim:", None)
+    assert [str(address) for address in settings.gcs] == ["udpin:127.0.0.1:1", "tcpin:127.0.0.1:2"]
+    assert settings.zenoh is not None
+    assert settings.zenoh.vehicle == "three"
+
+
+@pytest.mark.parametrize(
+    ("variable", "text", "words"),
+    [
+        ("NAZE_BRIDGE_SYSID", "many", "NAZE_BRIDGE_SYSID: sysid is 'many', but must be a whole number, 1..255"),
+        ("NAZE_BRIDGE_SYSID", "9" * 5000, "but must be"),
+        (
+            "NAZE_BRIDGE_RECORD_TLOG",
+            "maybe",
+            "NAZE_BRIDGE_RECORD_TLOG: record_tlog is 'maybe', but must be true or false",
+        ),
+        ("NAZE_BRIDGE_SYSIDD", "1", "NAZE_BRIDGE_SYSIDD: this is no setting; did you mean 'NAZE_BRIDGE_SYSID'?"),
+    ],
+)
+def test_a_wrong_variable_is_named(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, variable: str, text: str, words: str
+) -> None:
+    monkeypatch.setenv(variable, text)
+    (found,) = problems(folder, "")
+    assert words in found
+
+
+def test_all_that_is_wrong_is_told_at_once_with_its_line(folder: Path) -> None:
+    text = """
+# a comment
+sysid = 300
+gcs = [
+    "udpin:0.0.0.0:14550",
+    "tcpin:0.0.0.0",
+]
+takeof_max_m = 15
+[zenoh]
+vehicle = "a/b"
+encodings = "json"
+"""
+    told = problems(folder, text, late="tlog_days = 'all'")
+    wanted = [
+        "naze.toml:8: 'takeof_max_m' is no setting; did you mean 'takeoff_max_m'?",
+        "naze.toml:11: 'zenoh.encodings' is no setting; did you mean 'zenoh.encoding'?",
+        "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: write udpin:0.0.0.0:14550",
+        "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
+        "conf.d/late.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
+        "naze.toml:10: zenoh.vehicle is 'a/b', with '/' in it: make a name of letters, digits and dashes",
+    ]
+    assert [line[: len(words)] for line, words in zip(told, wanted, strict=True)] == wanted
+
+
+def test_a_table_that_is_none(folder: Path) -> None:
+    assert problems(folder, "zenoh = true") == ["naze.toml:1: zenoh must be a table: begin it with [zenoh]"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('gcs = ["udpin:0.0.0.0:14550", "udpin:127.0.0.1:14550"]', "would both listen on UDP port 14550"),
+        ('gcs = ["tcpin:[::]:5760", "tcpin:[::]:5760"]', "would both listen on TCP port 5760"),
+        ('gcs = ["tcpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]', "zenoh.listen tcp/0.0.0.0:7447"),
+        ('gcs = ["udpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["quic/0.0.0.0:7447"]', "UDP port 7447: change one"),
+    ],
+)
+def test_two_users_of_one_port(folder: Path, text: str, words: str) -> None:
+    (found,) = problems(folder, text)
+    assert found.startswith("naze.toml:1: ")
+    assert words in found
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'gcs = ["udpin:0.0.0.0:14550", "tcpin:0.0.0.0:14550"]',
+        'gcs = ["udpin:127.0.0.1:14550", "udpin:127.0.0.2:14550"]',
+        'gcs = ["udpin:0.0.0.0:14550", "udpin:[::]:14550"]',
+        'gcs = ["udpout:127.0.0.1:14550", "udpin:0.0.0.0:14550"]',
+    ],
+)
+def test_ports_that_are_different_ones(folder: Path, text: str) -> None:
+    assert len(load(folder, text).gcs) == 2
+
+
+def test_check_config_says_that_it_is_well_or_what_is_not(folder: Path) -> None:
+    config = folder / "naze.toml"
+    config.write_text('fc = "/dev/serial0"')
+    ended = run_naze_bridge("run", "--check-config", "--config", config)
+    assert (ended.returncode, ended.stdout) == (0, "The settings can be used.\n")
+    config.write_text('fc = "/dev/serial0"\nsysid = 0\ntlog_days = 0\n')
+    ended = run_naze_bridge("run", "--check-config", "--config", config)
+    assert ended.returncode == 2
+    assert f"{config}:2: sysid is 0" in ended.stderr
+    assert f"{config}:3: tlog_days is 0" in ended.stderr
+    assert not (folder / "missions.db").exists()
+
+
+def test_the_sample_is_up_to_date_and_means_the_defaults(folder: Path) -> None:
+    checked_in = (REPOSITORY / "systemd" / "config.toml").read_text()
+    assert checked_in == sample(), "run make config-sample"
+    assert load(folder, checked_in) == load(folder, "")
+
+
+def test_every_line_of_the_sample_can_be_used(folder: Path) -> None:
+    lines = [line.removeprefix("#") for line in sample().splitlines() if line and not line.startswith("# ")]
+    text = "\n".join(line for line in lines if not line.startswith("config_file"))
+    assert load(folder, text).zenoh is not None
+    tables = tomllib.loads("\n".join(lines))
+    named = {name for name, value in tables.items() if not isinstance(value, dict)}
+    named |= {f"{table}.{name}" for table, inner in tables.items() if isinstance(inner, dict) for name in inner}
+    assert named == {key.name for key in KEYS}
+
+
+def test_the_page_has_every_setting() -> None:
+    assert page() in (REPOSITORY / "docs" / "configuration.md").read_text(), "run make config-sample"
