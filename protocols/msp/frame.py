@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import reduce
+from operator import xor
 
 MAX_PAYLOAD = 255
 _PREAMBLE = b"$M"
@@ -31,10 +33,7 @@ class MspFrame:
     def encode(self) -> bytes:
         """Return the frame's bytes, checksum included."""
         body = bytes((len(self.payload), self.command)) + self.payload
-        checksum = 0
-        for byte in body:
-            checksum ^= byte
-        return b"$M" + bytes((self.direction.value,)) + body + bytes((checksum,))
+        return b"$M" + bytes((self.direction.value,)) + body + bytes((reduce(xor, body),))
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
@@ -84,10 +83,7 @@ class MspParser:
             end = start + FRAME_OVERHEAD + buffer[start + 3]
             if len(buffer) < end:
                 break
-            checksum = 0
-            for byte in buffer[start + 3 : end]:
-                checksum ^= byte
-            if checksum:
+            if reduce(xor, buffer[start + 3 : end]):
                 self.bad_checksums += 1
                 self.skipped_bytes += 1
                 start += 1

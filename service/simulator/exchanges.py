@@ -45,6 +45,7 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
     unasked: list[Piece] = []
     waiting: list[Exchange] = []
     unknown: set[Exchange] = set()
+    known: dict[Question, Question] = {}  # each is kept once: there are few, asked by the hundred thousand
     answers = _answers(events, unasked)
     answered_by, frame, pieces = next(answers, _NO_MORE)
     requests = MspParser()
@@ -54,11 +55,11 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
             unknown |= _cut_short(waiting, event.at)
             waiting = []
         elif event.deed is UartDeed.WRITE:
-            asked = [
-                Exchange((found.command, found.payload), event.at)
-                for found in requests.feed(event.data)
-                if found.direction is Direction.REQUEST
-            ]
+            asked = []
+            for found in requests.feed(event.data):
+                if found.direction is Direction.REQUEST:
+                    question = found.command, found.payload
+                    asked.append(Exchange(known.setdefault(question, question), event.at))
             exchanges += asked
             # What is asked again was given up before.
             questions = {exchange.question for exchange in asked}

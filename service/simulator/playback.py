@@ -13,6 +13,7 @@ same request got at this time of the recording, as fast as then, and none if it 
 import heapq
 from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import pairwise
 from math import inf
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
@@ -72,8 +73,9 @@ class CapturePlayer:
         self._stories: dict[tuple[int, bytes], _Story] = {}
         for exchange in conversation.exchanges:
             self._stories.setdefault(exchange.question, _Story()).add(exchange)
-        self._speed_times = [event.at for event in events]
-        self._speeds = [event.speed or _ANY_SPEED for event in events]
+        changes = [*events[:1], *(event for before, event in pairwise(events) if before.speed != event.speed)]
+        self._speed_times = [event.at for event in changes]
+        self._speeds = [event.speed or _ANY_SPEED for event in changes]
         self._ends_at = events[-1].at if events else 0.0
         self._outages = _outages(events)
 

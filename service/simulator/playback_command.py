@@ -21,13 +21,17 @@ def play_capture(path: Path, link: Path, tempo: float) -> None:
         given = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
         if given and name not in _OPTIONS_OF_PLAYING:
             raise click.UsageError(f"--{name.replace('_', '-')} is for a simulated board; leave it away with --play")
+    asyncio.run(_play(_player(path, tempo), path, link))
+
+
+def _player(path: Path, tempo: float) -> CapturePlayer:
     try:
         events = read_capture(path.read_bytes())
     except OSError as error:
         raise click.ClickException(f"Cannot read {path}: {error.strerror}.") from error
     if not events:
         raise click.ClickException(f"{path} holds no UART capture; naze-bridge run --record-uart FILE makes one.")
-    asyncio.run(_play(CapturePlayer(events, tempo), path, link))
+    return CapturePlayer(events, tempo)
 
 
 async def _play(player: CapturePlayer, path: Path, link: Path) -> None:
