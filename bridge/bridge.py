@@ -324,7 +324,7 @@ class Bridge:
         return system in (0, self._config.sysid) and component in (0, self._config.compid)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
-        around = Surroundings(self._is_armed, self._config.takeoff_max_m)
+        around = Surroundings(self._is_armed, self._home, self._vehicle.home, self._config.takeoff_max_m)
         dialect = None if controller is None else dialect_of(controller, around)
         self.desk.controller_changed(controller, dialect)
         self._downloads.forget_all()
@@ -354,6 +354,10 @@ class Bridge:
 
     def _is_armed(self) -> bool | None:
         return self.session.vehicle.armed
+
+    def _home(self) -> tuple[int, int] | None:
+        home = self.session.vehicle.home
+        return None if home is None else (home.lat_e7, home.lon_e7)
 
     def _banner(self) -> str:
         controller = self.session.controller

@@ -6,17 +6,24 @@ from dataclasses import dataclass
 from bridge.flight_controller import FlightController, Kind
 from bridge.harakiri import HarakiriMissions
 from bridge.harakiri_mavlink import HarakiriMavlinkMissions
+from bridge.inav import InavMissions
 from bridge.mission_dialect import AnyDialect
+from bridge.multiwii_nav import MultiwiiMissions
+from bridge.nav_missions import NavCraft
+from bridge.nav_rules import inav_profile, multiwii_profile
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
     """What a dialect may need besides the flight controller.
 
-    is_armed: None while it is not known. takeoff_max_m: the setting.
+    is_armed: None while it is not known. home: where the flight controller says that home is, position: the same, or
+    where it stands; degrees * 1e7. takeoff_max_m: the setting.
     """
 
     is_armed: Callable[[], bool | None]
+    home: Callable[[], tuple[int, int] | None]
+    position: Callable[[], tuple[int, int] | None]
     takeoff_max_m: int
 
 
@@ -29,9 +36,24 @@ def _harakiri_mavlink(_controller: FlightController, around: Surroundings) -> An
     return HarakiriMavlinkMissions(around.is_armed, around.takeoff_max_m)
 
 
+def _inav(controller: FlightController, around: Surroundings) -> AnyDialect:
+    return InavMissions(inav_profile(controller.capacity), _craft(controller, around))
+
+
+def _multiwii(controller: FlightController, around: Surroundings) -> AnyDialect:
+    return MultiwiiMissions(multiwii_profile(controller.capacity), _craft(controller, around))
+
+
+def _craft(controller: FlightController, around: Surroundings) -> NavCraft:
+    assert controller.arm_bit is not None
+    return NavCraft(1 << controller.arm_bit, around.is_armed, around.home, around.position)
+
+
 _DIALECTS: Mapping[Kind, Callable[[FlightController, Surroundings], AnyDialect]] = {
     Kind.HARAKIRI_MISSIONS: _harakiri,
     Kind.HARAKIRI_MAVLINK: _harakiri_mavlink,
+    Kind.INAV: _inav,
+    Kind.MULTIWII_NAV: _multiwii,
 }
 
 

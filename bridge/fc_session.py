@@ -272,7 +272,8 @@ class FcSession:
         self._enter(State.MSP)
         if controller.info is not None:
             self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
-        self.polls.begin(found.speed)
+        self.link.any_byte = controller.navigates
+        self.polls.begin(found.speed, navigates=controller.navigates)
         self.vehicle.mixer = controller.mixer
         self._welcome(controller, found, now)
 

@@ -131,6 +131,14 @@ class HarakiriMissions:
         """Return what a ground station reads of a list."""
         return tuple(items_from_records(records, sent_as))
 
+    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+        """Return the same: home is stored with the list."""
+        return items
+
+    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
+        """Return the same number: each record is an item, home too."""
+        return number if number < len(records) else 0
+
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
         """Set gps_wp_radius, 0..2000 cm; INFO tells what came of it, and not a late answer to another value."""
         frame = ext.encode_radius(wp_radius_cm)

@@ -116,6 +116,14 @@ class HarakiriMavlinkMissions:
         """Return what a ground station reads of a list."""
         return tuple(items_from_records(records, sent_as))
 
+    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+        """Return the same: home is stored with the list."""
+        return items
+
+    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
+        """Return the same number: each record is an item, home too."""
+        return number if number < len(records) else 0
+
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
         """Harakiri knows the parameter by another name and scale; it is not set from here."""
         yield from pause(0.0)

@@ -4,12 +4,12 @@ Mission Planner over UDP (bridge.mission_upload, bridge.mission_download) and th
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bridge.flight_controller import FlightController, Kind
 from bridge.mission_check import MissionRules
-from bridge.mission_dialect import AnyDialect, PushFailure, StoreReport, StoreState
+from bridge.mission_dialect import LIST_IS_GONE, AnyDialect, PushFailure, StoreReport, StoreState
 from bridge.mission_log import ArrivedMission, Conclusion, Outcome
 from bridge.procedure import LinkLost, Procedure, Stopped, conclude, pause, recall, save
 from bridge.verdict import Result
@@ -84,6 +84,12 @@ class MissionDesk:
         """How the present flight controller stores missions; None if it does not."""
         return self._dialect
 
+    def seq_of(self, number: int) -> int:
+        """Return the number of the item that the flight controller's record `number` is shown as; 0: none is known."""
+        if self._dialect is None or self.held is None:
+            return 0
+        return self._dialect.seq_of(self.held.records, number)
+
     def acquire(self, owner: object) -> Refusal | None:
         """Take the lock of the one transfer, or say why not."""
         if self._closed:
@@ -154,6 +160,8 @@ class MissionDesk:
             return (yield from self._conclude(number, Outcome.FAILED, self._refusal.ack, self._refusal.text))
         result = yield from dialect.push(verdict.records, progress)
         if result.failure is not None:
+            if result.failure in LIST_IS_GONE:
+                self.held = None
             return (
                 yield from self._conclude(
                     number,
@@ -190,7 +198,7 @@ class MissionDesk:
             if report is None:
                 return _NO_LINK
             if self.held is not None and self.held.identity == report.stored:
-                return self.held
+                return self._refreshed(dialect, self.held)
             if report.state is StoreState.ARMED and report.stored is None:
                 return ARMED
             records = yield from dialect.pull()
@@ -202,13 +210,16 @@ class MissionDesk:
             return _NO_LINK
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:
-            return self.held
+            return self._refreshed(dialect, self.held)
         sent_as: Mapping[int, int] = yield from recall(identity)
         held = HeldMission(identity, records, dialect.items(records, sent_as))
         if dialect is self._dialect:
             # The store may take its time, and another flight controller be there by then.
             self.held = held
         return held
+
+    def _refreshed(self, dialect: AnyDialect, held: HeldMission) -> HeldMission:
+        return replace(held, items=dialect.refreshed(held.items))
 
     def _conclude(self, number: int | None, outcome: Outcome, ack: MissionResult, text: str) -> Procedure[Delivery]:
         if number is not None and not (yield from conclude(number, Conclusion(outcome, text))):

@@ -34,7 +34,7 @@ class StoreReport:
 
 
 class PushFailure(Enum):
-    """Why a list did not get there. The flight controller's old list is whole in every case but UNCERTAIN."""
+    """Why a list did not get there. The flight controller's old list is whole but in the cases of LIST_IS_GONE."""
 
     ARMED = "the flight controller is armed: disarm first"
     BUSY = "the flight controller is busy writing its configuration: try again"
@@ -45,6 +45,15 @@ class PushFailure(Enum):
     NO_ANSWER = "the flight controller does not answer; its old mission is kept"
     STOPPED = "naze-bridge was stopped meanwhile; the old mission is kept"
     UNCERTAIN = "the flight controller fell silent while writing: read the mission back"
+    INCOMPLETE = "broken off: the flight controller holds no mission to fly now; write it again"
+    ARMED_MEANWHILE = "armed meanwhile: the flight controller holds no mission to fly now; disarm, write it again"
+    NOT_SAVED = "the mission is there but not saved: it is lost at power-off; write it again"
+
+
+#: What was there before is there no more, or may be.
+LIST_IS_GONE = frozenset(
+    (PushFailure.UNCERTAIN, PushFailure.INCOMPLETE, PushFailure.ARMED_MEANWHILE, PushFailure.NOT_SAVED)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +93,12 @@ class MissionDialect(Protocol[RecordT]):
 
     def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
         """Set gps_wp_radius, 0..2000 cm; the value in force, None if there was no answer."""
+
+    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+        """Return items that were read earlier with what changes by itself: home, where it is no part of the list."""
+
+    def seq_of(self, records: Sequence[RecordT], number: int) -> int:
+        """Return the number of the item that record `number` (as NAV_STATUS counts, from 1) is shown as; 0: none."""
 
 
 #: Whatever the present flight controller is.

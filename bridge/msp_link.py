@@ -32,6 +32,9 @@ _FIRST_GUESS_S = 0.03
 #: After so long without a byte nothing more comes of a frame that has begun.
 _LINE_SILENCE_S = 0.05
 _ANY_SIZE = 1 << 16
+#: An INAV that lost a frame's header reads the rest as typed by hand: a '#' and then silence for 100 ms opens its
+#: command line, an 'R' its boot loader. So after such a frame the line is not left silent: a harmless question follows.
+_FOLLOW_UP_S = 0.04
 
 #: Of a Harakiri, which does not know the second one; others are not so short of room.
 _REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: FRAME_OVERHEAD}
@@ -80,6 +83,10 @@ class MspLink:
         self.last_heard_at = now
         #: Set from the flight controller's INFO; 0: its parser never gives up on a cut frame.
         self.receiver_timeout_s = 0.0
+        #: Set where a frame may hold what a Harakiri must not be sent even in frames.
+        self.any_byte = False
+        self._follow_up_at: float | None = None
+        self._risky: int | None = None  # the command of the frame that is followed up
         self.requests_lost = 0
 
     @property
@@ -119,7 +126,7 @@ class MspLink:
 
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""
-        if not is_clean(message.frame):
+        if not (self.any_byte or is_clean(message.frame)):
             # By construction this cannot happen (protocols.msp.hazards); if it did, silence is the safe answer.
             raise AssertionError(f"frame with a hazard byte: {message.frame.hex()}")
         self._waiting.append(message)
@@ -137,6 +144,8 @@ class MspLink:
 
     def tick(self, now: float) -> list[MspFrame]:
         """Give up on requests whose time is over; return replies that were hidden behind a false header."""
+        if self._follow_up_at is not None and now >= self._follow_up_at:
+            self._ask(_QUESTION, now)
         if not any(now >= sent.deadline for sent in self._sent):
             return []
         hidden = self._parser.reset() if now >= self._last_byte_at + _LINE_SILENCE_S else []
@@ -163,7 +172,10 @@ class MspLink:
 
     def next_deadline(self) -> float | None:
         """Return when `tick` has something to do."""
-        return min((sent.deadline for sent in self._sent), default=None)
+        deadlines = [sent.deadline for sent in self._sent]
+        if self._follow_up_at is not None:
+            deadlines.append(self._follow_up_at)
+        return min(deadlines, default=None)
 
     def _timeout_s(self) -> float:
         floor = max(MIN_TIMEOUT_S, self.receiver_timeout_s + 0.02 if self.receiver_timeout_s else 0.0)
@@ -200,6 +212,9 @@ class MspLink:
 
     def _ask(self, message: Send, now: float) -> None:
         self._write(message.frame, now)
+        if self.any_byte and not is_clean(message.frame):
+            self._risky = message.command
+            self._follow_up_at = self._line_free_at + _FOLLOW_UP_S
         patience = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
         reply_time = (self.outstanding_bytes + message.reply_size) * self._byte_s
         deadline = self._line_free_at + reply_time + patience
@@ -219,6 +234,7 @@ class MspLink:
 
     def _write(self, data: bytes, now: float) -> None:
         self._line_free_at = max(self._line_free_at, now) + len(data) * self._byte_s
+        self._follow_up_at = None
         self._output.append(data)
 
     def _take(self, frames: list[MspFrame], now: float) -> list[MspFrame]:
@@ -236,6 +252,8 @@ class MspLink:
         alike = [sent for sent in self._sent if sent.command == reply.command]
         if not alike:
             return
+        if reply.command == self._risky:
+            self._follow_up_at = None
         oldest = alike[0]
         earlier = self._sent.index(oldest)
         self.requests_lost += sum(sent.awaited for sent in self._sent[:earlier])

@@ -14,6 +14,7 @@ from bridge.flight_mode import FlightMode
 from bridge.ground import Ground
 from bridge.message_rates import MessageRates
 from bridge.mission_desk import MissionDesk
+from bridge.mission_progress import MissionProgress
 from bridge.station import Peer, Station
 from bridge.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY, Row
 from protocols.mavlink.codec import pack
@@ -44,6 +45,7 @@ class OwnVehicle:
         self._started_at = self._now = now
         self._tick_due = now
         self._rates = MessageRates(_DEFAULTS)
+        self._progress = MissionProgress()
         self._announced_home: tuple[int, int] | None = None
         self._also_wanted: Mapping[Msp, float] = {}
         self._announced: tuple[bool | None, FlightMode | None] | None = None
@@ -82,6 +84,8 @@ class OwnVehicle:
                 message = make(vehicle, self._boot_ms())
                 if message is not None:
                     self._ground.multicast(pack(message), peers)
+        if command == Msp.NAV_STATUS:
+            self._follow_mission()
         if command == Msp.STATUS and self._announced != (vehicle.armed, vehicle.mode):
             self._heartbeat()
 
@@ -159,7 +163,16 @@ class OwnVehicle:
 
     def _mission_current(self) -> Message:
         held = self._desk.held
-        return vehicle_messages.mission_current(0 if held is None else held.identity.count)
+        seq = self._desk.seq_of(self._progress.number)
+        return vehicle_messages.mission_current(0 if held is None else len(held.items), seq, self._progress.progress)
+
+    def _follow_mission(self) -> None:
+        """Tell at once what was reached; where it flies to next comes every second."""
+        nav = self._session.vehicle.nav
+        reached = None if nav is None else self._progress.take(nav)
+        seq = self._desk.seq_of(reached or 0)
+        if seq:
+            self._ground.broadcast(vehicle_messages.mission_item_reached(seq))
 
     def _announce_home(self) -> None:
         """HOME_POSITION whenever it is another one; who asks gets it at any time."""

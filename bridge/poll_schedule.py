@@ -65,6 +65,8 @@ POLLS = (
     Poll(Msp.WP, request(Msp.WP, b"\0"), 21, 2.0),
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
 )
+#: Asked where a mission is flown.
+NAV_POLL = Poll(Msp.NAV_STATUS, request(Msp.NAV_STATUS), 7, 0.5)
 
 
 @dataclass(slots=True)
@@ -126,13 +128,14 @@ class PollSchedule:
         """What losses leave of the rates, 0.1..1."""
         return self._quality
 
-    def begin(self, baud: int | None) -> None:
+    def begin(self, baud: int | None, *, navigates: bool = False) -> None:
         """A flight controller is there: ask it everything once, then as often as wanted."""
         self._budget = (baud or _ASSUMED_BAUD) / 10 * _LINE_SHARE
         self._quality = 1.0
         self._lost_before = 0
+        polls = (*POLLS, NAV_POLL) if navigates else POLLS
         self._slots = {
-            poll.command: _Slot(poll, frozenset((poll.command,)), poll.reply_payload + FRAME_OVERHEAD) for poll in POLLS
+            poll.command: _Slot(poll, frozenset((poll.command,)), poll.reply_payload + FRAME_OVERHEAD) for poll in polls
         }
         self._fit()
 

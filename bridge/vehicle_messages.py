@@ -6,6 +6,7 @@ What is not known is MAVLink's "unknown"; a message whose fields have no such va
 import math
 
 from bridge.flight_mode import FlightMode
+from bridge.mission_progress import Progress
 from bridge.vehicle_state import VehicleState
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
@@ -60,7 +61,7 @@ _CAPABILITIES = (
     | messages.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | messages.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
-_NO_MISSION, _NOT_STARTED = 1, 2
+_NO_MISSION = 1
 _NO_TOTAL = 0xFFFF
 _VERSION = (0, 1, 0, 0)
 _UNKNOWN_U16 = 0xFFFF
@@ -106,11 +107,16 @@ def autopilot_version() -> Message:
     )
 
 
-def mission_current(count: int) -> Message:
-    """MISSION_CURRENT: `count` records are held (home included); nothing flies them from here."""
+def mission_current(count: int, seq: int = 0, progress: Progress = Progress.NOT_STARTED) -> Message:
+    """MISSION_CURRENT: `count` items are held (home included), item `seq` is flown to."""
     if not count:
         return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _NO_MISSION, 0)
-    return messages.MAVLink_mission_current_message(0, count - 1, _NOT_STARTED, 0)
+    return messages.MAVLink_mission_current_message(seq, count - 1, progress.value, 0)
+
+
+def mission_item_reached(seq: int) -> Message:
+    """MISSION_ITEM_REACHED."""
+    return messages.MAVLink_mission_item_reached_message(seq)
 
 
 def attitude(vehicle: VehicleState, boot_ms: int) -> Message | None:

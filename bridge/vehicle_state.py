@@ -8,6 +8,7 @@ from bridge.flight_mode import FlightMode, flight_mode
 from bridge.ground_track import GroundTrack, Velocity
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
+from protocols.msp.nav import NavStatus, decode_nav_status
 from protocols.msp.telemetry import (
     Altitude,
     Analog,
@@ -58,6 +59,7 @@ class VehicleState:
     imu: RawImu | None = None
     home: HomePoint | None = None
     home_vector: HomeVector | None = None
+    nav: NavStatus | None = None
     #: A receiver that was never heard to have any strength is not measured.
     measures_rssi: bool = False
     _track: GroundTrack = field(default_factory=GroundTrack)
@@ -85,6 +87,8 @@ class VehicleState:
                 self.imu = decode_raw_imu(payload) or self.imu
             case Msp.COMP_GPS:
                 self.home_vector = decode_comp_gps(payload) or self.home_vector
+            case Msp.NAV_STATUS:
+                self.nav = decode_nav_status(payload) or self.nav
             case Msp.WP:
                 home = decode_home(payload)
                 if home is not None:

@@ -4,12 +4,19 @@ import struct
 
 _FLOAT = struct.Struct("<f")
 _BITS = struct.Struct("<i")
+#: Beyond, packing fails.
+_LARGEST = 3e38
 
 
 def single(value: float) -> float:
     """Return the nearest single-precision number."""
     (rounded,) = _FLOAT.unpack(_FLOAT.pack(value))
     return float(rounded)
+
+
+def is_single(value: float, shown: float) -> bool:
+    """Tell whether `shown` is what single precision makes of `value`, so that a MISSION_ITEM cannot tell them apart."""
+    return value == shown or (abs(value) < _LARGEST and single(value) == single(shown))
 
 
 def neighbours(value: float) -> tuple[float, float, float]:

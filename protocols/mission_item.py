@@ -16,6 +16,9 @@ class Command(IntEnum):
     NAV_LAND = 21
     NAV_TAKEOFF = 22
     NAV_ROI = 80
+    CONDITION_YAW = 115
+    DO_JUMP = 177
+    DO_CHANGE_SPEED = 178
     DO_SET_ROI_LOCATION = 195
     DO_SET_ROI_NONE = 197
     DO_SET_ROI = 201

@@ -19,6 +19,8 @@ class Msp(IntEnum):
     ANALOG = 110
     BOXNAMES = 116
     WP = 118
+    BOXIDS = 119
+    NAV_STATUS = 121
 
 
 class MspAction(IntEnum):

@@ -17,6 +17,8 @@ _ALTITUDE = struct.Struct("<ih")
 _ANALOG = struct.Struct("<BHH")
 _AMPERAGE = struct.Struct("<h")
 _WP = struct.Struct("<Bii")
+_PLACE = struct.Struct("<ii")
+_NAV_WP_SIZE = 21
 _MIN_CHANNELS, _MAX_CHANNELS = 4, 18
 
 
@@ -192,10 +194,11 @@ def decode_analog(payload: bytes) -> Analog | None:
 
 
 def decode_home(payload: bytes) -> HomePoint | None:
-    """Read MSP_WP number 0."""
+    """Read MSP_WP number 0. In the 21 bytes of INAV and MultiWii NAV an action stands behind the number."""
     if len(payload) < _WP.size or payload[0] != 0:
         return None
-    return HomePoint(*_WP.unpack_from(payload)[1:])
+    has_action = len(payload) >= _NAV_WP_SIZE
+    return HomePoint(*_PLACE.unpack_from(payload, 2 if has_action else 1))
 
 
 def decode_box_names(payload: bytes) -> tuple[str, ...]:

@@ -1,0 +1,60 @@
+"""INAV: the list is in its memory until SAVE; what is not whole cannot be flown (docs/inav.md)."""
+
+from contextlib import suppress
+
+from bridge.mission_dialect import PushFailure
+from bridge.nav_missions import NOTHING, Failed, NavMissions
+from bridge.procedure import LinkLost, Procedure, ask
+from protocols.msp.frame import Direction, request
+from protocols.msp.nav import INFO_SIZE, LOAD_REQUEST, SAVE_REQUEST, Nav, NavInfo, NavRecord, decode_info
+
+
+class InavMissions(NavMissions):
+    """The mission store of one INAV. Record 1 wipes what is there, and no list is valid before its last record."""
+
+    def pull(self) -> Procedure[tuple[NavRecord, ...] | None]:
+        """Read the list that is there. One that is not whole is none; so is the single RTH of a cleared one."""
+        info = yield from self._info()
+        if info is None:
+            return None
+        records: list[NavRecord] = []
+        for number in range(1, info.count + 1 if info.is_valid else 1):
+            record = yield from self.read(number)
+            if record is None:
+                return None
+            records.append(record)
+        self._known = () if tuple(records) == NOTHING else tuple(records)
+        return self._known
+
+    def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
+        return list(enumerate(wanted, 1))
+
+    def _prove(self, count: int) -> Procedure[None]:
+        info = yield from self._info()
+        if info is None:
+            raise Failed(PushFailure.NO_ANSWER)
+        if not info.is_valid or info.count != count:
+            raise Failed(PushFailure.REFUSED, is_final=False)
+
+    def _keep(self) -> Procedure[None]:
+        """SAVE, and look again: the flight controller stands still meanwhile, and may have restarted."""
+        before = yield from self._info()
+        reply = yield from ask(SAVE_REQUEST, Nav.SAVE, 0, tries=2, exclusive=True)
+        after = yield from self._info()
+        if after is None or after != before:
+            raise Failed(PushFailure.UNCERTAIN)
+        last = yield from self.read(after.count)
+        if reply is None or reply.direction is Direction.ERROR or last is None:
+            raise Failed(PushFailure.NOT_SAVED)
+
+    def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
+        """Have it LOAD what was saved last; that is the old list, unless somebody else wrote one and did not save it."""
+        with suppress(LinkLost):
+            yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
+            info = yield from self._info()
+            return bool(before) and info is not None and info.is_valid and info.count == len(before or ())
+        return False
+
+    def _info(self) -> Procedure[NavInfo | None]:
+        reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE)
+        return None if reply is None else decode_info(reply.payload)

@@ -1,0 +1,37 @@
+"""MultiWii 2.4 NAV: each record goes to EEPROM at once, the list ends with the first that says so (docs/inav.md)."""
+
+from bridge.nav_missions import NOTHING, NavMissions
+from bridge.procedure import Procedure
+from protocols.msp.nav import LAST, NavRecord
+
+#: Flags of what is no record: damaged in EEPROM, or not told because it navigates.
+_NO_RECORD = (0xFE, 0xFF)
+
+
+class MultiwiiMissions(NavMissions):
+    """The mission store of one MultiWii NAV."""
+
+    def pull(self) -> Procedure[tuple[NavRecord, ...] | None]:
+        """Read up to the last record. A list without one is none; so is the single RTH of a cleared one."""
+        records: list[NavRecord] = []
+        known: tuple[NavRecord, ...] = ()
+        for number in range(1, self._profile.capacity + 1):
+            record = yield from self.read(number)
+            if record is None:
+                return None
+            if record.flag in _NO_RECORD:
+                break
+            records.append(record)
+            if record.flag == LAST:
+                known = () if tuple(records) == NOTHING else tuple(records)
+                break
+        self._known = known
+        return known
+
+    def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
+        """Write a single RTH first and the true record 1 last: what is cut off in between just flies home."""
+        first, *rest = enumerate(wanted, 1)
+        return [(1, NOTHING[0]), *rest, first] if rest else [first]
+
+    def _keep(self) -> Procedure[None]:
+        yield from ()

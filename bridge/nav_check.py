@@ -1,0 +1,287 @@
+"""The rules for a mission list on INAV and MultiWii NAV (docs/inav.md): what a list becomes there, and why."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from bridge.finding import DROPPED, Rejection, reject
+from bridge.mission_check import (
+    SEA_LEVEL_FRAMES,
+    TERRAIN_FRAMES,
+    ListCheck,
+    given,
+    missing_coordinate,
+    refuse_frame,
+    refuse_position,
+)
+from bridge.nav_items import AS_SET, GROUND_SPEED, home_item, items_from_records
+from bridge.nav_jumps import Jumps
+from bridge.nav_rules import (
+    HEADING,
+    LANDS,
+    LEAST_SPEED_CMS,
+    NAV_RULES,
+    REPEATS,
+    ROI_COMMANDS,
+    UNUSED,
+    Height,
+    NavProfile,
+    NavRule,
+    Whole,
+)
+from bridge.verdict import Result, Verdict
+from protocols.float32 import is_single
+from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord
+
+#: So high a single-precision number still holds a centimetre.
+_MAX_HEIGHT_CM = 3_276_700
+_MAX_SPEED_CMS = 32767
+#: DO_CHANGE_SPEED, param3: none, no change, as set.
+_NO_THROTTLE = (0, -1, -2)
+
+
+@dataclass(frozen=True, slots=True)
+class NavRules:
+    """The rules of one flight controller."""
+
+    profile: NavProfile
+
+    @property
+    def max_items(self) -> int:
+        """The longest list that may fit, home included."""
+        return self.profile.max_items
+
+    def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "NavCheck":
+        """Begin a list."""
+        return NavCheck(self.profile, count, fallback_home)
+
+
+class NavCheck(ListCheck):
+    """The check of one list.
+
+    Home (item 0) is no record: these flight controllers take their own where they arm. It must be a WAYPOINT, as with
+    every list; without coordinates it is shown at `fallback_home`.
+    """
+
+    def __init__(self, profile: NavProfile, count: int, fallback_home: tuple[int, int] | None = None) -> None:
+        super().__init__(count)
+        self._profile = profile
+        self._home = home_item(fallback_home)
+        self._records: list[NavRecord] = []
+        self._jumps = Jumps(back_only=profile.jumps_back_only)
+        self._sent_as: dict[int, int] = {}
+        self._speed_cms = 0
+        self._speed_unused: MissionItem | None = None  # the last change of speed, until a leg is flown with it
+        self._special: dict[int, Callable[[MissionItem], Rejection | None]] = {
+            Command.CONDITION_YAW: self._take_heading,
+            Command.DO_SET_ROI_NONE: self._take_roi_none,
+            Command.DO_JUMP: self._take_jump,
+            Command.DO_CHANGE_SPEED: self._take_speed,
+        }
+
+    def _judge(self, item: MissionItem) -> Rejection | None:
+        rule = NAV_RULES.get(item.command)
+        if rejection := refuse_frame(item, needs_position=rule is not None and rule.position):
+            return rejection
+        self._jumps.places.append(len(self._records))
+        if item.seq == 0:
+            return self._take_home(item)
+        if rule is not None:
+            rejection = self._take(item, rule)
+        elif special := self._special.get(item.command):
+            rejection = special(item)
+        else:
+            takes_off = item.command == Command.NAV_TAKEOFF
+            why = "it does not take off by itself" if takes_off else f"command {item.command} is not supported"
+            rejection = self._drop(item, "command", item.command, why)
+        if rejection is None and len(self._records) > self._profile.capacity:
+            why = f"more than the {self._profile.capacity} that fit"
+            return reject(MissionResult.NO_SPACE, item.seq, "count", self._count, why)
+        return rejection
+
+    def _take_home(self, home: MissionItem) -> Rejection | None:
+        if home.command != Command.NAV_WAYPOINT:
+            return reject(MissionResult.INVALID, 0, "command", home.command, "must be a WAYPOINT")
+        if home.lat_e7 and home.lon_e7 and refuse_position(home) is None:
+            alt_m = home.alt_m if math.isfinite(home.alt_m) else 0.0
+            self._home = home_item((home.lat_e7, home.lon_e7), alt_m)
+        return None
+
+    def _take(self, item: MissionItem, rule: NavRule) -> Rejection | None:
+        """Keep one item as a record; every value that does not survive becomes a finding."""
+        if rule.position and (rejection := refuse_position(item)):
+            return rejection
+        if rule.height is not Height.UNUSED and not math.isfinite(item.alt_m):
+            return self._drop(item, "alt_m", given(item.alt_m), "height is not a number")
+        if item.command == Command.NAV_LAND and missing_coordinate(item):
+            if self._records and self._records[-1].action == NavAction.RTH:
+                self._records[-1] = replace(self._records[-1], p1=LANDS.high)
+                return self._drop(item, "command", item.command, "the RTL before it lands now")
+            item = self._landing_where_it_is(item)
+        if rule.position and (missing := missing_coordinate(item)):
+            return self._drop(item, *missing, "it has no coordinates")
+        if item.command == Command.NAV_LAND and _centimetres(item.alt_m) <= 0:
+            item = self._landing_from_where_it_is(item)
+        p1 = self._fit(item, "p1", item.p1, rule.p1)
+        for name in ("p2", "p3", "p4"):
+            self._fit(item, name, getattr(item, name), UNUSED)
+        if not rule.position:
+            self._no_position(item, rule.name)
+        self._keep(item, self._record(item, rule, p1))
+        return None
+
+    def _record(self, item: MissionItem, rule: NavRule, p1: int) -> NavRecord:
+        place = (item.lat_e7 or 0, item.lon_e7 or 0)
+        alt_cm, datum = self._height(item, rule)
+        speed = self._speed_cms
+        match item.command:
+            case Command.NAV_RETURN_TO_LAUNCH:
+                return NavRecord(NavAction.RTH, 0, 0, alt_cm, p1)
+            case Command.NAV_LAND:
+                return NavRecord(NavAction.LAND, *place, alt_cm, speed, 0, datum)
+            case Command.NAV_LOITER_UNLIM:
+                action, p1 = self._profile.endless_hold
+                return NavRecord(action, *place, alt_cm, p1, speed, datum)
+            case Command.NAV_LOITER_TIME:
+                return NavRecord(NavAction.POSHOLD_TIME, *place, alt_cm, p1, speed, datum)
+            case Command.NAV_WAYPOINT if p1:
+                self._sent_as[len(self._records)] = int(Command.NAV_WAYPOINT)
+                return NavRecord(NavAction.POSHOLD_TIME, *place, alt_cm, p1, speed, datum)
+            case command if command in ROI_COMMANDS:
+                self._sent_as[len(self._records)] = command
+                return NavRecord(NavAction.SET_POI, *place, alt_cm, 0, 0, datum)
+        if item.command == Command.NAV_LOITER_TURNS:
+            self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "it flies no circles")
+        return NavRecord(NavAction.WAYPOINT, *place, alt_cm, speed, 0, datum)
+
+    def _landing_where_it_is(self, item: MissionItem) -> MissionItem:
+        """Give a LAND without coordinates those of the leg before."""
+        before = self._leg_before()
+        if before is None:
+            return item
+        self._note(item, "lat_e7", item.lat_e7, before.lat_e7, "not given, where it is")
+        self._note(item, "lon_e7", item.lon_e7, before.lon_e7, "not given, where it is")
+        return replace(item, lat_e7=before.lat_e7, lon_e7=before.lon_e7)
+
+    def _landing_from_where_it_is(self, item: MissionItem) -> MissionItem:
+        """Have it fly to the landing place as high as before: INAV goes there at the height that LAND has."""
+        before = self._leg_before()
+        if before is None or before.alt_cm <= 0:
+            return item
+        self._note(item, "alt_m", item.alt_m, before.alt_cm / 100, "flown there, then landed")
+        frame = Frame.GLOBAL if before.p3 & 1 else Frame.GLOBAL_RELATIVE_ALT
+        return replace(item, alt_m=before.alt_cm / 100, frame=int(frame))
+
+    def _leg_before(self) -> NavRecord | None:
+        return next((record for record in reversed(self._records) if record.action in LEGS), None)
+
+    def _take_heading(self, item: MissionItem) -> Rejection | None:
+        """CONDITION_YAW becomes SET_HEAD: an absolute heading, turned to at the flight controller's own rate."""
+        if math.isfinite(item.p4) and item.p4 != 0:
+            return self._drop(item, "p4", item.p4, "it turns to no relative heading")
+        if not math.isfinite(item.p1):
+            return self._drop(item, "p1", given(item.p1), "no heading is given")
+        heading = self._fit(item, "p1", item.p1, HEADING)
+        self._unused(item, "CONDITION_YAW", "p2", "p3", "p4")
+        self._keep(item, NavRecord(NavAction.SET_HEAD, p1=heading))
+        return None
+
+    def _take_roi_none(self, item: MissionItem) -> Rejection | None:
+        """DO_SET_ROI_NONE becomes SET_HEAD -1, which ends a region of interest and a heading alike."""
+        self._unused(item, "ROI_NONE", "p1", "p2", "p3", "p4")
+        self._keep(item, NavRecord(NavAction.SET_HEAD, p1=-1))
+        return None
+
+    def _take_jump(self, item: MissionItem) -> Rejection | None:
+        """Keep a place for the record: where it goes is known when all items are there."""
+        if not (math.isfinite(item.p1) and item.p1 == math.trunc(item.p1) and 1 <= item.p1 < self._count):
+            why = "there is no such item to jump to"
+            return reject(MissionResult.INVALID_PARAM1, item.seq, "p1", given(item.p1), why)
+        repeats = self._fit(item, "p2", item.p2, REPEATS)
+        self._unused(item, "JUMP", "p3", "p4")
+        self._jumps.wanted.append((len(self._records), item))
+        self._keep(item, NavRecord(NavAction.JUMP, p2=repeats))
+        return None
+
+    def _take_speed(self, item: MissionItem) -> Rejection | None:
+        """DO_CHANGE_SPEED is the speed of the legs that follow."""
+        if not self._profile.leg_speed:
+            return self._drop(item, "command", item.command, "its legs have no speeds")
+        if math.isfinite(item.p1) and item.p1 not in (0, GROUND_SPEED):
+            return self._drop(item, "p1", item.p1, "speed over ground only")
+        if not math.isfinite(item.p2) or (item.p2 < 0 and item.p2 != AS_SET):
+            return self._drop(item, "p2", given(item.p2), "it changes nothing")
+        if item.p1 != GROUND_SPEED:
+            self._note(item, "p1", given(item.p1), GROUND_SPEED, "speed over ground")
+        self._speed_cms = 0
+        if item.p2 != AS_SET:
+            self._speed_cms = min(max(round(min(item.p2, _MAX_SPEED_CMS) * 100), LEAST_SPEED_CMS), _MAX_SPEED_CMS)
+            if not is_single(item.p2, self._speed_cms / 100):
+                self._note(item, "p2", item.p2, self._speed_cms / 100, "0.5..327.67 m/s in cm/s")
+        self._unused(item, "CHANGE_SPEED", *(() if item.p3 in _NO_THROTTLE else ("p3",)), "p4")
+        self._speed_unused = item
+        return None
+
+    def _refuse_kept_list(self) -> Rejection | None:
+        if not any(record.action in LEGS for record in self._records):
+            return reject(MissionResult.INVALID, None, "count", self._count, "no waypoint is left to fly to")
+        if rejection := self._jumps.aim(self._records, self._note):
+            return rejection
+        if self._speed_unused is not None:
+            self._drop(self._speed_unused, "command", self._speed_unused.command, "no leg follows")
+        return None
+
+    def _conclude(self) -> Verdict[NavRecord]:
+        records = (*self._records[:-1], replace(self._records[-1], flag=LAST))
+        items = items_from_records(records, self._home, self._sent_as)
+        findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
+        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as)
+
+    def _keep(self, item: MissionItem, record: NavRecord) -> None:
+        if record.action in LEGS:
+            self._speed_unused = None
+        self._records.append(record)
+
+    def _drop(self, item: MissionItem, name: str, was: float | None, why: str) -> Rejection | None:
+        """Leave one item out, which rejects nothing."""
+        self._jumps.dropped.add(item.seq)
+        self._note(item, name, was, DROPPED, why)
+        return None
+
+    def _height(self, item: MissionItem, rule: NavRule) -> tuple[int, int]:
+        """Return centimetres, and the bit that says what they count from."""
+        if rule.height is Height.RTH and not self._profile.rth_height:
+            self._fit(item, "alt_m", item.alt_m, UNUSED)
+            return 0, 0
+        alt_cm = _centimetres(item.alt_m)
+        if not is_single(item.alt_m, alt_cm / 100):
+            self._note(item, "alt_m", item.alt_m, alt_cm / 100, "whole cm, at most 32767 m")
+        above_sea = item.frame in SEA_LEVEL_FRAMES
+        if rule.height is Height.RTH or (above_sea and self._profile.sea_level):
+            return alt_cm, int(above_sea and self._profile.sea_level and rule.height is not Height.RTH)
+        if above_sea or item.frame in TERRAIN_FRAMES:
+            self._note(item, "frame", item.frame, int(Frame.GLOBAL_RELATIVE_ALT), "height taken as relative")
+        return alt_cm, 0
+
+    def _fit(self, item: MissionItem, name: str, value: float, allowed: Whole) -> int:
+        stored = allowed.fit(value)
+        if stored != (0 if math.isnan(value) else value):
+            truncated = math.isfinite(value) and stored == math.trunc(value)
+            self._note(item, name, given(value), stored, "whole numbers only" if truncated else allowed.why)
+        return stored
+
+    def _unused(self, item: MissionItem, command: str, *names: str) -> None:
+        """Tell of values that mean nothing here, in `names` and where a place would be."""
+        for name in (*names, "alt_m"):
+            self._fit(item, name, getattr(item, name), UNUSED)
+        self._no_position(item, command)
+
+    def _no_position(self, item: MissionItem, command: str) -> None:
+        for name, value in (("lat_e7", item.lat_e7), ("lon_e7", item.lon_e7)):
+            if value:
+                self._note(item, name, value, 0, f"not used by {command}")
+
+
+def _centimetres(height_m: float) -> int:
+    return round(min(max(height_m * 100, -_MAX_HEIGHT_CM), _MAX_HEIGHT_CM))

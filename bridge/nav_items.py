@@ -1,0 +1,106 @@
+"""Records to items: what an INAV or a MultiWii NAV holds, as a ground station reads it.
+
+A leg's speed is shown as a DO_CHANGE_SPEED before it, so a list may have more items than records, and home (item 0) is
+none of them.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+
+from bridge.nav_rules import ENDLESS_S, LEAST_SPEED_CMS, ROI_COMMANDS
+from protocols.mission_item import Command, Frame, MissionItem
+from protocols.msp.nav import NavAction, NavRecord
+
+_NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
+_UNKNOWN_COMMAND = 0
+#: DO_CHANGE_SPEED: param1 ground speed, param2 "as set on the flight controller".
+GROUND_SPEED, AS_SET = 1, -2
+_HIGHEST_HEADING = 359
+
+
+def home_item(place: tuple[int, int] | None, alt_m: float = 0.0) -> MissionItem:
+    """Return item 0: where home is, if that is known, degrees * 1e7."""
+    lat_e7, lon_e7 = place or (0, 0)
+    return MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, lat_e7, lon_e7, alt_m)
+
+
+def items_from_records(
+    records: Sequence[NavRecord], home: MissionItem, sent_as: Mapping[int, int] = _NONE_KNOWN
+) -> tuple[MissionItem, ...]:
+    """Return the read-back form of a list; `sent_as`: a record's place (from 0) -> the MAV_CMD that it was sent as."""
+    seqs = item_seqs(records)
+    items = [home]
+    speed = 0
+    for place, record in enumerate(records):
+        changed = leg_speed(record, speed)
+        if changed != speed:
+            speed = changed
+            items.append(
+                _item(len(items), Command.DO_CHANGE_SPEED, p1=GROUND_SPEED, p2=speed / 100 if speed else AS_SET)
+            )
+        items.append(_shown(len(items), record, sent_as.get(place), seqs))
+    return tuple(items)
+
+
+def item_seqs(records: Iterable[NavRecord]) -> list[int]:
+    """Return the item's number for each record, in their order."""
+    seqs: list[int] = []
+    speed = seq = 0
+    for record in records:
+        changed = leg_speed(record, speed)
+        seq += 1 if changed == speed else 2
+        speed = changed
+        seqs.append(seq)
+    return seqs
+
+
+def leg_speed(record: NavRecord, before: int) -> int:
+    """Return the speed, cm/s, that holds after this record; 0: as set on the flight controller."""
+    match record.action:
+        case NavAction.WAYPOINT | NavAction.LAND:
+            speed = record.p1
+        case NavAction.POSHOLD_TIME:
+            speed = record.p2
+        case _:
+            return before
+    return speed if speed >= LEAST_SPEED_CMS else 0
+
+
+def _shown(seq: int, record: NavRecord, sent_as: int | None, seqs: Sequence[int]) -> MissionItem:
+    match record.action:
+        case NavAction.WAYPOINT:
+            return _leg(seq, Command.NAV_WAYPOINT, record)
+        case NavAction.POSHOLD_TIME if record.p1 == ENDLESS_S:
+            return _leg(seq, Command.NAV_LOITER_UNLIM, record)
+        case NavAction.POSHOLD_TIME:
+            command = Command.NAV_WAYPOINT if sent_as == Command.NAV_WAYPOINT else Command.NAV_LOITER_TIME
+            return _leg(seq, command, record, p1=record.p1)
+        case NavAction.POSHOLD_UNLIM:
+            return _leg(seq, Command.NAV_LOITER_UNLIM, record)
+        case NavAction.RTH:
+            return _item(seq, Command.NAV_RETURN_TO_LAUNCH, p1=int(record.p1 > 0), alt_m=record.alt_cm / 100)
+        case NavAction.SET_POI:
+            return _leg(seq, sent_as if sent_as in ROI_COMMANDS else Command.NAV_ROI, record)
+        case NavAction.JUMP:
+            target = seqs[record.p1 - 1] if 1 <= record.p1 <= len(seqs) else 0
+            return _item(seq, Command.DO_JUMP, p1=target, p2=record.p2)
+        case NavAction.SET_HEAD if 0 <= record.p1 <= _HIGHEST_HEADING:
+            return _item(seq, Command.CONDITION_YAW, p1=record.p1)
+        case NavAction.SET_HEAD:
+            return _item(seq, Command.DO_SET_ROI_NONE)
+        case NavAction.LAND:
+            return _leg(seq, Command.NAV_LAND, record)
+        case unknown:
+            # No ground station takes MAV_CMD 0 for something that flies, and the rules would drop it.
+            return _item(seq, _UNKNOWN_COMMAND, p1=unknown)
+
+
+def _leg(seq: int, command: int, record: NavRecord, *, p1: int = 0) -> MissionItem:
+    frame = Frame.GLOBAL if record.p3 & 1 else Frame.GLOBAL_RELATIVE_ALT
+    place = (record.lat_e7, record.lon_e7, record.alt_cm / 100)
+    return MissionItem(seq, int(command), int(frame), float(p1), 0.0, 0.0, 0.0, *place)
+
+
+def _item(seq: int, command: int, *, p1: float = 0, p2: float = 0, alt_m: float = 0.0) -> MissionItem:
+    frame = int(Frame.GLOBAL_RELATIVE_ALT)
+    return MissionItem(seq, int(command), frame, float(p1), float(p2), 0.0, 0.0, 0, 0, alt_m)

@@ -1,0 +1,53 @@
+"""Where the JUMPs of a list go, as the flight controller counts: records from 1, without what was dropped or folded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from bridge.finding import Rejection, reject
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.msp.nav import LEGS, NavRecord
+
+#: INAV does not arm with a JUMP to a nearer record (navigation.c, navigationIsBlockingArming).
+_NEAREST = 2
+
+Note = Callable[[MissionItem, str, float | None, float | str | None, str], None]
+
+
+@dataclass(slots=True)
+class Jumps:
+    """What must be known of a list to aim its JUMPs.
+
+    back_only: whether they may only go back. places: of each item, how many records there were when it came. dropped:
+    numbers of items that are left out. wanted: of each JUMP its record's place and the item.
+    """
+
+    back_only: bool
+    places: list[int] = field(default_factory=list)
+    dropped: set[int] = field(default_factory=set)
+    wanted: list[tuple[int, MissionItem]] = field(default_factory=list)
+
+    def aim(self, records: list[NavRecord], note: Note) -> Rejection | None:
+        """Give each JUMP among `records` its target; refuse one with which the flight controller would not fly."""
+        for place, item in self.wanted:
+            wanted = int(item.p1)
+            target = self.places[wanted]
+            fault = self._fault(place, wanted, records)
+            if fault is not None:
+                return reject(MissionResult.INVALID_PARAM1, item.seq, "p1", item.p1, fault)
+            if wanted in self.dropped:
+                goes_to = next(seq for seq in range(wanted, len(self.places)) if seq not in self.dropped)
+                note(item, "p1", wanted, goes_to, f"item {wanted} is dropped")
+            records[place] = replace(records[place], p1=target + 1)
+        return None
+
+    def _fault(self, place: int, wanted: int, records: list[NavRecord]) -> str | None:
+        target = self.places[wanted]
+        if target >= len(records):
+            return f"nothing is kept from item {wanted} on"
+        if records[target].action not in LEGS:
+            return f"item {wanted} is no waypoint"
+        if self.back_only:
+            return None if target < place else "it can only jump back"
+        if place == 0 or abs(target - place) < _NEAREST:
+            return "no jump to the item beside it"
+        return None

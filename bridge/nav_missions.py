@@ -1,0 +1,217 @@
+"""How a list is put on INAV and MultiWii NAV (docs/inav.md): record by record, each read back before the next is sent.
+
+An answer to SET_WP does not mean that anything was stored, so nothing is believed but what is read. Nothing is sent to
+an armed flight controller: STATUS is asked before the first record and before the last one, with which the list becomes
+one that can be flown, and watched in between.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.nav_check import NavRules
+from bridge.nav_items import home_item, item_seqs, items_from_records
+from bridge.nav_rules import NavProfile
+from bridge.procedure import LinkLost, Procedure, Stopped, ask, pause, receive, send
+from protocols.mission_item import MissionItem
+from protocols.msp.commands import Msp
+from protocols.msp.frame import Direction, request
+from protocols.msp.nav import LAST, WP_SIZE, Nav, NavAction, NavRecord, decode_wp, encode_read_wp, encode_set_wp
+from protocols.msp.telemetry import decode_status
+
+#: There is no empty list to write: this is what is there instead.
+NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
+_STATUS_PAYLOAD = 11
+_TRIES = 5
+#: How often one push may begin anew, because something else is read than was written.
+_MAX_BEGINS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class NavCraft:
+    """What a dialect must know of the craft.
+
+    arm_mask: the bit of the box ARM in STATUS. is_armed: as last heard, None while it is not known. home: where it says
+    that home is, and position: the same, or where it stands; degrees * 1e7, None while it is not known.
+    """
+
+    arm_mask: int
+    is_armed: Callable[[], bool | None]
+    home: Callable[[], tuple[int, int] | None]
+    position: Callable[[], tuple[int, int] | None]
+
+
+class Failed(Exception):
+    """An attempt is over; `is_final`: no other would do better."""
+
+    def __init__(self, failure: PushFailure, *, is_final: bool = True) -> None:
+        super().__init__(failure.value)
+        self.failure = failure
+        self.is_final = is_final
+
+
+class NavMissions(ABC):
+    """The mission store of one flight controller."""
+
+    def __init__(self, profile: NavProfile, craft: NavCraft) -> None:
+        self._profile = profile
+        self._craft = craft
+        #: What is on the flight controller, as last read from it; None: something that cannot be flown, or not known.
+        self._known: tuple[NavRecord, ...] | None = None
+
+    @property
+    def wp_radius_cm(self) -> int | None:
+        """It is a setting of its own that is neither asked for nor set from here."""
+        return None
+
+    def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
+        """Set nothing."""
+        yield from pause(0.0)
+        return None
+
+    def report(self) -> Procedure[StoreReport | None]:
+        """Tell whether it would take a list; what it holds is not known without reading it."""
+        armed = yield from self._ask_armed()
+        if armed is None:
+            return None
+        return StoreReport(StoreState.ARMED if armed else StoreState.READY, NavRules(self._profile), None)
+
+    def items(self, records: Sequence[NavRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """Return what a ground station reads of a list; of none, nothing."""
+        return items_from_records(records, home_item(self._craft.position()), sent_as) if records else ()
+
+    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+        """Show home where the flight controller has it; before it has one, where it was sent, if that is known."""
+        if not items:
+            return items
+        is_known = bool(items[0].lat_e7 and items[0].lon_e7)
+        home = self._craft.home() if is_known else self._craft.position()
+        return items if home is None else (replace(items[0], lat_e7=home[0], lon_e7=home[1]), *items[1:])
+
+    def seq_of(self, records: Sequence[NavRecord], number: int) -> int:
+        """Return the number of the item that record `number` is shown as; 0: there is none."""
+        return item_seqs(records)[number - 1] if 1 <= number <= len(records) else 0
+
+    def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Procedure[PushResult[NavRecord]]:
+        """Put the list there and prove it; after a failure put back what was there, if that is known."""
+        before, self._known = self._known, None
+        failure = PushFailure.NO_ANSWER  # if the link is lost now
+        try:
+            yield from self._make_sure_disarmed()
+            failure = PushFailure.INCOMPLETE
+            yield from self._write_surely(records or NOTHING, progress)
+            failure = PushFailure.UNCERTAIN
+            yield from self._keep()
+            self._known = records
+            return PushResult(None)
+        except Stopped:
+            if failure is PushFailure.INCOMPLETE:
+                restored = yield from self._restore_at_once(before)
+                return PushResult(PushFailure.STOPPED if restored else failure)
+            return PushResult(PushFailure.STOPPED if failure is PushFailure.NO_ANSWER else failure)
+        except LinkLost:
+            return PushResult(failure)
+        except Failed as failed:
+            if failure is PushFailure.NO_ANSWER:
+                self._known = before
+            elif failure is PushFailure.INCOMPLETE and not (yield from self._restore(before)):
+                return PushResult(_UNRESTORED.get(failed.failure, failure))
+            return PushResult(failed.failure)
+
+    @abstractmethod
+    def pull(self) -> Procedure[tuple[NavRecord, ...] | None]:
+        """Read the list that is there; None if that fails."""
+
+    @abstractmethod
+    def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
+        """Return what is written, in order, with its number: at no moment can half a list be flown."""
+
+    @abstractmethod
+    def _keep(self) -> Procedure[None]:
+        """Do what has to be done after the last record; raises Failed."""
+
+    def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
+        """Put the old list back if that takes no time; tell whether it is there."""
+        yield from ()
+        return False
+
+    def _write_surely(self, wanted: tuple[NavRecord, ...], progress: PushProgress) -> Procedure[None]:
+        for begins in range(1, _MAX_BEGINS + 1):
+            try:
+                yield from self._write(wanted, progress)
+                return
+            except Failed as failed:
+                if failed.is_final or begins == _MAX_BEGINS:
+                    raise
+
+    def _write(self, wanted: tuple[NavRecord, ...], progress: PushProgress) -> Procedure[None]:
+        order = self._order(wanted)
+        for done, (number, record) in enumerate(order, 1):
+            if done == len(order) > 1:
+                yield from self._make_sure_disarmed()
+            elif self._craft.is_armed():
+                raise Failed(PushFailure.ARMED)
+            reply = yield from ask(encode_set_wp(number, record), Nav.SET_WP, 0, tries=_TRIES)
+            if reply is None:
+                raise Failed(PushFailure.NO_ANSWER)
+            if reply.direction is Direction.ERROR:
+                raise Failed(PushFailure.REFUSED)
+            yield from self._compare(number, record)
+            progress(done)
+        yield from self._prove(len(wanted))
+
+    def _prove(self, count: int) -> Procedure[None]:
+        """Make sure of what no single record tells; raises Failed."""
+        yield from ()
+
+    def _compare(self, number: int, record: NavRecord) -> Procedure[None]:
+        """Read what was written; once more if it differs: the checksum of 8 bits lets some damage through."""
+        for _ in range(2):
+            held = yield from self.read(number)
+            if held is None:
+                raise Failed(PushFailure.NO_ANSWER)
+            if held == record:
+                return
+        raise Failed(PushFailure.REFUSED, is_final=False)
+
+    def read(self, number: int) -> Procedure[NavRecord | None]:
+        """Read one record; answers that are about another one (home is asked for by telemetry) are left alone."""
+        for _ in range(_TRIES):
+            yield from send(encode_read_wp(number), Nav.WP, WP_SIZE)
+            while True:
+                reply = yield from receive(Nav.WP)
+                if reply is None:
+                    break
+                answer = decode_wp(reply.payload)
+                if answer is not None and answer[0] == number:
+                    return answer[1]
+        return None
+
+    def _restore(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
+        """Write the old list again, if it is known and there was one; tell whether it is there."""
+        if not before or self._craft.is_armed():
+            return False
+        try:
+            yield from self._make_sure_disarmed()
+            yield from self._write(before, lambda _done: None)
+        except (Failed, LinkLost):
+            return False
+        self._known = before
+        return True
+
+    def _make_sure_disarmed(self) -> Procedure[None]:
+        armed = yield from self._ask_armed()
+        if armed is None:
+            raise Failed(PushFailure.NO_ANSWER)
+        if armed:
+            raise Failed(PushFailure.ARMED)
+
+    def _ask_armed(self) -> Procedure[bool | None]:
+        reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
+        status = None if reply is None else decode_status(reply.payload)
+        return None if status is None else bool(status.box_flags & self._craft.arm_mask)
+
+
+#: What is told instead, if the old list is not there any more.
+_UNRESTORED = {PushFailure.ARMED: PushFailure.ARMED_MEANWHILE}

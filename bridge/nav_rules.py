@@ -1,0 +1,121 @@
+"""What INAV and MultiWii NAV can hold, command by command: the table of docs/inav.md."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from protocols.mission_item import Command
+from protocols.msp.nav import NavAction
+
+#: POSHOLD_TIME with this time stands for a hold without end, which INAV does not know: nine hours.
+ENDLESS_S = 32767
+#: Speeds below this are none to INAV, cm/s.
+LEAST_SPEED_CMS = 50
+ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
+
+
+@dataclass(frozen=True, slots=True)
+class NavProfile:
+    """What two relatives do not have in common.
+
+    capacity: records that fit; home is none of them. endless_hold: action and p1 of a hold without end. sea_level:
+    whether a height may count from mean sea level. leg_speed: whether a leg may have a speed of its own. rth_height:
+    whether the way home may have a height. jumps_back_only: whether a JUMP must go back; else it may go to any leg that
+    is not next to it.
+    """
+
+    name: str
+    capacity: int
+    endless_hold: tuple[NavAction, int]
+    sea_level: bool
+    leg_speed: bool
+    rth_height: bool
+    jumps_back_only: bool
+
+    @property
+    def max_items(self) -> int:
+        """The longest list that may fit: every record with a change of speed before it, and home."""
+        return (2 if self.leg_speed else 1) * self.capacity + 1
+
+
+def inav_profile(capacity: int = 120) -> NavProfile:
+    """INAV. It stores no POSHOLD_UNLIM."""
+    return NavProfile(
+        "INAV",
+        capacity,
+        endless_hold=(NavAction.POSHOLD_TIME, ENDLESS_S),
+        sea_level=True,
+        leg_speed=True,
+        rth_height=False,
+        jumps_back_only=False,
+    )
+
+
+def multiwii_profile(capacity: int = 120) -> NavProfile:
+    """MultiWii 2.4 NAV."""
+    return NavProfile(
+        "MultiWii",
+        capacity,
+        endless_hold=(NavAction.POSHOLD_UNLIM, 0),
+        sea_level=False,
+        leg_speed=False,
+        rth_height=True,
+        jumps_back_only=True,
+    )
+
+
+class Height(Enum):
+    """What a command's height is."""
+
+    UNUSED = auto()
+    FLOWN = auto()
+    #: The way home's, where it may have one.
+    RTH = auto()
+    #: Where the landing begins; 0, as planners have it, is the height of the leg before.
+    APPROACH = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """Whole numbers that a parameter can hold."""
+
+    low: int
+    high: int
+    why: str
+
+    def fit(self, value: float) -> int:
+        """Truncate toward zero, then clamp; what is not a finite number counts as 0."""
+        whole = math.trunc(value) if math.isfinite(value) else 0
+        return min(max(whole, self.low), self.high)
+
+
+UNUSED = Whole(0, 0, "not used")
+HOLD = Whole(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
+LANDS = Whole(0, 1, "1 = land at home")
+HEADING = Whole(0, 359, "degrees 0..359")
+REPEATS = Whole(-1, 32767, "repeats -1..32767")
+
+
+@dataclass(frozen=True, slots=True)
+class NavRule:
+    """One row. p1: what the first parameter can hold. position: needed; if False, none is kept."""
+
+    name: str
+    p1: Whole
+    position: bool
+    height: Height
+
+
+_ROI = NavRule("ROI", UNUSED, True, Height.FLOWN)
+#: Commands that become a record of their own with nothing but these fields. `bridge.nav_check` has the others:
+#: CONDITION_YAW, DO_SET_ROI_NONE, DO_JUMP, DO_CHANGE_SPEED.
+NAV_RULES: Mapping[int, NavRule] = {
+    Command.NAV_WAYPOINT: NavRule("WAYPOINT", HOLD, True, Height.FLOWN),
+    Command.NAV_LOITER_UNLIM: NavRule("LOITER_UNLIM", UNUSED, True, Height.FLOWN),
+    Command.NAV_LOITER_TURNS: NavRule("LOITER_TURNS", UNUSED, True, Height.FLOWN),
+    Command.NAV_LOITER_TIME: NavRule("LOITER_TIME", HOLD, True, Height.FLOWN),
+    Command.NAV_RETURN_TO_LAUNCH: NavRule("RTL", LANDS, False, Height.RTH),
+    Command.NAV_LAND: NavRule("LAND", UNUSED, True, Height.APPROACH),
+    **dict.fromkeys(ROI_COMMANDS, _ROI),
+}

@@ -1,0 +1,178 @@
+"""Missions over MSP_SET_WP: what INAV and MultiWii NAV keep, and how they are asked (inav.md, "Layouts").
+
+Records are numbered from 1. Numbers 0 and 255 are no part of a mission: writing them moves the home point and a craft
+that holds its position, so no frame with them can be made here.
+"""
+
+import struct
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+from protocols.msp.frame import request
+
+_WP = struct.Struct("<BBiiihhhB")
+_BODY = struct.Struct("<BiiihhhB")
+_INFO = struct.Struct("<BBBB")
+_STATUS = struct.Struct("<BBBBBH")
+WP_SIZE = _WP.size
+INFO_SIZE = _INFO.size
+#: MSP_NAV_CONFIG as MultiWii 2.4 has it; only its end is of interest.
+NAV_CONFIG_SIZE = 32
+_HIGHEST_NUMBER = 254
+
+#: The flag of the last record of a mission.
+LAST = 0xA5
+
+
+class Nav(IntEnum):
+    """Commands. SET_WP, LOAD and SAVE change the mission, the others nothing."""
+
+    LOAD = 18
+    SAVE = 19
+    GETINFO = 20
+    WP = 118
+    NAV_CONFIG = 122
+    SET_WP = 209
+
+
+class NavAction(IntEnum):
+    """What a record does."""
+
+    WAYPOINT = 1
+    POSHOLD_UNLIM = 2
+    POSHOLD_TIME = 3
+    RTH = 4
+    SET_POI = 5
+    JUMP = 6
+    SET_HEAD = 7
+    LAND = 8
+
+
+#: Actions that fly somewhere.
+LEGS = frozenset((NavAction.WAYPOINT, NavAction.POSHOLD_UNLIM, NavAction.POSHOLD_TIME, NavAction.LAND))
+
+
+class UnsafeRecord(ValueError):
+    """A record that must never be sent."""
+
+
+@dataclass(frozen=True, slots=True)
+class NavRecord:
+    """One record; its number is its position in the list, counted from 1.
+
+    lat_e7, lon_e7: degrees * 1e7. alt_cm: above home, or above mean sea level if bit 0 of p3 is set. `flag` is LAST for
+    the last record. `action` is a plain int because a flight controller may hold a number that we do not know.
+    """
+
+    action: int
+    lat_e7: int = 0
+    lon_e7: int = 0
+    alt_cm: int = 0
+    p1: int = 0
+    p2: int = 0
+    p3: int = 0
+    flag: int = 0
+
+    def pack(self) -> bytes:
+        """Return the 20 bytes behind the number; struct.error if a field does not fit, which is a bug in the caller."""
+        return _BODY.pack(self.action, self.lat_e7, self.lon_e7, self.alt_cm, self.p1, self.p2, self.p3, self.flag)
+
+
+@dataclass(frozen=True, slots=True)
+class NavInfo:
+    """MSP_WP_GETINFO: how many records fit, whether the present list may be flown, how many it has."""
+
+    capacity: int
+    is_valid: bool
+    count: int
+
+
+class NavMode(IntEnum):
+    """What the navigation does, as MSP_NAV_STATUS tells."""
+
+    NONE = 0
+    HOLD = 1
+    RTH = 2
+    MISSION = 3
+    EMERGENCY = 15
+
+
+class NavState(IntEnum):
+    """The states in MSP_NAV_STATUS that mean "it is there"."""
+
+    HOLD_TIMED = 4
+    LAND_IN_PROGRESS = 9
+    LANDED = 10
+
+
+#: MSP_NAV_STATUS, error: "end flag detected, navigation finished".
+FINISHED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class NavStatus:
+    """MSP_NAV_STATUS: the record in work is `number`, counted from 1; heading in degrees.
+
+    `mode`, `state` and `error` are plain ints: newer firmware may send others than we know.
+    """
+
+    mode: int
+    state: int
+    action: int
+    number: int
+    error: int
+    heading_deg: int
+
+
+def encode_set_wp(number: int, record: NavRecord) -> bytes:
+    """Return the request that stores record `number`; UnsafeRecord for what must not reach a flight controller.
+
+    INAV crashes on a JUMP whose target is below 1, on the ground and in the air.
+    """
+    if not 1 <= number <= _HIGHEST_NUMBER:
+        raise UnsafeRecord(f"number {number} is no record of a mission")
+    if record.action == NavAction.JUMP and record.p1 <= 0:
+        raise UnsafeRecord(f"record {number} jumps to {record.p1}")
+    return request(Nav.SET_WP, bytes((number,)) + record.pack())
+
+
+def encode_read_wp(number: int) -> bytes:
+    """Return the request for record `number`."""
+    return request(Nav.WP, bytes((number,)))
+
+
+#: SAVE and LOAD have one byte, which means nothing yet; with any other length INAV refuses them.
+SAVE_REQUEST = request(Nav.SAVE, b"\0")
+LOAD_REQUEST = request(Nav.LOAD, b"\0")
+
+
+def decode_wp(payload: bytes) -> tuple[int, NavRecord] | None:
+    """Read MSP_WP: number and record. INAV counts down in p3 of a JUMP while it flies, so that is left out."""
+    if len(payload) < _WP.size:
+        return None
+    number, *fields = _WP.unpack_from(payload)
+    record = NavRecord(*fields)
+    return number, replace(record, p3=0) if record.action == NavAction.JUMP else record
+
+
+def unpack_nav_record(data: bytes) -> NavRecord:
+    """Read one record from exactly the 20 bytes that `pack` makes."""
+    return NavRecord(*_BODY.unpack(data))
+
+
+def decode_info(payload: bytes) -> NavInfo | None:
+    """Read MSP_WP_GETINFO."""
+    if len(payload) < _INFO.size:
+        return None
+    _, capacity, is_valid, count = _INFO.unpack_from(payload)
+    return NavInfo(capacity, bool(is_valid), count)
+
+
+def decode_nav_config(payload: bytes) -> int | None:
+    """Read how many records fit out of MultiWii's MSP_NAV_CONFIG: the last byte but one."""
+    return payload[-2] if len(payload) >= 2 else None
+
+
+def decode_nav_status(payload: bytes) -> NavStatus | None:
+    """Read MSP_NAV_STATUS."""
+    return NavStatus(*_STATUS.unpack_from(payload)) if len(payload) >= _STATUS.size else None

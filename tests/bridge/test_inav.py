@@ -1,0 +1,307 @@
+"""Missions to INAV and MultiWii NAV through the whole bridge: proof, faults, arming, clearing, progress."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from conversations import Download, Upload, clear_message, count_message, waypoints
+from fake_inav import FakeInav, FakeMultiwii, lossy
+from world import Air, GroundStation, World
+
+from bridge.flight_controller import Kind
+from bridge.mission_check import check_list
+from bridge.mission_log import Outcome
+from bridge.nav_check import NavRules
+from bridge.nav_rules import inav_profile
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.msp.frame import Direction, MspFrame, MspParser
+from protocols.msp.nav import LAST, Nav, NavAction
+
+RULES = NavRules(inav_profile())
+ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
+CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
+
+
+def plan(count: int, seed: int = 0) -> list[MissionItem]:
+    """Waypoints that INAV stores as they are."""
+    home, *legs = waypoints(count, seed)
+    # Read as it was sent, for this is where the fake has its home.
+    home = replace(home, lat_e7=453838000, lon_e7=84733000)
+    return [replace(item, p2=0.0) for item in (home, *legs)]
+
+
+def packed(items: list[MissionItem]) -> list[bytes]:
+    return [record.pack() for record in check_list(items, RULES).records]
+
+
+def found(peer: FakeInav) -> tuple[World, GroundStation]:
+    world = World(speeds=(115200,), peer=peer)
+    world.wait_ready(5)
+    return world, GroundStation(world)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "capacity"), [(FakeInav, Kind.INAV, 120), (FakeMultiwii, Kind.MULTIWII_NAV, 60)]
+)
+def test_it_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Kind, capacity: int) -> None:
+    world, _ = found(make())
+    assert world.kind is kind
+    assert world.bridge.session.controller is not None
+    assert world.bridge.session.controller.capacity == capacity
+    assert world.bridge.session.vehicle.armed is False
+
+
+def test_what_is_written_is_saved_and_reads_as_it_was_sent() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    sent = plan(121)
+    assert Upload(station, sent).run() is ACCEPTED
+    assert inav.saved == inav.records == packed(sent)
+    assert world.store.outcomes() == [Outcome.VERIFIED]
+    assert world.store.missions[0][0].verdict.findings == ()
+    assert Download(station).run() == sent
+    assert inav.writes == 120
+    assert inav.saves == 1
+
+
+def test_each_record_is_read_before_the_next_is_sent() -> None:
+    inav = FakeInav()
+    _, station = found(inav)
+    assert Upload(station, plan(30)).run() is ACCEPTED
+    frames = [f for _, _, data in station.world.written for f in MspParser().feed(data)]
+    mission = [f for f in frames if f.command in (Nav.SET_WP, Nav.WP) and f.payload[0] != 0]
+    written = [n for n, f in enumerate(mission) if f.command == Nav.SET_WP]
+    assert [mission[n].payload[0] for n in written] == list(range(1, 30))
+    for n in written:
+        assert (mission[n + 1].command, mission[n + 1].payload[0]) == (Nav.WP, mission[n].payload[0])
+
+
+def test_multiwii_holds_a_way_home_until_the_whole_list_is_there() -> None:
+    multiwii = FakeMultiwii()
+    world, station = found(multiwii)
+    first = plan(20)
+    assert Upload(station, first).run() is ACCEPTED
+    assert multiwii.flown == packed(first)
+    multiwii.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 9 else ""
+    upload = Upload(station, plan(15, 1))
+    seen: set[int] = set()
+    while not upload.is_over:
+        world.run(0.01)
+        seen.add(len(multiwii.flown))
+    assert upload.result is DENIED
+    # What it would have flown at any moment: the old list, or nothing but the way home.
+    assert seen <= {19, 1}
+
+
+def test_what_cannot_be_stored_is_noticed_and_the_old_list_put_back() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    old = plan(12)
+    assert Upload(station, old).run() is ACCEPTED
+    place = packed(plan(40, 3))[30][1:9]
+    honest = inav.store
+
+    def store(number: int, record: bytes) -> None:
+        if record[1:9] != place:
+            honest(number, record)
+
+    inav.store = store  # type: ignore[method-assign]
+    assert Upload(station, plan(40, 3)).run() is MissionResult.INVALID
+    assert inav.records == packed(old)
+    assert (inav.is_valid, inav.saves) == (True, 1)
+    assert Download(station).run() == old
+    assert "refused a record" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+
+
+def test_where_there_was_nothing_half_a_list_stays_that_cannot_be_flown() -> None:
+    inav = FakeInav(drop=lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 20 else "")
+    world, station = found(inav)
+    assert Upload(station, plan(40)).run() is DENIED
+    assert (len(inav.records), inav.is_valid, inav.saved) == (19, False, None)
+    assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert Download(station).run() == []
+
+
+@pytest.mark.parametrize("make", [FakeInav, FakeMultiwii])
+def test_losses_only_cost_time(make: Callable[[], FakeInav]) -> None:
+    for seed in range(6):
+        peer = make()
+        peer.drop = lossy(0.05, seed)
+        _, station = found(peer)
+        assert Upload(station, plan(30, seed), tries=40).run() is ACCEPTED
+        peer.drop = lambda _frame: ""
+        assert Download(station).run() == plan(30, seed)
+
+
+def test_armed_nothing_is_sent() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    inav.armed = True
+    assert Upload(station, plan(10)).run() is DENIED
+    world.run(1)
+    station.send(clear_message())
+    world.run(2)
+    assert inav.writes == 0
+    assert any("disarm" in text for text in station.texts())
+
+
+def test_armed_before_the_status_is_polled_it_is_asked_for() -> None:
+    inav = FakeInav()
+    world, _ = found(inav)
+    upload = Upload(GroundStation(world, "far", air=Air(delay_s=0.02)), plan(10))
+    world.run_until(lambda _: len(upload.requested) == 10, 5)
+    inav.armed = True
+    assert world.bridge.session.vehicle.armed is False
+    assert upload.run() is DENIED
+    assert inav.writes == 0
+
+
+def test_armed_in_the_middle_the_last_record_is_never_sent() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    assert Upload(station, plan(10)).run() is ACCEPTED
+    upload = Upload(station, plan(60, 1))
+    honest = inav.store
+
+    def store(number: int, record: bytes) -> None:
+        honest(number, record)
+        inav.armed = number >= 30
+
+    inav.store = store  # type: ignore[method-assign]
+    assert upload.run() is DENIED
+    assert not inav.is_valid
+    assert len(inav.records) < 59
+    assert any("armed meanwhile" in text for text in station.texts())
+    assert world.bridge.desk.held is None
+
+
+def test_a_save_that_fails_is_told() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    inav.save = lambda: None  # type: ignore[method-assign]
+    assert Upload(station, plan(10)).run() is DENIED
+    assert "not saved" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert inav.is_valid
+
+
+def test_cleared_is_a_single_way_home_and_reads_as_nothing() -> None:
+    for inav in (FakeInav(), FakeMultiwii()):
+        world, station = found(inav)
+        assert Upload(station, plan(10)).run() is ACCEPTED
+        station.send(count_message(0))
+        world.run(3)
+        assert (inav.flown if isinstance(inav, FakeMultiwii) else inav.saved) == [CLEARED]
+        download = Download(station)
+        assert download.run() == []
+        assert download.count == 0
+        other, other_station = found(inav)
+        assert other.bridge.desk.held is not None
+        assert Download(other_station).run() == []
+
+
+def test_a_link_lost_in_the_middle_is_told_and_the_next_upload_works() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    upload = Upload(station, plan(60))
+    world.run_until(lambda _: len(inav.records) == 25, 5)
+    world.unplug()
+    assert upload.run() is DENIED
+    assert not inav.is_valid
+    world.plug()
+    world.wait_ready(10)
+    assert Upload(station, plan(60)).run() is ACCEPTED
+
+
+def test_foreign_records_are_shown_and_damage_nothing() -> None:
+    inav = FakeInav()
+    inav.records = [bytes((99, *range(18), 0)), bytes((6, *bytes(12), 0x9C, 0xFF, *bytes(4), LAST))]
+    inav.is_valid = True
+    world, station = found(inav)
+    world.run(3)
+    shown = Download(station).run()
+    assert [item.command for item in shown] == [16, 0, 177]
+    assert (shown[0].lat_e7, shown[0].lon_e7) == (453838000, 84733000)
+
+
+def test_the_item_that_is_flown_to_and_those_reached_are_told() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
+    legs = plan(4)
+    assert Upload(station, [*legs[:2], speed, *legs[2:]]).run() is ACCEPTED
+    inav.armed = True
+    for nav in [(3, 5, 1, 1, 0, 0), (3, 5, 1, 2, 0, 0), (3, 4, 3, 2, 0, 0), (3, 5, 1, 3, 0, 0), (3, 5, 1, 3, 4, 0)]:
+        inav.nav = nav
+        world.run(3)
+    heard = [message for _, message in station.heard]
+    assert [m.seq for m in heard if m.get_type() == "MISSION_ITEM_REACHED"] == [1, 3, 4]
+    current = [(m.seq, m.mission_state) for m in heard if m.get_type() == "MISSION_CURRENT"]
+    wanted = [(1, 3), (3, 3), (4, 3), (4, 5)]
+    assert [now for n, now in enumerate(current) if now in wanted and (n == 0 or now != current[n - 1])] == wanted
+    assert all(m.total == 4 for m in heard if m.get_type() == "MISSION_CURRENT" and m.seq)
+
+
+def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -> None:
+    """INAV takes a '#' that is not in a frame, and 100 ms of silence, for its user: MSP is dead from then on."""
+    for lost in range(1, 12):
+        inav = FakeInav()
+        world, station = found(inav)
+        seen = 0
+
+        def drop(frame: MspFrame) -> str:
+            nonlocal seen
+            seen += frame.command == Nav.SET_WP
+            return "request" if frame.command == Nav.SET_WP and seen == lost else ""  # noqa: B023
+
+        inav.drop = drop
+        sent = plan(12)
+        sent[1:] = [MissionItem(i.seq, 16, 3, 0, 0, 0, 0, 0x23232323, 0x52525252, 35.0) for i in sent[1:]]
+        assert Upload(station, sent).run() is ACCEPTED
+        moments = [at for at, _, _ in world.written]
+        risky = [at for at, _, data in world.written if set(data) & {0x23, 0x52} and data[4] == Nav.SET_WP]
+        assert risky
+        assert all(any(at < later < at + 0.1 for later in moments) for at in risky)
+
+
+def test_only_a_question_tells_that_a_telemetry_reply_is_no_record() -> None:
+    """Home is asked for with the same command: its answer is not taken for the record that was written."""
+    inav = FakeInav()
+    world, station = found(inav)
+    upload = Upload(station, plan(40))
+    home = MspFrame(Direction.REPLY, Nav.WP, b"\0" + inav.read(0)).encode()
+    while not upload.is_over:
+        world.run(0.005)
+        world.hear(home)
+    assert upload.result is ACCEPTED
+    assert inav.writes == 39
+
+
+@pytest.mark.parametrize("name", [b"BTFL", b"CLFL", b"INAV"])
+def test_others_are_telemetry_only(name: bytes) -> None:
+    other = FakeInav()
+    other.answers = {1: b"\0\1\x2a", 2: name, 119: bytes((0, 1, 2)), 116: b"ARM;ANGLE;"}
+    other.answer = lambda frame: (  # type: ignore[method-assign]
+        bytes(6) + b"\1\0\0\0\0" if frame.command == 101 else other.answers.get(frame.command)
+    )
+    world, station = found(other)
+    assert world.kind is Kind.OTHER_MSP
+    world.run(1)
+    assert world.bridge.session.vehicle.armed is True
+    assert Upload(station, plan(5)).run() is MissionResult.UNSUPPORTED
+    assert any("stores no missions" in text for text in station.texts())
+    assert not {Nav.SET_WP, Nav.SAVE, Nav.LOAD} & set(other.commands)
+
+
+def test_the_boxes_of_a_betaflight_whose_names_outgrow_a_frame() -> None:
+    other = FakeInav()
+    other.answers = {2: b"BTFL", 119: bytes((0, 1, 46, 11))}
+    other.answer = lambda frame: (  # type: ignore[method-assign]
+        bytes(6) + b"\5\0\0\0\0" if frame.command == 101 else other.answers.get(frame.command)
+    )
+    world, station = found(other)
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+    world.run(3)
+    beat = station.said("HEARTBEAT")[-1]
+    assert beat.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED
+    assert beat.custom_mode == 6

@@ -1,0 +1,379 @@
+"""What a list becomes on INAV and MultiWii NAV: docs/inav.md, row by row, and what holds for every list."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import event, given, settings
+from hypothesis import strategies as st
+from test_rule_properties import degrees, numbers
+
+from bridge.finding import DROPPED, REJECTED
+from bridge.mission_check import check_count, check_list
+from bridge.nav_check import NavRules
+from bridge.nav_items import home_item, items_from_records
+from bridge.nav_rules import ENDLESS_S, inav_profile, multiwii_profile
+from bridge.verdict import Result, Verdict
+from protocols.mavlink.dialect import messages
+from protocols.mavlink.mission_messages import item_from_float_message
+from protocols.mission_item import Command, MissionItem, MissionResult
+from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord, UnsafeRecord, decode_wp, encode_set_wp
+
+INAV, MULTIWII = NavRules(inav_profile()), NavRules(multiwii_profile())
+LAT, LON = 453838000, 84733000
+A = NavAction
+C = Command
+
+
+def item(command: int, *, at: bool = True, **fields: Any) -> MissionItem:
+    place = (LAT, LON, 50.0) if at else (0, 0, 0.0)
+    return replace(MissionItem(0, command, 3, 0.0, 0.0, 0.0, 0.0, *place), **fields)
+
+
+HOME = item(C.NAV_WAYPOINT, frame=0, alt_m=123.0)
+WP = item(C.NAV_WAYPOINT)
+
+
+def verdict_on(*items: MissionItem, rules: NavRules = INAV) -> Verdict[NavRecord]:
+    return check_list((HOME, *items), rules)
+
+
+def kept(*items: MissionItem, rules: NavRules = INAV) -> tuple[NavRecord, ...]:
+    verdict = verdict_on(*items, rules=rules)
+    assert verdict.result is Result.ACCEPTED, verdict.findings
+    return verdict.records
+
+
+def said(*items: MissionItem, rules: NavRules = INAV) -> list[tuple[Any, ...]]:
+    return [(f.seq, f.field, f.was, f.becomes) for f in verdict_on(*items, rules=rules).findings]
+
+
+def jump(target: float, repeats: float = 2) -> MissionItem:
+    return item(C.DO_JUMP, at=False, p1=float(target), p2=float(repeats))
+
+
+def speed(metres: float, kind: float = 1, throttle: float = 0) -> MissionItem:
+    return item(C.DO_CHANGE_SPEED, at=False, p1=kind, p2=metres, p3=throttle)
+
+
+@pytest.mark.parametrize(
+    ("sent", "record"),
+    [
+        (WP, NavRecord(A.WAYPOINT, LAT, LON, 5000)),
+        (replace(WP, frame=0), NavRecord(A.WAYPOINT, LAT, LON, 5000, p3=1)),
+        (replace(WP, frame=5), NavRecord(A.WAYPOINT, LAT, LON, 5000, p3=1)),
+        (replace(WP, frame=6), NavRecord(A.WAYPOINT, LAT, LON, 5000)),
+        (replace(WP, alt_m=-12.34), NavRecord(A.WAYPOINT, LAT, LON, -1234)),
+        (replace(WP, p1=7), NavRecord(A.POSHOLD_TIME, LAT, LON, 5000, 7)),
+        (item(C.NAV_LOITER_TIME, p1=32766), NavRecord(A.POSHOLD_TIME, LAT, LON, 5000, 32766)),
+        (item(C.NAV_LOITER_UNLIM), NavRecord(A.POSHOLD_TIME, LAT, LON, 5000, ENDLESS_S)),
+        (item(C.NAV_RETURN_TO_LAUNCH, at=False), NavRecord(A.RTH)),
+        (item(C.NAV_RETURN_TO_LAUNCH, at=False, p1=1), NavRecord(A.RTH, p1=1)),
+        (item(C.NAV_LAND), NavRecord(A.LAND, LAT, LON, 5000)),
+        (item(C.NAV_ROI), NavRecord(A.SET_POI, LAT, LON, 5000)),
+        (item(C.DO_SET_ROI, frame=0), NavRecord(A.SET_POI, LAT, LON, 5000, p3=1)),
+        (item(C.DO_SET_ROI_LOCATION), NavRecord(A.SET_POI, LAT, LON, 5000)),
+        (item(C.DO_SET_ROI_NONE, at=False), NavRecord(A.SET_HEAD, p1=-1)),
+        (item(C.CONDITION_YAW, at=False, p1=270), NavRecord(A.SET_HEAD, p1=270)),
+    ],
+)
+def test_what_can_be_held_is_held_and_read_as_it_was_sent(sent: MissionItem, record: NavRecord) -> None:
+    verdict = verdict_on(WP, sent, WP)
+    assert verdict.findings == ()
+    assert verdict.records[1] == record
+    shown_frame = {5: 0, 6: 3}.get(sent.frame, sent.frame)
+    assert verdict.items[2] == replace(sent, seq=2, frame=shown_frame)
+
+
+@pytest.mark.parametrize(
+    ("sent", "record", "findings"),
+    [
+        (item(C.NAV_LOITER_TURNS, p1=3), A.WAYPOINT, [("p1", 3, 0), ("command", 18, 16)]),
+        (replace(WP, p1=0.5, p2=2, p4=90), A.WAYPOINT, [("p1", 0.5, 0), ("p2", 2, 0), ("p4", 90, 0)]),
+        (item(C.NAV_LOITER_TIME, p1=40000), A.POSHOLD_TIME, [("p1", 40000, 32766)]),
+        (replace(WP, frame=10), A.WAYPOINT, [("frame", 10, 3)]),
+        (replace(WP, alt_m=50.123), A.WAYPOINT, [("alt_m", 50.123, 50.12)]),
+        (replace(WP, alt_m=1e30), A.WAYPOINT, [("alt_m", 1e30, 32767)]),
+        (item(C.NAV_RETURN_TO_LAUNCH), A.RTH, [("lat_e7", LAT, 0), ("lon_e7", LON, 0), ("alt_m", 50, 0)]),
+        (item(C.CONDITION_YAW, at=False, p1=360, p3=-1), A.SET_HEAD, [("p1", 360, 359), ("p3", -1, 0)]),
+        (item(C.NAV_LAND, alt_m=0.0), A.LAND, [("alt_m", 0, 50)]),
+        (item(C.NAV_LAND, at=False), A.LAND, [("lat_e7", 0, LAT), ("lon_e7", 0, LON), ("alt_m", 0, 50)]),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_held_is_told(sent: MissionItem, record: NavAction, findings: list[tuple[Any, ...]]) -> None:
+    assert kept(WP, sent, WP)[1].action == record
+    assert [told[1:] for told in said(WP, sent, WP)] == findings
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        item(C.NAV_TAKEOFF, at=False, alt_m=10),
+        item(206),
+        item(C.NAV_WAYPOINT, lat_e7=0),
+        item(C.NAV_WAYPOINT, alt_m=math.nan),
+        item(C.CONDITION_YAW, at=False, p1=20, p4=1),
+        item(C.CONDITION_YAW, at=False, p1=math.nan),
+        speed(5, kind=2),
+        speed(-1),
+        speed(math.nan),
+    ],
+)
+def test_what_means_nothing_there_is_dropped(sent: MissionItem) -> None:
+    assert kept(WP, sent, WP) == kept(WP, WP)
+    assert [(told[0], told[3]) for told in said(WP, sent, WP)] == [(2, DROPPED)]
+
+
+def test_a_landing_without_a_place_after_the_way_home_is_part_of_it() -> None:
+    rtl, land = item(C.NAV_RETURN_TO_LAUNCH, at=False), item(C.NAV_LAND, at=False)
+    assert kept(WP, rtl, land)[1:] == (NavRecord(A.RTH, p1=1, flag=LAST),)
+    assert said(WP, rtl, land) == [(3, "command", 21, DROPPED)]
+
+
+def test_speeds_are_folded_into_the_legs_and_shown_again() -> None:
+    sent = (WP, speed(7.5), WP, item(C.NAV_LOITER_TIME, p1=5), item(C.DO_SET_ROI), speed(3), item(C.NAV_LAND))
+    records = kept(*sent)
+    assert [(r.action, r.p1, r.p2) for r in records] == [(1, 0, 0), (1, 750, 0), (3, 5, 750), (5, 0, 0), (8, 300, 0)]
+    verdict = verdict_on(*sent)
+    assert verdict.findings == ()
+    assert list(verdict.items[1:]) == [replace(it, seq=n) for n, it in enumerate(sent, 1)]
+
+
+def test_a_speed_goes_back_to_the_set_one() -> None:
+    sent = (speed(7), WP, speed(-2), WP)
+    assert [record.p1 for record in kept(*sent)] == [700, 0]
+    assert [shown.p2 for shown in verdict_on(*sent).items if shown.command == C.DO_CHANGE_SPEED] == [7, -2]
+
+
+def test_of_a_speed_what_is_lost_is_told() -> None:
+    assert said(speed(0.1, 0, 50), WP) == [
+        (1, "p1", 0, 1),
+        (1, "p2", 0.1, 0.5),
+        (1, "p3", 50, 0),
+    ]
+    assert said(WP, speed(5), item(C.NAV_RETURN_TO_LAUNCH, at=False)) == [(2, "command", 178, DROPPED)]
+    assert said(speed(1e30), WP) == [(1, "p2", 1e30, 327.67)]
+
+
+def test_a_jump_goes_where_the_pilot_said_as_the_flight_controller_counts() -> None:
+    sent = (WP, speed(5), WP, item(C.NAV_TAKEOFF, at=False, alt_m=5.0), WP, jump(3), WP)
+    records = kept(*sent)
+    assert records[3] == NavRecord(A.JUMP, p1=2, p2=2)
+    verdict = verdict_on(*sent)
+    assert [shown.p1 for shown in verdict.items if shown.command == C.DO_JUMP] == [3]
+
+
+def test_a_jump_to_what_is_folded_or_dropped_goes_to_what_follows() -> None:
+    assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=LAST)
+    takeoff = item(C.NAV_TAKEOFF, at=False, alt_m=5.0)
+    assert kept(takeoff, WP, WP, jump(1))[2].p1 == 1
+    assert said(takeoff, WP, WP, jump(1))[-1] == (4, "p1", 1, 2)
+
+
+def test_a_jump_may_go_forward_on_inav_and_only_back_on_multiwii() -> None:
+    forward = (WP, jump(4), WP, WP)
+    assert kept(*forward)[1].p1 == 4
+    assert verdict_on(*forward, rules=MULTIWII).ack is MissionResult.INVALID_PARAM1
+    assert kept(WP, jump(1), rules=MULTIWII)[1].p1 == 1
+
+
+@pytest.mark.parametrize(
+    "items",
+    [
+        (WP, WP, jump(0)),
+        (WP, WP, jump(-1)),
+        (WP, WP, jump(4)),
+        (WP, WP, jump(math.nan)),
+        (WP, WP, jump(1.5)),
+        (WP, WP, jump(1e30)),
+        (WP, WP, jump(2)),
+        (WP, WP, jump(3)),
+        (WP, jump(3), WP),
+        (jump(3), WP, WP),
+        (item(C.DO_SET_ROI), WP, WP, jump(1)),
+        (WP, item(C.NAV_RETURN_TO_LAUNCH, at=False), WP, WP, jump(2)),
+        (WP, WP, jump(4), item(206)),
+    ],
+)
+def test_a_jump_with_which_inav_would_not_arm_or_would_crash_rejects_the_list(items: tuple[MissionItem, ...]) -> None:
+    verdict = verdict_on(*items)
+    assert (verdict.result, verdict.ack) == (Result.REJECTED, MissionResult.INVALID_PARAM1)
+    assert verdict.findings[-1].becomes == REJECTED
+
+
+@pytest.mark.parametrize("target", [0, -1, -32768])
+def test_a_jump_that_crashes_cannot_even_be_encoded(target: int) -> None:
+    with pytest.raises(UnsafeRecord):
+        encode_set_wp(2, NavRecord(A.JUMP, p1=target))
+
+
+@pytest.mark.parametrize("number", [0, 255, -1])
+def test_home_and_the_held_position_cannot_be_written(number: int) -> None:
+    with pytest.raises(UnsafeRecord):
+        encode_set_wp(number, NavRecord(A.WAYPOINT, 1, 2, 3))
+
+
+def test_a_set_wp_is_the_bytes_of_the_spec() -> None:
+    spec = bytes.fromhex("244d3c15d101018768111ff99254ff88130000000000000000007e")
+    number, record = decode_wp(spec[5:-1]) or (0, NavRecord(0))
+    assert encode_set_wp(number, record) == spec
+
+
+@pytest.mark.parametrize(
+    ("items", "ack"),
+    [
+        ((item(C.NAV_RETURN_TO_LAUNCH, at=False),), MissionResult.INVALID),
+        ((item(C.NAV_TAKEOFF, at=False, alt_m=5.0), item(206)), MissionResult.INVALID),
+        ((item(C.DO_SET_ROI), item(C.DO_SET_ROI_NONE, at=False)), MissionResult.INVALID),
+        ((item(C.NAV_WAYPOINT, frame=7),), MissionResult.UNSUPPORTED_FRAME),
+        ((item(C.NAV_WAYPOINT, lat_e7=900_000_001),), MissionResult.INVALID_PARAM5_X),
+        ((item(C.NAV_WAYPOINT, lon_e7=2**31 - 1),), MissionResult.INVALID_PARAM6_Y),
+        ((WP,) * 121, MissionResult.NO_SPACE),
+        ((WP,) * 300, MissionResult.NO_SPACE),
+    ],
+)
+def test_lists_that_are_rejected(items: tuple[MissionItem, ...], ack: MissionResult) -> None:
+    verdict = verdict_on(*items)
+    assert (verdict.result, verdict.ack, verdict.records) == (Result.REJECTED, ack, ())
+
+
+def test_as_many_records_fit_as_the_flight_controller_says() -> None:
+    assert len(kept(*(WP,) * 120)) == 120
+    assert len(kept(*(speed(5), WP, speed(6), WP) * 60)) == 120
+    assert check_count(242, INAV) is not None
+    assert check_count(122, MULTIWII) is not None
+
+
+def test_home_is_no_record_and_may_be_anywhere() -> None:
+    for lat in (0, None, LAT, 2**31 - 1):
+        verdict = check_list([replace(HOME, lat_e7=lat), WP], INAV, (11, 22))
+        assert (verdict.result, len(verdict.records), verdict.findings) == (Result.ACCEPTED, 1, ())
+        assert verdict.items[0].lat_e7 == (LAT if lat == LAT else 11)
+    assert check_list([WP, WP], INAV).result is Result.ACCEPTED
+    assert check_list([item(C.NAV_LAND), WP], INAV).ack is MissionResult.INVALID
+
+
+def test_multiwii_has_an_endless_hold_a_height_on_the_way_home_and_no_speeds() -> None:
+    sent = (WP, item(C.NAV_RETURN_TO_LAUNCH, at=False, alt_m=30.0), item(C.NAV_LOITER_UNLIM))
+    verdict = verdict_on(*sent, rules=MULTIWII)
+    assert verdict.findings == ()
+    assert [(r.action, r.alt_cm) for r in verdict.records] == [(1, 5000), (4, 3000), (2, 5000)]
+    assert list(verdict.items[1:]) == [replace(it, seq=n) for n, it in enumerate(sent, 1)]
+    assert said(speed(5), WP, rules=MULTIWII) == [(1, "command", 178, DROPPED)]
+    assert said(replace(WP, frame=0), rules=MULTIWII) == [(1, "frame", 0, 3)]
+
+
+def test_what_others_wrote_is_shown_whatever_it_is() -> None:
+    records = [
+        NavRecord(99, 1, 2, 3),
+        NavRecord(A.JUMP, p1=77),
+        NavRecord(A.WAYPOINT, p1=-5),
+        NavRecord(A.SET_HEAD, p1=400),
+    ]
+    shown = items_from_records(records, home_item(None))
+    assert [(it.command, it.p1) for it in shown] == [(16, 0), (0, 99), (177, 0), (16, 0), (197, 0)]
+
+
+MANY = 250
+ALL = [16, 16, 16, 17, 18, 19, 20, 21, 22, 80, 115, 177, 177, 178, 178, 195, 197, 201, 206]
+tame = st.sampled_from([-2.0, -1.0, 0.0, 0.3, 1.0, 2.0, 3.0, 4.0, 5.5, 180.0, 359.0, math.nan])
+items = st.builds(
+    MissionItem,
+    seq=st.just(0),
+    command=st.sampled_from(ALL),
+    frame=st.sampled_from([0, 2, 3, 3, 3, 5, 6, 10]),
+    p1=st.one_of(tame, tame, numbers),
+    p2=st.one_of(tame, tame, numbers),
+    p3=st.sampled_from([0.0, math.nan, 3.0]),
+    p4=st.sampled_from([0.0, 0.0, 1.0, math.nan]),
+    lat_e7=st.one_of(st.sampled_from([453838000, 453840141, -1, 0]), degrees),
+    lon_e7=st.one_of(st.sampled_from([84733000, 84741389, -1, None]), degrees),
+    alt_m=st.one_of(st.sampled_from([50.0, 33.33, 0.0]), numbers),
+)
+flyable = st.builds(
+    replace,
+    items,
+    command=st.sampled_from([c for c in ALL if c != 177] * 2 + [177]),
+    frame=st.sampled_from([0, 3, 10]),
+    lat_e7=st.sampled_from([453838000, 453840141]),
+    lon_e7=st.sampled_from([84733000, -1]),
+    alt_m=st.sampled_from([50.0, 33.33, 0.0]),
+)
+lists = st.one_of(st.lists(flyable, min_size=1, max_size=14), st.lists(items, min_size=1, max_size=6))
+profiles = st.sampled_from([INAV, MULTIWII])
+
+
+@given(lists, profiles)
+@settings(max_examples=MANY, deadline=None)
+def test_nothing_raises_and_nothing_dangerous_is_kept(sent: list[MissionItem], rules: NavRules) -> None:
+    verdict = check_list([HOME, *sent], rules)
+    event(verdict.result.name)
+    assert all(len(finding.text()) <= 50 for finding in verdict.findings)
+    assert all("\n" not in finding.full_text() for finding in verdict.findings)
+    if verdict.result is not Result.ACCEPTED:
+        assert verdict.records == ()
+        return
+    assert [record.flag for record in verdict.records] == [0] * (len(verdict.records) - 1) + [LAST]
+    for number, record in enumerate(verdict.records, 1):
+        assert decode_wp(encode_set_wp(number, record)[5:-1]) == (number, record)
+        if record.action == A.JUMP:
+            assert 1 <= record.p1 <= len(verdict.records)
+            assert verdict.records[record.p1 - 1].action in LEGS
+            assert rules is MULTIWII or abs(record.p1 - number) >= 2
+            assert rules is INAV or record.p1 < number
+        if record.action == A.POSHOLD_UNLIM:
+            assert rules is MULTIWII
+
+
+@given(lists, profiles, st.booleans(), st.booleans())
+@settings(max_examples=MANY, deadline=None)
+def test_what_is_read_and_written_again_is_the_same_without_a_finding(
+    sent: list[MissionItem], rules: NavRules, remembered: bool, as_float: bool
+) -> None:
+    verdict = check_list([HOME, *sent], rules)
+    if verdict.result is not Result.ACCEPTED:
+        return
+    read = items_from_records(verdict.records, verdict.items[0], verdict.sent_as if remembered else {})
+    if remembered:
+        assert read == verdict.items
+    if as_float:
+        # As the wire has it: heights and parameters in single precision, places in degrees * 1e7.
+        read = tuple(through_the_wire(shown) for shown in read)
+    again = check_list(read, rules)
+    assert (again.result, again.findings) == (Result.ACCEPTED, ())
+    assert again.records == verdict.records
+    if remembered and not as_float:
+        assert again.items == verdict.items
+
+
+def through_the_wire(shown: MissionItem) -> MissionItem:
+    params = (shown.p1, shown.p2, shown.p3, shown.p4)
+    link = messages.MAVLink(None, 1, 1)
+    packed = messages.MAVLink_mission_item_message(
+        1, 1, shown.seq, shown.frame, shown.command, 0, 1, *params, 0, 0, shown.alt_m
+    ).pack(link)
+    heard = item_from_float_message(link.parse_char(packed))
+    return replace(heard, lat_e7=shown.lat_e7, lon_e7=shown.lon_e7)
+
+
+@given(st.lists(flyable, min_size=1, max_size=10))
+@settings(max_examples=MANY, deadline=None)
+def test_what_differs_was_told(sent: list[MissionItem]) -> None:
+    """Without findings every item is read as it was sent, but for NaN, equal frames, and speeds' places."""
+    verdict = check_list([HOME, *sent], INAV)
+    if verdict.result is not Result.ACCEPTED or verdict.findings:
+        return
+    event("without findings")
+    frames = {5: 0, 6: 3, 2: 3}
+
+    def comparable(shown: MissionItem) -> tuple[Any, ...]:
+        params = tuple(0.0 if math.isnan(p) else p for p in (shown.p1, shown.p2, shown.p3, shown.p4))
+        is_leg = shown.command in (16, 17, 19, 21, 80, 195, 201)
+        frame = frames.get(shown.frame, shown.frame) if is_leg else None
+        return shown.command, frame, *params, shown.lat_e7 or 0, shown.lon_e7 or 0, shown.alt_m
+
+    def without_speeds(of: Any) -> list[tuple[Any, ...]]:
+        return [comparable(shown)[:1] + comparable(shown)[3:] for shown in of if shown.command not in (177, 178)]
+
+    assert without_speeds(verdict.items[1:]) == without_speeds(sent)
