@@ -48,7 +48,7 @@ class InavMissions(NavMissions):
             raise Failed(PushFailure.NOT_SAVED)
 
     def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
-        """Have it LOAD what was saved last; that is the old list, unless somebody else wrote one and did not save it."""
+        """Have it LOAD what was saved last: the old list, unless somebody else wrote one and did not save it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
             info = yield from self._info()
