@@ -79,3 +79,10 @@ def test_a_search_that_never_ends_enters_no_trap(read: int) -> None:
     assert {speed for _, speed, _ in world.written} == set(SPEEDS)
     world.assert_line_was_clean()
     assert world.naze.counters.resets == 0
+
+
+@pytest.mark.parametrize("read", [9600, 19200, 38400, 57600, 115200, 230400, 250000, 460800, 921600, 1000000])
+def test_no_single_trap_byte_at_the_speeds_of_other_firmware(read: int) -> None:
+    """INAV needs one '#' and silence to enter its command line, and one 'R' to reboot into its bootloader."""
+    for sent, clock, probe in itertools.product(SENT, CLOCKS, (PROBE, RESYNC)):
+        assert not {0x23, 0x52} & set(heard(probe, sent, read, clock))
