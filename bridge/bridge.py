@@ -171,6 +171,13 @@ class Bridge:
         self.ground.gone(peer)
         self._left(peer)
 
+    def link_closed(self, name: str, now: float) -> None:
+        """A link to ground stations is given up, and all who were heard on it are gone."""
+        self._now = now
+        for peer in self.ground.remove_link(name):
+            self._uploads.peer_gone(peer, now)
+            self._left(peer)
+
     # The store.
 
     def take_store_effects(self) -> list[StoreEffect]:

@@ -61,6 +61,15 @@ class Ground:
         self._everyone = None
         self._writers.pop(peer, None)
 
+    def remove_link(self, name: str) -> list[Peer]:
+        """Forget everybody on a link, and return those who were heard."""
+        for peer in [peer for peer in self._default_peers if peer.link == name]:
+            self.remove_default_peer(peer)
+        heard = [peer for peer in self.peers() if peer.link == name]
+        for peer in heard:
+            self.gone(peer)
+        return heard
+
     def peers(self) -> list[Peer]:
         """Return the ground stations that were heard."""
         return self._stations.peers()

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Protocol
 
 import structlog
@@ -15,9 +16,9 @@ from bridge.mission_log import ArrivedMission
 from bridge.procedure import StoreEffect
 from bridge.station import Peer
 from bridge.vehicle_groups import Group
-from service.connection import FcAddress, SerialFc
+from service.connection import FcAddress, GcsAddress, SerialFc
 from service.fc_port import STOPPED
-from service.gcs_links import GcsLink, open_link
+from service.gcs_links import GcsLink, LinkError, open_link
 from service.mission_data import Json
 from service.recording import Recording
 from service.settings import Settings
@@ -140,6 +141,25 @@ class Daemon:
     def add_link(self, link: GcsLink) -> None:
         """Serve ground stations over one more link; it is closed with the others."""
         self._links[link.name] = link
+
+    def change_links(self, gcs: Sequence[GcsAddress]) -> None:
+        """Serve these links to ground stations from now on; those that were there before go on undisturbed."""
+        wanted = {str(address): address for address in gcs}
+        for name in map(str, self.settings.gcs):
+            if name not in wanted and name in self._links:
+                self.bridge.link_closed(name, self._loop.time())
+                self.flush()
+                self._links.pop(name).close()
+                _log.info("gcs.closed", link=name)
+        for name, address in wanted.items():
+            if name not in self._links:
+                try:
+                    self._links[name] = open_link(address, self)
+                except LinkError as error:
+                    _log.error("gcs.unavailable", link=name, why=str(error))
+                else:
+                    _log.warning("gcs.open", link=name, what=_WHO_MAY_WRITE)
+        self.settings = replace(self.settings, gcs=tuple(gcs))
 
     def flush(self) -> None:
         """Carry out what the bridge wants after it was told something."""

@@ -2,12 +2,15 @@
 
 import asyncio
 import signal
+from collections.abc import Callable
 from contextlib import suppress
 
 import structlog
 
 from service.daemon import Daemon
 from service.notify import Notifier
+from service.reload import reload
+from service.settings import Settings
 
 #: How often the line for `systemctl status` is looked at, and at least how often within the watchdog's time it is fed.
 _INTERVAL_S = 2.0
@@ -16,8 +19,11 @@ _FEEDS = 3
 _log = structlog.get_logger()
 
 
-async def run_until_signal(daemon: Daemon, notifier: Notifier) -> None:
-    """Run the daemon until SIGINT or SIGTERM. A second signal does not wait for a mission under way."""
+async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]) -> None:
+    """Run the daemon until SIGINT or SIGTERM. A second signal does not wait for a mission under way.
+
+    On SIGHUP the settings are read again by `load`.
+    """
     loop = asyncio.get_running_loop()
     running = loop.create_task(daemon.run())
     stopping: asyncio.Task[None] | None = None
@@ -37,6 +43,7 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, signalled, number)
+    loop.add_signal_handler(signal.SIGHUP, reload, daemon, notifier, load)
     reporting = _Reporting(daemon, notifier)
     ready = loop.create_task(_tell_ready(daemon, notifier))
     try:

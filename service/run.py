@@ -2,6 +2,8 @@
 
 import asyncio
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,8 +50,9 @@ def run(
     check_config: bool,
 ) -> None:
     """Run the bridge between a flight controller and ground stations."""
+    load = partial(load_settings, config, fc, gcs, state_dir, record_uart, verbose=verbose)
     try:
-        settings = load_settings(config, fc, gcs, state_dir, record_uart, verbose=verbose)
+        settings = load()
     except SettingsError as error:
         raise click.UsageError(str(error)) from error
     if check_config:
@@ -57,19 +60,19 @@ def run(
         return
     set_up_logging(settings.log_level)
     try:
-        _serve(settings)
+        _serve(settings, load)
     except (ControlError, LinkError, StoreError, UartFileError, ZenohSettingsError) as error:
         click.echo(f"naze-bridge: {error}", err=True)
         sys.exit(1)
 
 
-def _serve(settings: Settings) -> None:
+def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
     assert settings.state_dir is not None
     with StateLock(settings.state_dir):
-        asyncio.run(_main(settings, socket_of_daemon(settings.state_dir)))
+        asyncio.run(_main(settings, load, socket_of_daemon(settings.state_dir)))
 
 
-async def _main(settings: Settings, socket_path: Path) -> None:
+async def _main(settings: Settings, load: Callable[[], Settings], socket_path: Path) -> None:
     daemon = Daemon(settings)
     control = ControlServer(daemon, socket_path)
     zenoh_node = None if settings.zenoh is None else _zenoh_node(settings.zenoh, daemon)
@@ -77,7 +80,7 @@ async def _main(settings: Settings, socket_path: Path) -> None:
     if zenoh_node is not None:
         zenoh_node.start()
     try:
-        await run_until_signal(daemon, Notifier())
+        await run_until_signal(daemon, Notifier(), load)
     finally:
         await control.close()
         if zenoh_node is not None:

@@ -44,6 +44,11 @@ class PlainStation:
     ) -> None:
         self._socket.close()
 
+    @property
+    def own_address(self) -> tuple[str, int]:
+        host, port = self._socket.getsockname()[:2]
+        return host, port
+
     def send(self, message: Any) -> None:
         self._socket.sendall(bytes(message.pack(self._codec)))
 

@@ -92,7 +92,7 @@ async def more_food(systemd: Systemd, before: int) -> int:
 async def test_the_watchdog_is_fed_by_the_loop_that_owns_the_links(systemd: Systemd, tmp_path: Path) -> None:
     """A loop that hangs feeds it no more, whatever other threads do."""
     daemon = Daemon(Settings(parse_fc("sim:"), [parse_gcs(f"udpin:127.0.0.1:{free_port()}")], tmp_path / "state"))
-    running = asyncio.create_task(run_until_signal(daemon, Notifier()))
+    running = asyncio.create_task(run_until_signal(daemon, Notifier(), lambda: daemon.settings))
     fed = await more_food(systemd, 2)
     time.sleep(1.0)  # noqa: ASYNC251 - this is the hang; the watchdog would have waited for 0.6 s
     assert systemd.listen().count("WATCHDOG=1") == fed

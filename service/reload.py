@@ -1,0 +1,42 @@
+"""SIGHUP: the settings are read again, and what can be taken over in flight is."""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import structlog
+
+from service.daemon import Daemon
+from service.log_setup import set_log_level
+from service.notify import Notifier
+from service.settings import Settings, SettingsError
+
+_log = structlog.get_logger()
+
+
+def reload(daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]) -> None:
+    """Take over what `load` returns; settings that cannot be used change nothing."""
+    notifier.reloading()
+    try:
+        _take_over(daemon, load())
+    except SettingsError as error:
+        _log.error("config.rejected", why=[str(problem) for problem in error.problems], what="nothing is changed")
+    notifier.ready()
+
+
+def _take_over(daemon: Daemon, new: Settings) -> None:
+    old = daemon.settings
+    changed = {field.name for field in fields(Settings) if getattr(old, field.name) != getattr(new, field.name)}
+    live: set[str] = set()
+    if "log_level" in changed:
+        set_log_level(new.log_level)
+        daemon.settings = replace(daemon.settings, log_level=new.log_level)
+        live.add("log_level")
+    if "access" in changed:
+        # Keys are held by what guards and signs: who may write is not changed under a running transfer.
+        changed = changed - {"access"} | {"gcs"}
+    elif "gcs" in changed:
+        daemon.change_links(new.gcs)
+        live.add("gcs")
+    _log.info("config.reloaded", taken_over=sorted(live))
+    if needs_restart := sorted(changed - live):
+        _log.warning("config.needs_restart", settings=needs_restart)

@@ -1,0 +1,112 @@
+"""SIGHUP: what is taken over in flight, what needs a restart, and a file that cannot be used."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from plain_station import tcp_station, udp_station
+from programs import Program, free_port, until
+
+from service.control import ask_daemon
+
+
+class ConfiguredDaemon:
+    """A daemon with a simulated Naze and a configuration file."""
+
+    def __init__(self, start: Starter) -> None:
+        self._config = start.directory / "config.toml"
+        self._state = start.directory / "state"
+        self.port, self.second, self.tcp = free_port(), free_port(), free_port()
+        self.write(self.first_link)
+        arguments = ("--config", str(self._config), "--state-dir", str(self._state))
+        self._program: Program = start.program("log", "run", "--fc", "sim:", *arguments)
+        until(lambda: "daemon.started" in self.log or not self._program.is_alive, "the daemon")
+
+    @property
+    def first_link(self) -> str:
+        return f'"udpin:127.0.0.1:{self.port}"'
+
+    @property
+    def log(self) -> str:
+        return self._program.printed
+
+    def write(self, links: str, more: str = "") -> None:
+        self._config.write_text(f"gcs = [{links}]\n{more}\n")
+
+    def reload(self, word: str) -> None:
+        """Send SIGHUP, and wait for an event."""
+        before = self.log.count(word)
+        os.kill(self._program.process.pid, signal.SIGHUP)
+        until(lambda: self.log.count(word) > before, word)
+
+    def stations(self) -> list[str]:
+        found: list[str] = ask_daemon(self._state, {"do": "status"})["ground_stations"]
+        return found
+
+
+@pytest.fixture
+def daemon(start: Starter) -> ConfiguredDaemon:
+    return ConfiguredDaemon(start)
+
+
+def test_links_come_and_go_while_the_others_go_on(daemon: ConfiguredDaemon) -> None:
+    with udp_station(("127.0.0.1", daemon.port)) as first:
+        first.say_hello()
+        first.wait_for("HEARTBEAT")
+        daemon.write(f'{daemon.first_link}, "udpin:127.0.0.1:{daemon.second}", "tcpin:127.0.0.1:{daemon.tcp}"')
+        daemon.reload("config.reloaded")
+        with udp_station(("127.0.0.1", daemon.second)) as second, tcp_station(daemon.tcp) as third:
+            for station in (second, third):
+                station.say_hello()
+                station.wait_for("HEARTBEAT")
+            assert len(daemon.stations()) == 3
+            daemon.write(daemon.first_link)
+            daemon.reload("config.reloaded")
+            assert [station.split(":")[2].split()[0] for station in daemon.stations()] == [str(daemon.port)]
+        first.heard.clear()
+        first.wait_for("HEARTBEAT")
+    assert "config.needs_restart" not in daemon.log
+
+
+def test_a_port_that_is_taken_costs_only_that_link(daemon: ConfiguredDaemon) -> None:
+    with udp_station(("127.0.0.1", daemon.port)) as taken:
+        own_port = taken.own_address[1]
+        daemon.write(f'{daemon.first_link}, "udpin:127.0.0.1:{own_port}"')
+        daemon.reload("gcs.unavailable")
+        taken.say_hello()
+        taken.wait_for("HEARTBEAT")
+
+
+def test_what_needs_a_restart_is_named(daemon: ConfiguredDaemon) -> None:
+    daemon.write(daemon.first_link, 'sysid = 7\ntakeoff_max_m = 20\nlog_level = "debug"\n[zenoh]')
+    daemon.reload("config.needs_restart")
+    assert '"settings": ["sysid", "takeoff_max_m", "zenoh"]' in daemon.log
+    assert '"taken_over": ["log_level"]' in daemon.log
+    with udp_station(("127.0.0.1", daemon.port)) as station:
+        station.say_hello()
+        assert station.wait_for("HEARTBEAT").get_srcSystem() == 1
+
+
+def test_who_may_write_is_not_changed_in_flight(daemon: ConfiguredDaemon) -> None:
+    daemon.write(f'{{address = {daemon.first_link}, writers = []}}, "udpin:127.0.0.1:{daemon.second}"')
+    daemon.reload("config.needs_restart")
+    assert '"settings": ["gcs"]' in daemon.log
+    assert '"taken_over": []' in daemon.log
+
+
+def test_a_broken_file_changes_nothing_and_is_explained(daemon: ConfiguredDaemon) -> None:
+    daemon.write("", "sysidd = 1")
+    daemon.reload("config.rejected")
+    assert "gcs is empty" in daemon.log
+    assert "did you mean 'sysid'?" in daemon.log
+    with udp_station(("127.0.0.1", daemon.port)) as station:
+        station.say_hello()
+        station.wait_for("HEARTBEAT")
+
+
+def test_a_missing_file_changes_nothing(daemon: ConfiguredDaemon, start: Starter) -> None:
+    Path(start.directory / "config.toml").unlink()
+    daemon.reload("config.rejected")
+    assert daemon.stations() == []
