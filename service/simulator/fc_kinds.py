@@ -1,5 +1,7 @@
 """Which boards beside the Naze can be simulated, and how one is made."""
 
+from functools import partial
+
 from service.simulator.inav import InavFirmware
 from service.simulator.inav_mission import EEPROM_SIZE
 from service.simulator.msp_board import MspBoard
@@ -8,8 +10,14 @@ from service.simulator.msp_options import MspOptions
 from service.simulator.multiwii import MultiWiiFirmware
 from service.simulator.multiwii_mission import blank_eeprom
 from service.simulator.options import Faults
+from service.simulator.telemetry_only import BASEFLIGHT, BETAFLIGHT, TelemetryFirmware
 
-_FIRMWARE: dict[str, BootFirmware] = {"inav": InavFirmware, "multiwii": MultiWiiFirmware}
+_FIRMWARE: dict[str, BootFirmware] = {
+    "inav": InavFirmware,
+    "multiwii": MultiWiiFirmware,
+    "betaflight": partial(TelemetryFirmware, BETAFLIGHT),
+    "baseflight": partial(TelemetryFirmware, BASEFLIGHT),
+}
 KINDS = tuple(_FIRMWARE)
 
 

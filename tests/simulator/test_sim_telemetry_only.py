@@ -1,0 +1,58 @@
+"""The simulated Betaflight and baseflight: their own lengths, and no missions."""
+
+import struct
+
+import pytest
+from msp_bench import MspBench, waypoint
+
+from service.simulator.options import Faults
+
+LENGTHS = {
+    "betaflight": {1: 3, 2: 4, 3: 3, 101: 24, 102: 18, 105: 32, 106: 18, 107: 5, 108: 6, 109: 6, 110: 9},
+    "baseflight": {100: 7, 101: 11, 102: 18, 105: 16, 106: 16, 107: 5, 108: 6, 109: 6, 110: 7},
+}
+KINDS = tuple(LENGTHS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_lengths(kind: str) -> None:
+    bench = MspBench(kind)
+    assert {command: len(bench.payload(command)) for command in LENGTHS[kind]} == LENGTHS[kind]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("command", "payload"), [(18, b"\0"), (19, b"\0"), (20, b""), (121, b""), (122, b"")])
+def test_questions_about_missions_are_errors(kind: str, command: int, payload: bytes) -> None:
+    frame = MspBench(kind).ask(command, payload)
+    assert frame is not None
+    assert frame.direction == "!"
+
+
+def test_betaflight_refuses_a_waypoint_and_baseflight_takes_any_for_its_hold_position() -> None:
+    refused, taken = (MspBench(kind).ask(209, waypoint(1).pack(1)) for kind in KINDS)
+    assert refused is not None
+    assert taken is not None
+    assert (refused.direction, taken.direction) == ("!", ">")
+    assert len(MspBench("baseflight").payload(118, b"\x01")) == 18
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("armed", [False, True])
+def test_the_arm_flag_is_where_the_names_have_arm(kind: str, armed: bool) -> None:
+    bench = MspBench(kind, faults=Faults(armed=armed))
+    bench.run(0.5)
+    names = bench.payload(116).split(b";")
+    assert len(names) == len(bench.payload(119)) + 1
+    flags = struct.unpack_from("<I", bench.payload(101), 6)[0]
+    assert bool(flags >> names.index(b"ARM") & 1) is armed
+
+
+@pytest.mark.parametrize(("kind", "lowest"), [("betaflight", 0), ("baseflight", -180)])
+def test_the_heading_goes_round_in_flight(kind: str, lowest: int) -> None:
+    bench = MspBench(kind, faults=Faults(armed=True))
+    headings = []
+    for _ in range(80):
+        bench.run(1)
+        headings.append(struct.unpack("<hhh", bench.payload(108))[2])
+    assert lowest <= min(headings) < lowest + 10
+    assert lowest + 350 < max(headings) < lowest + 360
