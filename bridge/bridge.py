@@ -186,10 +186,10 @@ class Bridge:
         self._store_effects.clear()
         return effects
 
-    def store_answered(self, answer: object, now: float) -> None:
-        """Take the store's answer."""
+    def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
+        """Take the store's answer to an effect."""
         self._now = now
-        self.runner.store_answered(answer, now)
+        self.runner.store_answered(effect, answer, now)
 
     def take_mission_endings(self) -> list[tuple[ArrivedMission, Delivery]]:
         """Return the missions that were dealt with to their end, and how."""

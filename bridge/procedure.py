@@ -67,7 +67,7 @@ class Pause:
 
 @dataclass(frozen=True, slots=True)
 class Save:
-    """Store a mission that came in. Answer: its number, or None if it could not be stored."""
+    """Store a mission that came in. Answer: its number, or None if it could not be stored in time."""
 
     mission: ArrivedMission
 
@@ -147,11 +147,11 @@ def save(mission: ArrivedMission) -> Procedure[int | None]:
 
 def conclude(number: int, conclusion: Conclusion) -> Procedure[bool]:
     """Store what became of a mission; whether that worked."""
-    done: bool = yield Conclude(number, conclusion)
-    return done
+    done: bool | None = yield Conclude(number, conclusion)
+    return bool(done)
 
 
 def recall(identity: ListIdentity) -> Procedure[Mapping[int, int]]:
     """Return the commands, by record number, with which records that do not tell were sent; empty if unknown."""
-    commands: Mapping[int, int] = yield Recall(identity)
-    return commands
+    commands: Mapping[int, int] | None = yield Recall(identity)
+    return commands or {}

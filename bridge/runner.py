@@ -8,13 +8,10 @@ from bridge.mavlink_line import MavlinkLine
 from bridge.msp_link import MspLink
 from bridge.procedure import (
     Await,
-    Conclude,
     LinkLost,
     Pause,
     Procedure,
-    Recall,
     Receive,
-    Save,
     Send,
     Stopped,
     StoreEffect,
@@ -22,6 +19,10 @@ from bridge.procedure import (
 )
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
+
+#: A dying SD card may hang for ever, and what is asked of the flight controller waits behind it. Mission Planner waits
+#: for its final ack for 5 s.
+_STORE_PATIENCE_S = 3.0
 
 
 class Runner:
@@ -80,9 +81,9 @@ class Runner:
         if isinstance(self._awaited, Await) and frame.msgid in self._awaited.msgids:
             self._advance(frame, now)
 
-    def store_answered(self, answer: object, now: float) -> None:
-        """Take the store's answer to the effect that was handed out last."""
-        if isinstance(self._awaited, Save | Conclude | Recall):
+    def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
+        """Take the store's answer to an effect that was handed out; nobody waits for one that comes too late."""
+        if effect is self._awaited:
             self._advance(answer, now)
 
     def tick(self, now: float) -> None:
@@ -147,6 +148,7 @@ class Runner:
                     return
                 else:
                     self._awaited = effect
+                    self._deadline = now + _STORE_PATIENCE_S
                     self._on_store(effect)
                     return
         except StopIteration as stop:

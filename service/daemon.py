@@ -272,7 +272,7 @@ class Daemon:
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answered(answer: object) -> None:
-            self.bridge.store_answered(answer, self._loop.time())
+            self.bridge.store_answered(effect, answer, self._loop.time())
             self.flush()
 
         self.store.carry_out(effect, answered)

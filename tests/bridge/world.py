@@ -290,7 +290,7 @@ class World:
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answer() -> None:
-            self.bridge.store_answered(self.store.carry_out(effect), self.now)
+            self.bridge.store_answered(effect, self.store.carry_out(effect), self.now)
             self._flush()
 
         self.after(self.store.delay_s, answer)

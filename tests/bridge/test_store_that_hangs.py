@@ -1,0 +1,59 @@
+"""A dying SD card answers after minutes or never: the craft is still shown, and still takes its mission."""
+
+from conversations import Download, Upload, records_of, waypoints
+from world import GroundStation, World, flash_holding
+
+from bridge.mission_log import Outcome
+from protocols.mission_item import MissionResult
+
+NEVER = 1e9
+
+
+def holding(count: int = 5) -> tuple[World, GroundStation]:
+    world = World(speeds=(115200,), flash=flash_holding(records_of(waypoints(count))))
+    world.wait_ready()
+    return world, GroundStation(world)
+
+
+def test_a_mission_gets_there_while_mission_planner_still_waits() -> None:
+    world, station = holding()
+    world.store.delay_s = NEVER
+    items = waypoints(20)
+    # Mission Planner repeats its last item for 5 s.
+    assert Upload(station, items).run(4.5) is MissionResult.ACCEPTED
+    assert world.stored == records_of(items)
+    assert "The mission could not be stored on the Pi" in station.texts()
+
+
+def test_what_hangs_after_the_push_keeps_no_answer_back() -> None:
+    world, station = holding()
+    upload = Upload(station, waypoints(20))
+    world.wait_until(lambda w: bool(w.store.missions), 10)
+    world.store.delay_s = NEVER
+    assert upload.run(4.5) is MissionResult.ACCEPTED
+    assert "The mission could not be stored on the Pi" in station.texts()
+    assert world.store.outcomes() == [None]
+
+
+def test_the_flight_controller_is_found_and_read_all_the_same() -> None:
+    world = World(speeds=(115200,), flash=flash_holding(records_of(waypoints(5))))
+    world.store.delay_s = NEVER
+    world.wait_ready(8)
+    world.unplug()
+    world.plug()
+    world.wait_ready(8)
+    assert len(Download(GroundStation(world)).run(10)) == 5
+
+
+def test_a_late_answer_is_nobody_elses() -> None:
+    """The card goes on after 10 s: what it says of one mission is not taken for another's."""
+    world, station = holding()
+    world.store.delay_s = 10.0
+    assert Upload(station, waypoints(6, 1)).run(8) is MissionResult.ACCEPTED
+    world.run(3)
+    world.store.delay_s = 0.0
+    second = waypoints(7, 2)
+    assert Upload(station, second).run(8) is MissionResult.ACCEPTED
+    world.run(20)
+    ended = [(mission.items, end and end.outcome) for mission, end in world.store.missions]
+    assert [(items, outcome) for items, outcome in ended if outcome] == [(tuple(second), Outcome.VERIFIED)]
