@@ -10,6 +10,7 @@
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
 #   make config-sample  write systemd/config.toml and the keys of docs/configuration.md anew
+#   make zenoh-schemas  write service/zenoh_link/schemas/ anew, from the types that the payloads are made of
 #   make clean          remove everything that the above have made
 
 PYTHON ?= python3
@@ -20,7 +21,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench soak lock message-table config-sample clean
+.PHONY: demo test lint bench soak lock message-table config-sample zenoh-schemas clean
 
 demo: $(VENV)/.demo-ready
 	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
@@ -78,6 +79,9 @@ config-sample: $(VENV)/.test-ready
 	sed -i '/begin: make config-sample/,$$d' docs/configuration.md
 	echo '<!-- begin: make config-sample -->' >> docs/configuration.md
 	$(BIN)/python -m service.settings.sample --page >> docs/configuration.md
+
+zenoh-schemas: $(VENV)/.test-ready
+	$(BIN)/python -m service.zenoh_link.schema_files
 
 clean:
 	rm -rf $(VENV) build dist .demo .hypothesis .mypy_cache .pytest_cache .ruff_cache benchmarks/results

@@ -1,10 +1,13 @@
 """The zenoh configuration of the daemon's session: the file that is passed through, and ours where it says nothing."""
 
 import json
+from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import zenoh
 
+from service.zenoh_link.endpoint_trouble import TlsFiles
 from service.zenoh_link.settings import I_KNOW, ZenohSettings, ZenohSettingsError
 
 #: A command of 10 MB is answered; what is larger is not even put together in a Pi's memory.
@@ -39,6 +42,17 @@ def make_config(settings: ZenohSettings) -> zenoh.Config:
     if settings.commands or settings.mavlink_in:
         _insist_on_authentication(settings, config)
     return config
+
+
+def connect_endpoints(config: zenoh.Config) -> list[str]:
+    """Return where the session connects to."""
+    return _endpoints(json.loads(config.get_json("connect/endpoints")))
+
+
+def tls_files(config: zenoh.Config) -> TlsFiles:
+    """Return the certificates that it connects with."""
+    tls = json.loads(config.get_json("transport/link/tls"))
+    return TlsFiles(*(Path(tls[field.name]) if tls[field.name] else None for field in fields(TlsFiles)))
 
 
 def in_short(error: zenoh.ZError) -> str:

@@ -23,7 +23,8 @@ from service.mission_data import Json
 from service.zenoh_link import keys, vehicle_data
 from service.zenoh_link.answers import Answers
 from service.zenoh_link.commands import Commands
-from service.zenoh_link.configuration import make_config
+from service.zenoh_link.configuration import connect_endpoints, make_config, tls_files
+from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.keys import Delivery as Way
 from service.zenoh_link.keys import Key
 from service.zenoh_link.mavlink_link import MavlinkLink
@@ -38,6 +39,8 @@ from service.zenoh_link.vehicle_data import VehicleData
 _STATE_INTERVAL_S = 1.0
 #: An autopilot may send faster than this; nobody reads it so.
 _LEAST_INTERVAL_S = 0.004
+#: How long nobody is there before it is looked into, and until it is looked again.
+_PATIENCE_S = 10.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
 
 _log = structlog.get_logger()
@@ -50,7 +53,8 @@ class Node:
         self._settings = settings
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
-        self._thread = SessionThread(make_config(settings), self._declare)
+        self._config = make_config(settings)
+        self._thread = SessionThread(self._config, self._declare)
         self._payloads = Payloads(settings.encoding)
         self._publisher = Publisher(self._payloads, self._readers_changed)
         self._mavlink = MavlinkLink(self._publisher, daemon)
@@ -63,6 +67,8 @@ class Node:
             self._answerers |= Commands(jobs).answerers
         self._sent_at: dict[Group, float] = {}
         self._held: HeldMission | None = None
+        self._ask_why_at = self._loop.time() + _PATIENCE_S
+        self._why_alone = ""
         self._soon: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None
 
@@ -152,7 +158,24 @@ class Node:
 
     def _every_second(self) -> None:
         self._publish_whole()
+        self._look_into_silence()
         self._tick = self._loop.call_later(_STATE_INTERVAL_S, self._every_second)
+
+    def _look_into_silence(self) -> None:
+        """Say why nobody is joined who should be: zenoh goes on trying and says nothing."""
+        now = self._loop.time()
+        if not self._presence.is_alone:
+            self._ask_why_at = now + _PATIENCE_S
+        elif now >= self._ask_why_at:
+            self._ask_why_at = now + _PATIENCE_S
+            self._thread.submit(self._find_out_why)
+
+    def _find_out_why(self) -> None:
+        endpoints = connect_endpoints(self._config)
+        why = endpoint_trouble(endpoints, tls_files(self._config)) if endpoints else ""
+        if why != self._why_alone:
+            self._why_alone = why
+            _log.warning("zenoh.alone", why=why)
 
     def _publish_whole(self) -> None:
         self._soon = None

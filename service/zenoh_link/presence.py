@@ -51,6 +51,11 @@ class Presence:
             self.others.discard(who)
             self._note("info", "zenoh.name_free", vehicle=self._vehicle, was=who)
 
+    @property
+    def is_alone(self) -> bool:
+        """Tell whether nobody is joined."""
+        return not self._neighbours
+
     def status(self) -> Json:
         """Tell how things stand, for `naze-bridge status`."""
         return {

@@ -54,10 +54,10 @@ class Starter:
         """Any other subcommand; what it prints goes to a file of that name."""
         return self._ended_at_last(Program(self.directory / name, *arguments))
 
-    def bench(self, *options: str, gcs: Sequence[str] = ()) -> Bench:
+    def bench(self, *options: str, gcs: Sequence[str] = (), daemon_options: Sequence[str] = ()) -> Bench:
         """A board with `options`, and a daemon that has found it."""
         board = self.board(*options)
-        daemon = self.daemon(str(board.link), gcs)
+        daemon = self.daemon(str(board.link), gcs, options=daemon_options)
         daemon.wait()
         return Bench(board, daemon, self._stack)
 

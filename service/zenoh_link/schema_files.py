@@ -1,0 +1,141 @@
+"""Writes schemas/*.json, the published JSON Schema of each key, from the types that the payloads are made of.
+
+`make zenoh-schemas` does it; a test says when the files are not up to date.
+"""
+
+import json
+import types
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from bridge import vehicle_groups as groups
+from bridge.finding import Finding
+from bridge.vehicle_groups import Group, VehicleReport
+from protocols.mission_item import MissionItem
+from service.mission_data import Json
+from service.zenoh_link.keys import VERSION
+from storage.mission_store import MissionSummary
+
+FOLDER = Path(__file__).parent / "schemas"
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_TYPES = {float: "number", int: "integer", str: "string", bool: "boolean", types.NoneType: "null"}
+_ENVELOPE: Json = {
+    "v": {"const": VERSION, "description": "version of keys and payloads"},
+    "seq": {"type": "integer", "minimum": 0, "description": "number of this key's sample: a gap is a loss"},
+    "time_s": {"type": "number", "description": "by the bridge's clock, seconds since 1970 (UTC)"},
+}
+_NUMBER: Json = {"type": ["number", "null", "string"], "description": "null: not given; inf or -inf as text"}
+_PLACE: Json = {"type": ["integer", "null"], "description": "degrees * 1e7; null: not given"}
+_ITEM_FIELDS: Json = {**dict.fromkeys(("p1", "p2", "p3", "p4", "alt_m"), _NUMBER), "lat_e7": _PLACE, "lon_e7": _PLACE}
+_COUNT: Json = {"type": ["integer", "null"], "minimum": 0, "description": "records, home included; null: not known"}
+_CHECKSUM: Json = {"type": "string", "pattern": "^[0-9a-f]{8}$", "description": "CRC-32 over the records"}
+
+
+def schemas() -> dict[str, Json]:
+    """Return the schema of each payload by its file's name."""
+    items = {"type": "array", "items": _of(MissionItem) | {"properties": _fields(MissionItem) | _ITEM_FIELDS}}
+    findings = {"type": "array", "items": _of(Finding)}
+    upload = {
+        "ack": {"type": "string", "pattern": "^MAV_MISSION_"},
+        "text": {"type": "string"},
+        "verdict": {"enum": ["ACCEPTED", "CLEARED", "REJECTED"]},
+        "findings": findings,
+        "sent": items,
+        "stored": items,
+        "mission": {"type": ["integer", "null"], "description": "its number in the store; null: it is not stored"},
+    }
+    made = {group.value: _fields(getattr(groups, group.value.capitalize())) for group in Group}
+    made["state"] = {
+        "vehicle": {"type": "string", "description": "its name, as in the key"},
+        "others_of_this_name": {"type": "integer", "minimum": 0, "description": "more bridges that use the name"},
+        **_fields(VehicleReport),
+    }
+    made["event"] = {
+        "level": {"enum": ["debug", "info", "warning", "error"]},
+        "event": {"type": "string", "pattern": r"^[a-z0-9_]+(\.[a-z0-9_]+)+$"},
+        "facts": {"type": "object", "additionalProperties": {"type": ["string", "number", "boolean", "null"]}},
+    }
+    made["mission_current"] = {
+        "count": _COUNT,
+        "checksum": _CHECKSUM | {"type": ["string", "null"]},
+        "items": items | {"type": ["array", "null"]},
+    }
+    summary = _fields(MissionSummary) | {"checksum": _CHECKSUM}
+    for name in ("received_at", "concluded_at"):
+        summary[f"{name}_s"] = summary.pop(name) | {"description": "seconds since 1970 (UTC)"}
+    made["mission_list"] = {"missions": {"type": "array", "items": _object(summary)}}
+    made["mission_report"] = upload | {"source": {"type": "string", "description": "who sent it"}}
+    files = {name: _file(name, _ENVELOPE | body) for name, body in made.items()}
+    files["command_reply"] = _reply(_object(upload, required=("ack", "text")), items, findings)
+    return files
+
+
+def _reply(upload: Json, items: Json, findings: Json) -> Json:
+    check = _object(
+        {
+            "result": {"enum": ["ACCEPTED", "CLEARED", "REJECTED"]},
+            "ack": {"type": "string", "pattern": "^MAV_MISSION_"},
+            "items": items,
+            "records": {"type": "array", "items": {"type": "string", "pattern": "^([0-9a-f]{2})+$"}},
+            "findings": findings,
+        }
+    )
+    status = {"type": "object", "required": ["state"], "description": "as `naze-bridge status --json`"}
+    count = {"type": "integer", "minimum": 0}
+    error = {"type": "string", "description": "one sentence: why not"}
+    return {
+        "$schema": _DIALECT,
+        "title": "@cmd",
+        "oneOf": [
+            _object({"progress": count, "of": count}),
+            _object({"result": {"anyOf": [upload, check, status]}}),
+            _object({"error": error, "result": upload}, required=("error",)),
+        ],
+    }
+
+
+def _file(name: str, properties: Json) -> Json:
+    return {"$schema": _DIALECT, "title": name, **_object(properties)}
+
+
+def _object(properties: Json, required: tuple[str, ...] | None = None) -> Json:
+    must = list(properties) if required is None else list(required)
+    return {"type": "object", "properties": properties, "required": must, "additionalProperties": False}
+
+
+def _fields(kind: type) -> Json:
+    return {name: _of(hint) for name, hint in get_type_hints(kind, include_extras=True).items()}
+
+
+def _of(hint: Any) -> Json:
+    """Return the schema of a type."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _of(arguments[0]) | {"description": arguments[1]}
+    if is_dataclass(hint):
+        return _object(_fields(hint))  # type: ignore[arg-type]
+    if origin in (Union, types.UnionType):
+        several = [_of(argument) for argument in arguments]
+        if all(list(each) == ["type"] for each in several):
+            return {"type": [each["type"] for each in several]}
+        return {"anyOf": several}
+    if origin is tuple:
+        return {"type": "array", "items": _of(arguments[0])}
+    return {"type": _TYPES[hint]}
+
+
+def text(schema: Json) -> str:
+    """Return a file's contents."""
+    return json.dumps(schema, indent=2) + "\n"
+
+
+def write() -> None:
+    """Write all files."""
+    FOLDER.mkdir(exist_ok=True)
+    for name, schema in schemas().items():
+        (FOLDER / f"{name}.json").write_text(text(schema))
+
+
+if __name__ == "__main__":
+    write()

@@ -1,0 +1,85 @@
+"""Everything that is published or replied is what the published schemas say, on every key and in both encodings."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+from benches import Starter
+from jsonschema import Draft202012Validator
+from plan import plain_plan
+from programs import until
+from zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
+
+from service.zenoh_link.keys import COMMANDS, KEYS, Delivery
+from service.zenoh_link.schema_files import FOLDER, schemas, text
+
+MISSION = (Path(__file__).parents[2] / "examples" / "naze-field.waypoints").read_bytes()
+SCHEMAS = {key.suffix: key.schema for key in KEYS}
+
+
+def validator(name: str) -> Draft202012Validator:
+    schema = json.loads((FOLDER / f"{name}.json").read_text())
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
+
+
+def check(suffix: str, payload: Any) -> None:
+    name = SCHEMAS[suffix]
+    assert name is not None
+    validator(name).validate(payload)
+
+
+def check_all(reader: Reader, encoding: zenoh.Encoding) -> set[str]:
+    """Check all samples, and return which keys there were."""
+    found: set[str] = set()
+    for sample in reader.samples:
+        suffix = str(sample.key_expr).removeprefix(key(""))
+        found.add(suffix)
+        if SCHEMAS[suffix] is None:
+            assert sample.encoding == zenoh.Encoding.APPLICATION_OCTET_STREAM
+            continue
+        assert sample.encoding == encoding
+        check(suffix, body(sample))
+    return found
+
+
+def test_the_files_are_up_to_date() -> None:
+    """`make zenoh-schemas` writes them."""
+    wanted = {f"{name}.json": text(schema) for name, schema in schemas().items()}
+    assert {path.name: path.read_text() for path in FOLDER.iterdir()} == wanted
+
+
+@pytest.mark.parametrize("encoding", ["json", "cbor"])
+def test_all_that_is_said_is_as_published(start: Starter, encoding: str) -> None:
+    """A pilot's day: telemetry, missions that are taken and refused, arming, the other protocol, a cut cable."""
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\nencoding = "{encoding}"\n{I_KNOW}')
+    with session(connect=where) as opened:
+        reader = Reader(opened)
+        reader.wait("telemetry/attitude", lambda attitude: attitude["roll_deg"] is not None)
+        bench.daemon.push(plain_plan(12))
+        refused = MISSION.replace(b"\t16\t", b"\t2000\t")
+        for suffix, payload in {
+            "mission/upload": MISSION,
+            "mission/check": refused,
+            "mission/restore?number=1": None,
+            "mission/restore?number=99": None,
+            "mission/clear": None,
+            "status": None,
+        }.items():
+            for reply in ask(opened, f"{COMMANDS}/{suffix}", payload, consolidation=zenoh.ConsolidationMode.NONE):
+                check(f"{COMMANDS}/{suffix.partition('?')[0]}", reply)
+        ask_surely(opened, f"{COMMANDS}/mission/upload", refused)
+        bench.board.set("armed 1")
+        reader.wait("event", lambda event: event["event"] == "vehicle.armed")
+        for suffix in ("state", "mission/current", "mission/list"):
+            check(suffix, ask_surely(opened, suffix))
+        bench.board.set("unplug")
+        reader.wait("state", lambda state: state["link"]["flight_controller"] is None)
+        until(lambda: reader.of("mission/report"), "a report")
+        encodings = {"json": zenoh.Encoding.APPLICATION_JSON, "cbor": zenoh.Encoding.APPLICATION_CBOR}
+        found = check_all(reader, encodings[encoding])
+    published = {each.suffix for each in KEYS if each.delivery is not Delivery.REPLY} - {"mavlink/in"}
+    assert found == published

@@ -1,0 +1,84 @@
+"""A daemon in zenoh, and a session of the test's own beside it."""
+
+import json
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import cbor2
+import zenoh
+from benches import Bench, Starter
+from programs import PATIENCE, free_port, until
+
+VEHICLE = "naze-1"
+I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
+
+
+def endpoint() -> str:
+    return f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+
+
+def write_config(directory: Path, table: str, vehicle: str = VEHICLE, name: str = "config.toml") -> Path:
+    path = directory / name
+    path.write_text(f'[zenoh]\nvehicle = "{vehicle}"\n{table}\n')
+    return path
+
+
+def zenoh_bench(start: Starter, table: str, *board_options: str) -> Bench:
+    """A daemon that has found a simulated board and has `table` as its [zenoh]."""
+    config = write_config(start.directory, table)
+    return start.bench(*board_options, daemon_options=("--config", str(config)))
+
+
+@contextmanager
+def session(connect: str = "", listen: str = "") -> Iterator[zenoh.Session]:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"peer"')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("connect/endpoints", json.dumps([connect] if connect else []))
+    config.insert_json5("listen/endpoints", json.dumps([listen] if listen else []))
+    with zenoh.open(config) as opened:
+        yield opened
+
+
+def key(suffix: str, vehicle: str = VEHICLE) -> str:
+    return f"fleet/{vehicle}/{suffix}"
+
+
+def body(data: zenoh.Sample | zenoh.ReplyError) -> Any:
+    """What a sample, a reply or an error holds."""
+    raw = data.payload.to_bytes()
+    return cbor2.loads(raw) if data.encoding == zenoh.Encoding.APPLICATION_CBOR else json.loads(raw)
+
+
+class Reader:
+    """Keeps the samples of a key expression."""
+
+    def __init__(self, opened: zenoh.Session, expression: str = "fleet/**") -> None:
+        self.samples: list[zenoh.Sample] = []
+        self._subscriber = opened.declare_subscriber(expression, self.samples.append)
+
+    def of(self, suffix: str, vehicle: str = VEHICLE) -> list[Any]:
+        return [body(sample) for sample in self.samples[:] if str(sample.key_expr) == key(suffix, vehicle)]
+
+    def wait(self, suffix: str, condition: Callable[[Any], object] = lambda _: True) -> Any:
+        """Return the first sample of a key that fulfils a condition."""
+        return until(lambda: next(filter(condition, self.of(suffix)), None), f"{suffix} as it should be")
+
+    def events(self, name: str) -> list[Any]:
+        return [each["facts"] for each in self.of("event") if each["event"] == name]
+
+
+def ask(
+    opened: zenoh.Session, suffix: str, payload: bytes | None = None, *, vehicle: str = VEHICLE, **options: Any
+) -> list[Any]:
+    """Return all that is replied, errors as they come."""
+    replies = opened.get(key(suffix, vehicle), payload=payload, timeout=PATIENCE, **options)
+    return [body(reply.ok or reply.err) for reply in replies]  # type: ignore[type-var]
+
+
+def ask_surely(opened: zenoh.Session, suffix: str, payload: bytes | None = None, **options: Any) -> Any:
+    """Return the last reply; asked again until the vehicle is there."""
+    return until(lambda: ask(opened, suffix, payload, **options), f"an answer to {suffix}")[-1]
