@@ -117,7 +117,7 @@ def push(
 
     def token(sample: zenoh.Sample) -> None:
         bridge = bridge_of(str(sample.key_expr), prefix)
-        if bridge is not None and sample.kind is zenoh.SampleKind.DELETE:
+        if bridge is not None and sample.kind == zenoh.SampleKind.DELETE:
             events.put(lambda: fleet.gone(bridge.vehicle))
 
     def ended(name: str) -> None:

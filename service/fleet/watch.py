@@ -32,7 +32,7 @@ class Watch:
         if bridge is None:
             return
         with self._lock:
-            if sample.kind is zenoh.SampleKind.PUT:
+            if sample.kind == zenoh.SampleKind.PUT:
                 self._bridges.add(bridge)
             else:
                 self._bridges.discard(bridge)

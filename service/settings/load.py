@@ -1,7 +1,7 @@
 """Puts the settings of a daemon together, and tells of all that is wrong at once."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from service.settings.problem import Problem, SettingsError
 from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 from service.settings.table import KEYS
 from service.write_access import WriteAccess
-from service.zenoh_link.settings import ZenohSettings
+from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 
 #: Names the configuration file itself.
 CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"
@@ -64,6 +64,8 @@ def load_settings(
     zenoh = _zenoh(values) if "zenoh" in given else None
     used = Given(None, "--gcs") if gcs else given.get("gcs", Given(None, ""))
     problems += [Problem(used.where, text) for text in port_conflicts(addresses, zenoh)]
+    if zenoh is not None:
+        problems += _zenoh_problems(zenoh, given)
     if problems:
         raise SettingsError(problems)
     chosen: FcAddress = values["fc"]
@@ -137,3 +139,13 @@ def _tlog_limits(values: dict[str, Any], given: Mapping[str, Given], problems: l
 def _zenoh(values: Mapping[str, Any]) -> ZenohSettings:
     mine = {name.removeprefix("zenoh."): value for name, value in values.items() if name.startswith("zenoh.")}
     return ZenohSettings(**mine)
+
+
+def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:
+    """Tell what zenoh itself has against it."""
+    from service.zenoh_link.configuration import make_config  # loads zenoh, 10 MB
+
+    try:
+        make_config(zenoh)
+    except ZenohSettingsError as error:
+        yield Problem(given["zenoh"].where, str(error))

@@ -27,7 +27,7 @@ class Presence:
 
         def joined(event: zenoh.TransportEvent) -> None:
             who, kind = str(event.transport.zid), str(event.transport.whatami)
-            post(self._loop, self._joined, who, kind, event.kind is zenoh.SampleKind.PUT)
+            post(self._loop, self._joined, who, kind, event.kind == zenoh.SampleKind.PUT)
 
         session.info.declare_transport_events_listener(zenoh.handlers.Callback(joined, indirect=False), history=True)
         liveliness = session.liveliness()
@@ -35,7 +35,7 @@ class Presence:
         self._token = liveliness.declare_token(f"{alive}/{self._own}")
 
         def seen(sample: zenoh.Sample) -> None:
-            is_there = sample.kind is zenoh.SampleKind.PUT
+            is_there = sample.kind == zenoh.SampleKind.PUT
             post(self._loop, self._seen, str(sample.key_expr).rpartition("/")[2], is_there)
 
         liveliness.declare_subscriber(f"{alive}/*", zenoh.handlers.Callback(seen, indirect=False), history=True)

@@ -76,7 +76,7 @@ def ask(
 ) -> list[Any]:
     """Return all that is replied, errors as they come."""
     replies = opened.get(key(suffix, vehicle), payload=payload, timeout=PATIENCE, **options)
-    return [body(reply.ok or reply.err) for reply in replies]  # type: ignore[type-var]
+    return [body(reply.ok or reply.err) for reply in replies]
 
 
 def ask_surely(opened: zenoh.Session, suffix: str, payload: bytes | None = None, **options: Any) -> Any:

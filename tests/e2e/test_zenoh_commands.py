@@ -1,0 +1,205 @@
+"""Commands over zenoh: the rules, the lock and the reasons are everybody's, and what is wrong is said to who asked."""
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import pytest
+import zenoh
+from benches import Bench, Starter
+from plan import judge, plain_plan, records_of
+from programs import until
+from zenoh_bench import I_KNOW, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
+
+from protocols.mission_file import write_qgc_wpl
+from service.zenoh_link.keys import COMMANDS
+
+UPLOAD, CHECK, CLEAR, RESTORE, STATUS = (
+    f"{COMMANDS}/{each}" for each in ("mission/upload", "mission/check", "mission/clear", "mission/restore", "status")
+)
+
+
+def mission_file(count: int, start: int = 0) -> bytes:
+    return write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(count, start))]).encode()
+
+
+@pytest.fixture(scope="module")
+def commanded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bench, zenoh.Session]]:
+    where = endpoint()
+    with ExitStack() as stack:
+        start = Starter(tmp_path_factory.mktemp("commanded"), stack)
+        bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
+        opened = stack.enter_context(session(connect=where))
+        ask_surely(opened, STATUS)
+        yield bench, opened
+        bench.board.assert_was_treated_well()
+
+
+def error(answers: list[Any]) -> str:
+    (answer,) = [each for each in answers if "error" in each]
+    assert len(answer["error"]) < 250
+    assert "\n" not in answer["error"]
+    said: str = answer["error"]
+    return said
+
+
+def test_an_upload_tells_its_progress_and_its_result(commanded: tuple[Bench, zenoh.Session]) -> None:
+    bench, opened = commanded
+    *progress, last = ask(opened, UPLOAD, mission_file(60), consolidation=zenoh.ConsolidationMode.NONE)
+    assert [each["of"] for each in progress] == [60] * len(progress)
+    assert [each["progress"] for each in progress] == sorted(each["progress"] for each in progress)
+    assert last["result"]["ack"] == "MAV_MISSION_ACCEPTED"
+    assert bench.board.records() == records_of(judge(plain_plan(60)))
+    assert bench.daemon.missions()[0]["source"] == "zenoh upload"
+
+
+def test_who_asks_as_usual_gets_the_result_alone(commanded: tuple[Bench, zenoh.Session]) -> None:
+    _, opened = commanded
+    (answer,) = ask(opened, UPLOAD, mission_file(40, start=50))
+    assert answer["result"]["text"] == "Mission verified: 40 records"
+
+
+def test_a_check_changes_nothing(commanded: tuple[Bench, zenoh.Session]) -> None:
+    bench, opened = commanded
+    before, missions = bench.board.records(), len(bench.daemon.missions())
+    (answer,) = ask(opened, CHECK, mission_file(12, start=7))
+    assert answer["result"]["records"] == records_of(judge(plain_plan(12, 7)))
+    (too_long,) = ask(opened, CHECK, mission_file(200))
+    assert too_long["result"]["ack"] == "MAV_MISSION_NO_SPACE"
+    assert (bench.board.records(), len(bench.daemon.missions())) == (before, missions)
+
+
+def test_clear_and_restore(commanded: tuple[Bench, zenoh.Session]) -> None:
+    bench, opened = commanded
+    ask(opened, UPLOAD, mission_file(9))
+    number = bench.daemon.missions()[0]["number"]
+    (cleared,) = ask(opened, CLEAR)
+    assert cleared["result"]["verdict"] == "CLEARED"
+    assert bench.board.records() == []
+    (restored,) = ask(opened, f"{RESTORE}?number={number}")
+    assert restored["result"]["ack"] == "MAV_MISSION_ACCEPTED"
+    assert bench.board.records() == records_of(judge(plain_plan(9)))
+    (current,) = ask(opened, "mission/current")
+    assert (current["count"], len(current["items"])) == (9, 9)
+
+
+def test_the_state_and_the_list_of_missions_are_told(commanded: tuple[Bench, zenoh.Session]) -> None:
+    bench, opened = commanded
+    ask(opened, UPLOAD, mission_file(9))
+    (state,) = ask(opened, "state")
+    assert state["mission"] == {"count": 9, "checksum": bench.daemon.held()["checksum"]}
+    assert (state["link"]["state"], state["status"]["armed"]) == ("MSP", False)
+    (listed,) = ask(opened, "mission/list?limit=1")
+    assert [each["number"] for each in listed["missions"]] == [bench.daemon.missions()[0]["number"]]
+    assert "whole number" in error(ask(opened, "mission/list?limit=all"))
+
+
+BAD_PAYLOADS = {
+    "nothing": (b"", "the file is empty"),
+    "no mission": (b"<html>", "QGC WPL"),
+    "no text": (b"\xff\xfe\x00\x01", "this is not text"),
+    "half a plan": (b'{"fileType": "Plan", "mission": {', "JSON"),
+    "a place in words": (mission_file(5).replace(b"45.384", b"nowhere"), "line 3"),
+    "10 MB": (b"x" * 10_000_000, "larger than 8 MB"),
+    "a home alone": (mission_file(1), "only a home point"),
+    "too many": (mission_file(200), "146 fit"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_PAYLOADS)
+def test_what_is_no_mission_is_refused_with_a_reason(commanded: tuple[Bench, zenoh.Session], name: str) -> None:
+    bench, opened = commanded
+    before = bench.board.records()
+    payload, reason = BAD_PAYLOADS[name]
+    assert reason in error(ask(opened, UPLOAD, payload))
+    assert bench.board.records() == before
+
+
+@pytest.mark.parametrize(
+    "parameters", ["", "?number=", "?number=0", "?number=-1", "?number=1e3", "?number=" + "9" * 99]
+)
+def test_a_restore_of_nothing(commanded: tuple[Bench, zenoh.Session], parameters: str) -> None:
+    _, opened = commanded
+    assert "restore?number=3" in error(ask(opened, RESTORE + parameters))
+    assert "there is no mission 99999" in error(ask(opened, f"{RESTORE}?number=99999"))
+
+
+def test_no_wildcard_sends_a_command(commanded: tuple[Bench, zenoh.Session]) -> None:
+    bench, opened = commanded
+    ask(opened, UPLOAD, mission_file(9))
+    for expression in ("fleet/**", "**", "*/*/*/*/*/clear"):
+        found = [str(each.ok.key_expr) for each in opened.get(expression, timeout=3.0) if each.ok]
+        assert not any("@cmd" in each for each in found)
+    assert len(bench.board.records()) == 9
+
+
+def test_one_transfer_at_a_time(commanded: tuple[Bench, zenoh.Session]) -> None:
+    """One of many at once is served, or one after the other; whoever is not hears why."""
+    bench, opened = commanded
+    answers: list[Any] = []
+    askers = [
+        Thread(target=lambda number=number: answers.extend(ask(opened, UPLOAD, mission_file(30, start=number))))
+        for number in range(6)
+    ]
+    for asker in askers:
+        asker.start()
+    for asker in askers:
+        asker.join()
+    results = [each["result"] for each in answers if "error" not in each and "result" in each]
+    errors = [each["error"] for each in answers if "error" in each]
+    assert len(results) >= 1
+    assert len(results) + len(errors) == 6
+    assert set(errors) <= {"Another mission transfer is running"}
+    verified = [each for each in bench.daemon.missions() if each["outcome"] == "VERIFIED"]
+    assert f"{verified[0]['checksum']}" == bench.daemon.held()["checksum"]
+
+
+def test_an_armed_craft_is_left_alone(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
+    with session(connect=where) as opened:
+        ask_surely(opened, UPLOAD, mission_file(9))
+        before = bench.board.records()
+        bench.board.set("armed 1")
+        for suffix in (UPLOAD, CLEAR, f"{RESTORE}?number=1"):
+            payload = mission_file(5) if suffix == UPLOAD else None
+            said = error(ask(opened, suffix, payload))
+            assert "rmed" in said or "No link" in said, suffix
+        until(lambda: bench.daemon.has_logged("zenoh.refused"), "a word in the log")
+        assert bench.board.records() == before
+    bench.board.assert_was_treated_well()
+
+
+def test_commands_are_off_unless_they_are_switched_on(start: Starter) -> None:
+    where = endpoint()
+    zenoh_bench(start, f'listen = ["{where}"]')
+    with session(connect=where) as opened:
+        ask_surely(opened, "state")
+        for suffix in (UPLOAD, CHECK, CLEAR, RESTORE, STATUS):
+            assert list(opened.get(key(suffix), timeout=2.0)) == []
+
+
+def test_a_command_without_a_flight_controller(start: Starter, tmp_path: Path) -> None:
+    where = endpoint()
+    config = write_config(tmp_path, f'listen = ["{where}"]\n{I_KNOW}')
+    daemon = start.daemon(str(tmp_path / "nothing"), options=("--config", str(config)))
+    daemon.wait_up()
+    with session(connect=where) as opened:
+        state = ask_surely(opened, "state")
+        assert (state["link"]["state"], state["mission"]) == ("no port", None)
+        for suffix in (UPLOAD, CHECK, CLEAR):
+            assert "No link to the flight controller" in error(ask(opened, suffix, mission_file(5)))
+        (current,) = ask(opened, "mission/current")
+        assert (current["count"], current["items"]) == (None, None)
+
+
+def test_a_status_is_what_the_command_line_shows(commanded: tuple[Bench, zenoh.Session]) -> None:
+    bench, opened = commanded
+    (answer,) = ask(opened, STATUS)
+    shown = bench.daemon.status()
+    assert shown is not None
+    assert json.loads(json.dumps(answer["result"])).keys() == shown.keys()
+    assert answer["result"]["zenoh"] == "joined to 1"
