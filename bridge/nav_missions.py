@@ -54,6 +54,9 @@ class Failed(Exception):
 class NavMissions(ABC):
     """The mission store of one flight controller."""
 
+    #: Whether it stands still while it stores a record.
+    _stores_slowly = False
+
     def __init__(self, profile: NavProfile, craft: NavCraft) -> None:
         self._profile = profile
         self._craft = craft
@@ -152,7 +155,8 @@ class NavMissions(ABC):
                 yield from self._make_sure_disarmed()
             elif self._craft.is_armed():
                 raise Failed(PushFailure.ARMED)
-            reply = yield from ask(encode_set_wp(number, record), Nav.SET_WP, 0, tries=_TRIES)
+            frame = encode_set_wp(number, record)
+            reply = yield from ask(frame, Nav.SET_WP, 0, tries=_TRIES, exclusive=self._stores_slowly)
             if reply is None:
                 raise Failed(PushFailure.NO_ANSWER)
             if reply.direction is Direction.ERROR:

@@ -1,0 +1,239 @@
+"""Missions to the simulated INAV and MultiWii (service/simulator), which have every trap of inav.md."""
+
+from typing import Any
+
+import pytest
+from conversations import Download, Upload, clear_message
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_inav import packed, plan
+from world import GroundStation, World
+
+from bridge.bridge import Bridge
+from bridge.flight_controller import Kind
+from bridge.mission_check import check_list
+from bridge.nav_check import NavRules
+from bridge.nav_rules import inav_profile, multiwii_profile
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.msp.frame import MspParser
+from protocols.msp.nav import LAST, Nav, NavAction
+from service.simulator.fc_kinds import make_board
+from service.simulator.inav_boxes import BOXES
+from service.simulator.msp_board import MspBoard
+from service.simulator.msp_options import MspOptions
+from service.simulator.options import Faults
+
+ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
+CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
+NAV_WP_ID = 28
+MIXED = [
+    (16, 0),
+    (16, 7),
+    (178, 4),
+    (201, 0),
+    (16, 0),
+    (19, 9),
+    (115, 90),
+    (16, 0),
+    (197, 0),
+    (177, 2),
+    (16, 0),
+    (20, 0),
+]
+
+
+def board_with(
+    kind: str = "inav", faults: Faults | None = None, **options: Any
+) -> tuple[MspBoard, World, GroundStation]:
+    board = make_board(kind, MspOptions(**options), faults or Faults(boxes=0))
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready(10)
+    world.run(2)
+    return board, world, GroundStation(world)
+
+
+def mixed() -> list[MissionItem]:
+    """Home and one of everything that INAV can hold."""
+    home, *legs = plan(len(MIXED) + 1)
+    items = []
+    for leg, (command, p1) in zip(legs, MIXED, strict=True):
+        is_place = command in (16, 19, 201)
+        place = (leg.lat_e7, leg.lon_e7, leg.alt_m) if is_place else (0, 0, 0.0)
+        p2 = 3.0 if command == 177 else 0.0
+        params = (1.0, float(p1), 0.0, 0.0) if command == 178 else (float(p1), p2, 0.0, 0.0)
+        items.append(MissionItem(leg.seq, command, 0 if is_place and leg.seq % 2 else 3, *params, *place))
+    return [home, *items]
+
+
+def without_home(items: list[MissionItem]) -> list[MissionItem]:
+    """Home is where the board has it."""
+    return items[1:]
+
+
+@pytest.mark.parametrize("version", BOXES)
+def test_a_mission_comes_back_as_it_was_sent_on_each_version(version: str) -> None:
+    board, world, station = board_with(version=version)
+    assert world.kind is Kind.INAV
+    sent = mixed()
+    assert Upload(station, sent).run() is ACCEPTED
+    assert world.store.missions[-1][0].verdict.findings == ()
+    records = list(check_list(sent, NavRules(inav_profile())).records)
+    assert [record[1:] for record in board.stored_records[: len(records)]] == [r.pack() for r in records]
+    read = Download(station).run()
+    assert without_home(read) == without_home(sent)
+    assert Upload(station, read).run() is ACCEPTED
+    assert world.store.missions[-1][0].verdict.findings == ()
+    assert without_home(Download(station).run()) == without_home(sent)
+
+
+def test_a_multiwii_holds_what_it_can() -> None:
+    board, world, station = board_with("multiwii", capacity=40)
+    assert world.kind is Kind.MULTIWII_NAV
+    assert Upload(station, plan(42), tries=60).run() is MissionResult.NO_SPACE
+    assert Upload(station, plan(21), tries=60).run() is ACCEPTED
+    wanted = [r.pack() for r in check_list(plan(21), NavRules(multiwii_profile())).records]
+    assert [record[1:] for record in board.stored_records[:20]] == wanted
+    assert without_home(Download(station).run()) == without_home(plan(21))
+    station.send(clear_message())
+    world.run(2)
+    assert Download(station).run() == []
+
+
+def test_after_a_restart_inav_holds_nothing_until_somebody_loads_it() -> None:
+    board, world, station = board_with()
+    assert Upload(station, plan(30)).run() is ACCEPTED
+    board.power_off(world.now)
+    world.run(3)
+    board.power_on(world.now)
+    world.wait_until(lambda w: w.is_found, 15)
+    world.run(1)
+    assert Download(station).run() == []
+    assert [record[1:] for record in board.stored_records[:29]] == packed(plan(30))
+
+
+@pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
+def test_armed_nothing_is_changed(version: str) -> None:
+    board, world, station = board_with(version=version)
+    assert Upload(station, plan(10)).run() is ACCEPTED
+    before = board.stored_records
+    board.faults.armed = True
+    world.wait_until(lambda _: board.armed, 5)
+    sent_before = len(world.written)
+    assert Upload(station, plan(20, 1)).run() is DENIED
+    station.send(clear_message())
+    world.run(2)
+    assert not any(data[4] in (Nav.SET_WP, Nav.SAVE) for _, _, data in world.written[sent_before:])
+    assert board.stored_records == before
+
+
+@pytest.mark.parametrize("moment", [0.05, 0.2, 0.5, 0.7, 0.75, 0.8, 0.85])
+def test_armed_at_any_moment_no_half_list_can_be_flown(moment: float) -> None:
+    board, world, station = board_with()
+    assert Upload(station, plan(10)).run() is ACCEPTED
+    upload = Upload(station, plan(100, 1))
+    world.after(moment, lambda: setattr(board.faults, "armed", True))
+    result = upload.run()
+    world.run(1)
+    board.faults.armed = False
+    world.run(2)
+    world.wait_ready()
+    read = without_home(Download(station).run())
+    assert read in ([], without_home(plan(10)), without_home(plan(100, 1)))
+    assert (result is ACCEPTED) <= (read == without_home(plan(100, 1)))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_on_a_line_that_damages_bytes_no_trap_is_set_off(seed: int) -> None:
+    faults = Faults(boxes=0)
+    board, world, station = board_with(faults=faults, version="7.1.2", seed=seed)
+    faults.lost_byte_rate = faults.bit_error_rate = 5e-4
+    result = Upload(station, plan(40, seed), tries=60).run(90)
+    faults.lost_byte_rate = faults.bit_error_rate = 0.0
+    world.run(3)
+    world.wait_ready()
+    assert (board.counters.cli_entered, board.counters.bootloader_entered, board.counters.crashes) == (False, False, 0)
+    read = without_home(Download(station).run())
+    assert read in ([], without_home(plan(40, seed)))
+    assert (result is ACCEPTED) <= (read == without_home(plan(40, seed)))
+
+
+def test_on_a_wire_the_transfer_takes_its_bytes() -> None:
+    """But for the time until the board looks at its port."""
+    board, world, station = board_with(eeprom_write_ms=0.0, serial_task_ms=0.1)
+    upload = Upload(station, plan(121))
+    began = world.now
+    while upload.result is None:
+        world.run(0.001)
+    sent = [f for at, _, data in world.written if at >= began for f in MspParser().feed(data)]
+    assert [f.command for f in sent].count(Nav.SET_WP) == 120
+    wire_s = 120 * (27 + 6 + 7 + 27) * 10 / 115200
+    assert world.now - began <= 1.15 * wire_s
+    assert board.counters.rx_overflows == 0
+
+
+def test_a_board_that_serves_a_request_each_10_ms_is_served() -> None:
+    _, world, station = board_with(serial_task_ms=10.0)
+    upload = Upload(station, plan(61))
+    assert upload.run() is ACCEPTED
+    assert without_home(Download(station).run()) == without_home(plan(61))
+    sent = [frame.command for _, _, data in world.written for frame in MspParser().feed(data)]
+    assert sent.count(Nav.SET_WP) == 60
+
+
+def test_a_mission_that_is_flown_is_told_item_by_item() -> None:
+    board, world, station = board_with()
+    home = world.bridge.session.vehicle.home_or_position() or (473977000, 85456000)
+    legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home[0] + 1500 * n, home[1], 20.0) for n in (1, 2, 3)]
+    speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
+    assert Upload(station, [plan(1)[0], legs[0], speed, *legs[1:]]).run() is ACCEPTED
+    board.faults.armed = True
+    world.run(2)
+    board.faults.boxes = 1 << BOXES["9.1.0"].index(NAV_WP_ID)
+    world.run_until(lambda _: any(m.mission_state == 5 for m in station.said("MISSION_CURRENT")), 300)
+    assert [m.seq for m in station.said("MISSION_ITEM_REACHED")] == [1, 3, 4]
+    current = [m.seq for m in station.said("MISSION_CURRENT")]
+    assert [seq for n, seq in enumerate(current) if n == 0 or seq != current[n - 1]] == [0, 1, 3, 4]
+
+
+commands = st.sampled_from([16, 16, 16, 17, 18, 19, 20, 21, 80, 115, 177, 177, 177, 178, 197])
+wild = st.builds(
+    MissionItem,
+    seq=st.just(0),
+    command=commands,
+    frame=st.sampled_from([0, 3]),
+    p1=st.sampled_from([0.0, 1.0, 2.0, 3.0, 5.0, 90.0]),
+    p2=st.sampled_from([0.0, -1.0, 1.0, 3.0]),
+    p3=st.just(0.0),
+    p4=st.just(0.0),
+    lat_e7=st.integers(453830000, 453850000),
+    lon_e7=st.integers(84730000, 84740000),
+    alt_m=st.sampled_from([20.0, 50.0]),
+)
+
+
+@given(st.lists(wild, min_size=2, max_size=10))
+@settings(max_examples=25, deadline=None)
+def test_whatever_the_rules_let_pass_the_board_arms_with(items: list[MissionItem]) -> None:
+    sent = [plan(1)[0], *items]
+    if not check_list(sent, NavRules(inav_profile())).records:
+        return
+    board, world, station = board_with()
+    assert Upload(station, sent).run() is ACCEPTED
+    board.faults.armed = True
+    world.run(2)
+    assert board.armed
+    assert board.counters.crashes == 0
+
+
+def test_a_stop_in_the_middle_loads_the_old_list_again() -> None:
+    board, world, station = board_with()
+    assert Upload(station, plan(10)).run() is ACCEPTED
+    upload = Upload(station, plan(100, 1))
+    world.run(0.4)
+    bridge: Bridge = world.bridge
+    bridge.runner.stop(world.now)
+    world.run(0.5)
+    assert upload.result is DENIED
+    assert any("stopped meanwhile" in text for text in station.texts())
+    assert without_home(Download(station).run()) == without_home(plan(10))
+    assert board.counters.flash_writes == 1
