@@ -25,7 +25,7 @@ from bridge.ground import Ground, Tap
 from bridge.guard import Guard, LinkAccess, Refused, denial
 from bridge.harakiri_relay import HarakiriRelay
 from bridge.inbox import Inbox
-from bridge.journal import Journal
+from bridge.journal import Incidents, Journal
 from bridge.mission_check import check_list
 from bridge.mission_desk import Delivery, HeldMission, MissionDesk, Refusal
 from bridge.mission_dialect import StoreReport
@@ -45,7 +45,7 @@ from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.target import target_of
-from protocols.mission_item import MissionItem
+from protocols.mission_item import MissionItem, MissionResult
 
 _AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
 
@@ -78,6 +78,7 @@ class Bridge:
         self._pass_through: PassThrough | None = None
         self._relay: HarakiriRelay | None = None
         self._presence = Presence()
+        self._incidents = Incidents()
 
         signers = {
             name: partial(access.signing.signature, link_id=access.link_id)
@@ -91,6 +92,7 @@ class Bridge:
             config.speeds,
             self.runner,
             journal,
+            self._incidents,
             self._controller_changed,
             self._mavlink_received,
             self._answered,
@@ -101,7 +103,9 @@ class Bridge:
         self._vehicle = OwnVehicle(self.session, self.desk, self.ground, now)
         self.report = VehicleReporter(self.session, self.desk, self.ground, self._vehicle.also_want)
         home = self._vehicle.home
-        self._uploads = MissionUploads(self.desk, self.runner, self.ground, journal, home, self.ground.moved_to)
+        self._uploads = MissionUploads(
+            self.desk, self.runner, self.ground, journal, self._incidents, home, self.ground.moved_to
+        )
         self._downloads = MissionDownloads(self.desk, self.runner, self.ground, self._is_armed, home)
         self._parameters = Parameters(self.desk, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.desk, self.runner)
@@ -209,10 +213,7 @@ class Bridge:
         """Do what an upload by a ground station does, with a list that is all there. No items: clear."""
         self._now = now
         owner = object()
-        refusal = self.desk.acquire(owner)
-        if refusal is not None:
-            on_done(refusal, None)
-            return
+        incident = self._incidents.begin("push")
         arrived: list[ArrivedMission] = []
 
         def procedure() -> Procedure[Delivery | Refusal]:
@@ -227,9 +228,23 @@ class Bridge:
             self.desk.release(owner)
             if arrived and isinstance(result, Delivery):
                 self.ground.say(Severity.NOTICE, f"{source}: {result.text}")
+            self._journal(
+                "info" if result.ack is MissionResult.ACCEPTED else "warning",
+                "mission.push_ended",
+                source=source,
+                mission=result.number if isinstance(result, Delivery) else None,
+                ack=result.ack.name,
+                detail=result.text,
+                incident=incident,
+            )
             on_done(result, arrived[0] if arrived else None)
 
-        self.runner.start(procedure(), done, now)
+        self._journal("info", "mission.push_started", source=source, count=len(items), incident=incident)
+        refusal = self.desk.acquire(owner)
+        if refusal is None:
+            self.runner.start(procedure(), done, now)
+        else:
+            done(refusal, now)
 
     def pull_locally(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
         """Read what the flight controller holds."""

@@ -6,7 +6,7 @@ from enum import Enum
 from bridge.autosense import Autosense, Found, Spoken
 from bridge.flight_controller import FlightController, Kind, identify_msp
 from bridge.frsky_line import FrskyLine
-from bridge.journal import Journal
+from bridge.journal import Incidents, Journal
 from bridge.mavlink_line import MavlinkLine
 from bridge.msp_link import MspLink
 from bridge.poll_schedule import PollSchedule
@@ -67,6 +67,7 @@ class FcSession:
         speeds: Sequence[int | None],
         runner: Runner,
         journal: Journal,
+        incidents: Incidents,
         on_change: Callable[[FlightController | None, float], None],
         on_mavlink: Callable[[list[MavlinkFrame]], None],
         on_answer: Callable[[int, float], None],
@@ -75,6 +76,9 @@ class FcSession:
         self._speeds = speeds
         self._runner = runner
         self._journal = journal
+        self._incidents = incidents
+        #: From the port's opening or a loss until somebody is found.
+        self._incident = ""
         self._on_change = on_change
         self._on_mavlink = on_mavlink
         self._on_answer = on_answer
@@ -110,7 +114,7 @@ class FcSession:
         self._drop(now)
         self._search = None
         if why is not None:
-            self._journal("warning", "fc.port_lost", why=why)
+            self._journal("warning", "fc.port_lost", why=why, incident=self._follow_incident())
 
     def take_output(self) -> list[bytes]:
         """Return what is to be written to the port at the present `speed`."""
@@ -209,9 +213,13 @@ class FcSession:
             debt.add(self.speed, self.link.outstanding_bytes, self.link.last_heard_at)
         self._drop(now)
         if was_known:
-            self._journal("warning", "fc.lost", why=why, speed_baud=self.speed)
+            self._journal("warning", "fc.lost", why=why, speed_baud=self.speed, incident=self._follow_incident())
         self._search = Autosense(self._speeds, self._known_speed, now, first, debt)
         self.speed = self._search.speed
+
+    def _follow_incident(self) -> str:
+        self._incident = self._incident or self._incidents.begin("link")
+        return self._incident
 
     def _drop(self, now: float) -> None:
         """Forget the present flight controller."""
@@ -236,7 +244,14 @@ class FcSession:
             return
         self._output += self._search.take_output()
         self._search = None
-        self._journal("debug", "fc.sensed", protocol=found.spoken.value, speed_baud=found.speed, why=found.why)
+        self._journal(
+            "debug",
+            "fc.sensed",
+            protocol=found.spoken.value,
+            speed_baud=found.speed,
+            why=found.why,
+            incident=self._follow_incident(),
+        )
         if found.spoken is Spoken.MSP or (self._known_speed is None and found.spoken is Spoken.MAVLINK):
             # A Harakiri that arms may go to another speed for MAVLink; disarmed, it comes back to this one.
             self._known_speed = found.speed
@@ -289,7 +304,9 @@ class FcSession:
             name=controller.name,
             kind=controller.kind.value,
             why=found.why,
+            incident=self._follow_incident(),
         )
+        self._incident = ""
         self._on_change(controller, now)
 
     def _msp_frame(self, frame: MspFrame, now: float) -> None:

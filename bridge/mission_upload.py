@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Any
 
 from bridge.finding import Finding
-from bridge.journal import Journal
+from bridge.journal import Incidents, Journal
 from bridge.mission_check import ListCheck, check_count
 from bridge.mission_desk import ARMED, Delivery, MissionDesk, Refusal
 from bridge.mission_dialect import StoreReport
@@ -43,6 +43,7 @@ class Phase(Enum):
 
 @dataclass(slots=True)
 class _Transfer:
+    incident: str
     station: Station
     count: int
     phase: Phase = Phase.ASKING
@@ -78,6 +79,7 @@ class MissionUploads:
         runner: Runner,
         post: Post,
         journal: Journal,
+        incidents: Incidents,
         fallback_home: Callable[[], tuple[int, int] | None],
         moved_to: Callable[[Station, float], list[Station]],
     ) -> None:
@@ -85,6 +87,7 @@ class MissionUploads:
         self._runner = runner
         self._post = post
         self._journal = journal
+        self._incidents = incidents
         self._fallback_home = fallback_home
         self._moved_to = moved_to
         self._transfer: _Transfer | None = None
@@ -125,14 +128,15 @@ class MissionUploads:
                 return
             self._end(now)
         self._answered.pop(station, None)
+        transfer = _Transfer(self._incidents.begin("upload"), station, count)
         refusal = self._desk.acquire(station)
         if refusal is not None:
-            self._refuse(station, count, refusal, now)
+            self._refuse(transfer, refusal, now)
             return
         if count == 0:
-            self._deliver(_Transfer(station, 0), CLEARED_LIST, (), now)
+            self._deliver(transfer, CLEARED_LIST, (), now)
             return
-        self._transfer = _Transfer(station, count)
+        self._transfer = transfer
         if not self._is_asking:
             # One question serves all transfers that are begun before it is answered.
             self._is_asking = True
@@ -272,7 +276,13 @@ class MissionUploads:
         transfer.check = answer.rules.begin(transfer.count, self._fallback_home())
         transfer.phase = Phase.RECEIVING
         transfer.progress_at = now
-        self._journal("info", "mission.upload_started", station=str(transfer.station), count=transfer.count)
+        self._journal(
+            "info",
+            "mission.upload_started",
+            station=str(transfer.station),
+            count=transfer.count,
+            incident=transfer.incident,
+        )
         self._request(transfer, now)
 
     def _request(self, transfer: _Transfer, now: float) -> None:
@@ -300,7 +310,13 @@ class MissionUploads:
         self._forget_old_answers(now)
         if station in self._answered or station not in self._moved_to(transfer.station, now):
             return
-        self._journal("info", "mission.station_moved", before=str(transfer.station), after=str(station))
+        self._journal(
+            "info",
+            "mission.station_moved",
+            before=str(transfer.station),
+            after=str(station),
+            incident=transfer.incident,
+        )
         self._desk.release(transfer.station)
         self._desk.acquire(station)
         transfer.station = station
@@ -373,6 +389,7 @@ class MissionUploads:
             mission=delivery.number,
             ack=delivery.ack.name,
             detail=delivery.text,
+            incident=transfer.incident,
         )
         self._end(now)
 
@@ -390,12 +407,19 @@ class MissionUploads:
             arrived = ArrivedMission(str(transfer.station), items, verdict)
             self._runner.start(self._desk.deliver(arrived, _ignore), lambda _delivery, _at: None, now)
         self._end(now)
-        self._refuse(transfer.station, transfer.count, refusal, now)
+        self._refuse(transfer, refusal, now)
 
-    def _refuse(self, station: Station, count: int, refusal: Refusal, now: float) -> None:
+    def _refuse(self, transfer: _Transfer, refusal: Refusal, now: float) -> None:
         self._post.say(Severity.ERROR, refusal.text)
-        self._answer(station, count, refusal.ack, now)
-        self._journal("warning", "mission.refused", station=str(station), ack=refusal.ack.name, why=refusal.text)
+        self._answer(transfer.station, transfer.count, refusal.ack, now)
+        self._journal(
+            "warning",
+            "mission.refused",
+            station=str(transfer.station),
+            ack=refusal.ack.name,
+            why=refusal.text,
+            incident=transfer.incident,
+        )
 
     def _answer(self, station: Station, count: int, ack: MissionResult, now: float) -> None:
         refused = ack is not MissionResult.ACCEPTED

@@ -18,7 +18,7 @@ import structlog
 from bridge.mission_desk import Delivery, HeldMission, Refusal
 from bridge.mission_log import ArrivedMission
 from bridge.verdict import Verdict
-from protocols.mission_item import MissionItem, MissionResult
+from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.control_socket import find_socket
 from service.daemon import Daemon
@@ -78,9 +78,6 @@ class MissionJobs:
                     "mission": outcome.number if isinstance(outcome, Delivery) else None,
                 }
             _resolve(future, answer)
-            level = _log.info if outcome.ack is MissionResult.ACCEPTED else _log.warning
-            mission, ack = answer.get("mission"), outcome.ack.name
-            level("mission.push_ended", source=source, mission=mission, ack=ack, detail=outcome.text)
 
         bridge = self._daemon.bridge
         bridge.push_locally(items, source, lambda records: progress({"progress": records}), done, self._loop.time())

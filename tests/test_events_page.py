@@ -1,0 +1,34 @@
+"""docs/events.md lists every event that the log can have, and no other."""
+
+import ast
+import re
+from pathlib import Path
+
+_REPOSITORY = Path(__file__).parents[1]
+_EVENT = re.compile(r"[a-z]+\.[a-z_]+")
+#: What is called with an event's name, be it the first or the second argument.
+_SPEAKERS = {"debug", "info", "warning", "error", "level", "journal", "_journal", "note", "_note", "_complain"}
+
+
+def _events_of_the_code() -> set[str]:
+    found: set[str] = set()
+    for file in [*_REPOSITORY.glob("service/**/*.py"), *_REPOSITORY.glob("bridge/**/*.py")]:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if not isinstance(node, ast.Call):
+                continue
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if name in _SPEAKERS:
+                texts = [each.value for each in ast.walk(ast.Tuple(node.args[:2])) if isinstance(each, ast.Constant)]
+                found |= {text for text in texts if isinstance(text, str) and _EVENT.fullmatch(text)}
+    return found
+
+
+def _events_of_the_page() -> set[str]:
+    rows = [line for line in (_REPOSITORY / "docs" / "events.md").read_text().splitlines() if line.startswith("| `")]
+    return {event for row in rows for event in re.findall(r"`([a-z]+\.[a-z_]+)`", row.split("|")[1])}
+
+
+def test_the_page_lists_the_events_of_the_code() -> None:
+    events = _events_of_the_code()
+    assert "mission.upload_ended" in events
+    assert events == _events_of_the_page()
