@@ -202,7 +202,7 @@ class Daemon:
             await asyncio.sleep(_REST_INTERVAL_S)
         return not self.bridge.is_conversing
 
-    # What the ground station links tell (service.gcs_links.GcsEvents).
+    # What the ground station links tell (service.gcs_events.GcsEvents).
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
         """Take bytes from a ground station."""

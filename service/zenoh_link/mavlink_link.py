@@ -5,7 +5,7 @@ import asyncio
 import zenoh
 
 from bridge.station import Peer
-from service.gcs_links import GcsEvents
+from service.gcs_events import GcsEvents
 from service.zenoh_link.keys import MAVLINK_OUT
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.threads import post

@@ -10,7 +10,7 @@ import pytest
 from bridge.station import Peer
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
-from service import gcs_links
+from service import tcp_link, udp_link
 from service.connection import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs
 from service.fc_device import device_opener
 from service.gcs_links import GcsLink, open_link
@@ -133,7 +133,7 @@ async def test_a_name_is_spoken_to_when_it_is_known(links: Links, monkeypatch: p
     answers: list[list[tuple[str, int]]] = [[], [], [first.getsockname()], [first.getsockname(), ("127.0.0.9", 9)]]
     answers += [[], [("127.0.0.9", 9), first.getsockname()], [second.getsockname()]]
     asked = 0
-    monkeypatch.setattr(gcs_links, "_LOOK_UP_S", 0.01)
+    monkeypatch.setattr(udp_link, "_LOOK_UP_S", 0.01)
 
     async def look_up(host: str, port: int, **_: object) -> list[tuple[object, ...]]:
         nonlocal asked
@@ -190,7 +190,7 @@ async def test_datagrams_that_nobody_takes_block_nobody(links: Links) -> None:
 async def test_a_client_too_many_is_hung_up_and_finds_room_later(links: Links) -> None:
     port = free_port(socket.SOCK_STREAM)
     links.open(f"tcpin:127.0.0.1:{port}")
-    clients = [links.tcp(port) for _ in range(gcs_links._MAX_CLIENTS)]
+    clients = [links.tcp(port) for _ in range(tcp_link._MAX_CLIENTS)]
     await until(lambda: len(links.ears.default_peers) == len(clients), "all clients")
     assert await received(links.tcp(port)) == b""
     assert len(links.ears.default_peers) == len(clients)
@@ -201,7 +201,7 @@ async def test_a_client_too_many_is_hung_up_and_finds_room_later(links: Links) -
 
 
 async def test_who_takes_nothing_any_more_is_hung_up(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gcs_links, "_STALL_MS", 500)
+    monkeypatch.setattr(tcp_link, "_STALL_MS", 500)
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
     links.tcp(port)

@@ -8,7 +8,7 @@ from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.connection import GcsAddress
-from service.gcs_links import TcpLink
+from service.tcp_link import TcpLink
 
 
 class Listener:

@@ -1,0 +1,21 @@
+"""What a link to ground stations tells the daemon."""
+
+from typing import Protocol
+
+from bridge.station import Peer
+
+
+class GcsEvents(Protocol):
+    """What a link tells the daemon."""
+
+    def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
+        """Bytes came; a datagram holds whole frames."""
+
+    def gcs_gone(self, peer: Peer) -> None:
+        """A connection was closed."""
+
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
+        """`peer` is spoken to before it was heard; or only as long as nobody on its link was heard."""
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        """It is not any more."""

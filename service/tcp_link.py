@@ -1,0 +1,159 @@
+"""Ground stations over TCP."""
+
+import asyncio
+import socket
+from collections.abc import Callable
+
+import structlog
+
+from bridge.station import Peer
+from service.connection import GcsAddress, family_of
+from service.gcs_events import GcsEvents
+from service.send_queue import SendQueue
+
+_READ_SIZE = 2048
+#: What a stalled client may leave unread; then telemetry for it is dropped, the oldest first.
+_MAX_UNSENT = 65536
+_KERNEL_BUFFER = 32768
+#: One that has taken nothing for so long is not there any more, though its Wi-Fi could not say so.
+_STALL_MS = 60000
+#: Each costs a copy of the telemetry.
+_MAX_CLIENTS = 32
+
+_log = structlog.get_logger()
+
+
+class TcpLink:
+    """tcpin: any number of ground stations connect."""
+
+    def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
+        self.name = str(address)
+        self._events = events
+        self._loop = asyncio.get_running_loop()
+        self._clients: dict[Peer, _TcpClient] = {}
+        self._complained = False
+        self._socket = socket.create_server((address.host, address.port), family=family_of(address.host))
+        self._socket.setblocking(False)
+        self._loop.add_reader(self._socket.fileno(), self._acceptable)
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send to one client."""
+        client = self._clients.get(peer)
+        if client is not None:
+            client.send(data)
+
+    def close(self) -> None:
+        """Close the server and its clients."""
+        self._loop.remove_reader(self._socket.fileno())
+        self._socket.close()
+        for client in self._clients.values():
+            client.close()
+        self._clients.clear()
+
+    def _acceptable(self) -> None:
+        try:
+            connection, sender = self._socket.accept()
+        except OSError:
+            return
+        if len(self._clients) >= _MAX_CLIENTS:
+            connection.close()
+            level = _log.debug if self._complained else _log.warning
+            level("gcs.too_many_clients", link=self.name, refused=str(sender), limit=_MAX_CLIENTS)
+            self._complained = True
+            return
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)
+        # The kernel would keep minutes of old telemetry for who does not read.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
+        peer = Peer(self.name, sender)
+        # A TCP client hears the vehicle from the start: it may wait for a heartbeat before it speaks.
+        self._events.add_default_peer(peer)
+
+        def received(data: bytes) -> None:
+            self._events.gcs_data(peer, data, datagram=False)
+
+        def gone() -> None:
+            del self._clients[peer]
+            self._events.remove_default_peer(peer)
+            self._events.gcs_gone(peer)
+
+        self._clients[peer] = _TcpClient(connection, self._loop, received, gone)
+
+
+class _TcpClient:
+    """One connection with a bounded amount of unsent bytes. `gone`: it was closed, but not by `close`."""
+
+    def __init__(
+        self,
+        connection: socket.socket,
+        loop: asyncio.AbstractEventLoop,
+        received: Callable[[bytes], None],
+        gone: Callable[[], None],
+    ) -> None:
+        self._socket = connection
+        self._loop = loop
+        self._received = received
+        self._gone = gone
+        self._unsent = SendQueue(_MAX_UNSENT)
+        self._hanging_up: asyncio.Handle | None = None
+        loop.add_reader(connection.fileno(), self._readable)
+
+    def send(self, data: bytes) -> None:
+        if self._hanging_up is not None:
+            return
+        if self._unsent:
+            if not self._unsent.add(data):
+                # It has not read so many answers that it can make no sense of the next one.
+                self._hang_up()
+            return
+        sent = self._try_send(memoryview(data))
+        if sent < len(data):
+            self._unsent.add(data)
+            self._unsent.sent(sent)
+            self._loop.add_writer(self._socket.fileno(), self._writable)
+
+    def close(self) -> None:
+        if self._hanging_up is not None:
+            self._hanging_up.cancel()
+        self._loop.remove_reader(self._socket.fileno())
+        self._loop.remove_writer(self._socket.fileno())
+        self._socket.close()
+
+    def _hang_up(self) -> None:
+        """Close soon: whoever sends is in the middle of sending to others, too."""
+        if self._hanging_up is None:
+            self._hanging_up = self._loop.call_soon(self._end)
+
+    def _end(self) -> None:
+        self.close()
+        self._gone()
+
+    def _writable(self) -> None:
+        while self._unsent:
+            sent = self._try_send(self._unsent.first())
+            if sent == 0:
+                return
+            self._unsent.sent(sent)
+        self._loop.remove_writer(self._socket.fileno())
+
+    def _try_send(self, data: memoryview) -> int:
+        try:
+            return self._socket.send(data)
+        except (BlockingIOError, InterruptedError):
+            return 0
+        except OSError:
+            self._hang_up()
+            return 0
+
+    def _readable(self) -> None:
+        try:
+            data = self._socket.recv(_READ_SIZE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._received(data)
+        else:
+            self._hang_up()

@@ -1,0 +1,110 @@
+"""Ground stations over UDP."""
+
+import asyncio
+import socket
+
+import structlog
+
+from bridge.station import Peer
+from service.connection import UNKNOWN_HOST_HINT, GcsAddress, family_of
+from service.gcs_events import GcsEvents
+
+_DATAGRAM_SIZE = 2048
+#: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.
+_DATAGRAMS_AT_ONCE = 64
+#: How often it is asked what a name stands for.
+_LOOK_UP_S = 10.0
+
+_log = structlog.get_logger()
+
+
+class UdpLink:
+    """udpin waits to be spoken to, udpout speaks to one address, udpbcast to all until somebody answers."""
+
+    def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
+        self.name = str(address)
+        self._address = address
+        self._family = family_of(address.host)
+        self._events = events
+        self._loop = asyncio.get_running_loop()
+        self._complained = False
+        self._lookup: asyncio.Task[None] | None = None
+        self._socket = socket.socket(self._family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        try:
+            self._set_up()
+        except OSError:
+            self._socket.close()
+            raise
+        self._loop.add_reader(self._socket.fileno(), self._readable)
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send one datagram, or drop it: MAVLink repeats what matters."""
+        try:
+            self._socket.sendto(data, peer.key)  # type: ignore[call-overload]
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            # Wi-Fi that is down says so with every datagram.
+            level = _log.debug if self._complained else _log.warning
+            level("gcs.send_failed", peer=str(peer), why=error.strerror or str(error))
+            self._complained = True
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._lookup is not None:
+            self._lookup.cancel()
+        self._loop.remove_reader(self._socket.fileno())
+        self._socket.close()
+
+    def _set_up(self) -> None:
+        host, port = self._address.host, self._address.port
+        if self._family is socket.AF_INET6:
+            # Otherwise it would take the port away from udpin:0.0.0.0.
+            self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        if self._address.kind == "udpin":
+            self._socket.bind((host, port))
+            return
+        broadcast = self._address.kind == "udpbcast"
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, broadcast)
+        try:
+            found = socket.getaddrinfo(host, port, self._family, socket.SOCK_DGRAM, flags=socket.AI_NUMERICHOST)
+        except socket.gaierror:
+            self._lookup = self._loop.create_task(self._follow_name(until_answered=broadcast))
+        else:
+            self._events.add_default_peer(Peer(self.name, found[0][4]), until_answered=broadcast)
+
+    async def _follow_name(self, *, until_answered: bool) -> None:
+        """Speak to what the name stands for: a network comes up after us, and a laptop gets another address."""
+        known: Peer | None = None
+        complained = False
+        while True:
+            try:
+                found = await self._loop.getaddrinfo(
+                    self._address.host, self._address.port, family=self._family, type=socket.SOCK_DGRAM
+                )
+            except OSError as error:
+                level = _log.debug if complained else _log.warning
+                level("gcs.name_unknown", link=self.name, why=f"{error.strerror or error}; {UNKNOWN_HOST_HINT}")
+                complained = True
+            else:
+                peers = [Peer(self.name, entry[4]) for entry in found]
+                complained = False
+                if known not in peers:
+                    if known is not None:
+                        self._events.remove_default_peer(known)
+                    known = peers[0]
+                    self._events.add_default_peer(known, until_answered=until_answered)
+                    _log.info("gcs.name_found", peer=str(known))
+            await asyncio.sleep(_LOOK_UP_S)
+
+    def _readable(self) -> None:
+        for _ in range(_DATAGRAMS_AT_ONCE):
+            try:
+                data, sender = self._socket.recvfrom(_DATAGRAM_SIZE)
+            except BlockingIOError:
+                return
+            except OSError:
+                # An ICMP "port unreachable" for something we sent; the ground station is just not there yet.
+                continue
+            self._events.gcs_data(Peer(self.name, sender), data, datagram=True)
