@@ -84,7 +84,7 @@ def test_multiwii_holds_a_way_home_until_the_whole_list_is_there() -> None:
     assert Upload(station, first).run() is ACCEPTED
     assert multiwii.flown == packed(first)
     multiwii.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 9 else ""
-    upload = Upload(station, plan(15, 1))
+    upload = Upload(station, plan(15, 1), tries=60)
     seen: set[int] = set()
     while not upload.is_over:
         world.run(0.01)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from test_inav import packed, plan
 from world import GroundStation, World
 
-from bridge.bridge import Bridge
 from bridge.flight_controller import Kind
 from bridge.mission_check import check_list
 from bridge.nav_check import NavRules
@@ -29,8 +28,8 @@ NAV_WP_ID = 28
 MIXED = [
     (16, 0),
     (16, 7),
-    (178, 4),
     (201, 0),
+    (178, 4),
     (16, 0),
     (19, 9),
     (115, 90),
@@ -230,10 +229,8 @@ def test_a_stop_in_the_middle_loads_the_old_list_again() -> None:
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(100, 1))
     world.run(0.4)
-    bridge: Bridge = world.bridge
-    bridge.runner.stop(world.now)
-    world.run(0.5)
-    assert upload.result is DENIED
+    world.bridge.abort_missions(world.now)
+    assert upload.run(2) is DENIED
     assert any("stopped meanwhile" in text for text in station.texts())
     assert without_home(Download(station).run()) == without_home(plan(10))
     assert board.counters.flash_writes == 1
