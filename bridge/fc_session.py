@@ -102,6 +102,13 @@ class FcSession:
         """Whether it is not known yet who is there."""
         return self.state in (State.SEARCHING, State.IDENTIFYING)
 
+    @property
+    def bad_checksums(self) -> int | None:
+        """Damaged frames since the present flight controller was found; None if that is not known."""
+        if self.link is not None:
+            return self.link.bad_checksums
+        return None if self._mavlink is None else self._mavlink.bad_frames
+
     def opened(self, now: float) -> None:
         """The port is there."""
         self._begin_search(now, "port opened")

@@ -46,6 +46,8 @@ class Ground:
         self._datagrams: list[tuple[Peer, bytes]] = []
         self._texts = RecentTexts()
         self._now = 0.0
+        #: Frames from ground stations whose checksum was wrong.
+        self.bad_frames = 0
         self._everyone: list[Peer] | None = None  # counted anew after each change
 
     # Who is there.
@@ -127,9 +129,11 @@ class Ground:
             splitter = MavlinkSplitter()
             if not datagram:
                 self._splitters[peer] = splitter
+        bad_before = splitter.bad_frames
         frames = splitter.feed(data)
         if datagram:
             frames += splitter.reset()
+        self.bad_frames += splitter.bad_frames - bad_before
         return [frame for frame in frames if self._is_welcome(peer, frame, now)]
 
     def _is_welcome(self, peer: Peer, frame: MavlinkFrame, now: float) -> bool:

@@ -33,6 +33,11 @@ class MavlinkLine:
         self.armed: bool | None = None
         self.ended: str | None = None
 
+    @property
+    def bad_frames(self) -> int:
+        """Frames whose checksum was wrong."""
+        return self._splitter.bad_frames
+
     def receive(self, data: bytes, now: float) -> list[MavlinkFrame]:
         """Take bytes from the port; return the whole frames."""
         self._last_byte_at = now

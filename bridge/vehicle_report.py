@@ -87,6 +87,6 @@ class VehicleReporter:
             speed_baud=None if controller is None else session.speed,
             round_trip_ms=None if msp is None else round(msp.round_trip_s * 1000, 1),
             requests_lost=None if msp is None else msp.requests_lost,
-            bad_checksums=None if msp is None else msp.bad_checksums,
+            bad_checksums=session.bad_checksums,
             ground_stations=tuple(str(peer) for peer in self._ground.peers()),
         )

@@ -131,7 +131,7 @@ class MissionJobs:
             "mission_checksum": None if held is None else _hex(held.identity.checksum),
             "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),
             "requests_lost": None if link is None else link.requests_lost,
-            "bad_checksums": None if link is None else link.bad_checksums,
+            "bad_checksums": session.bad_checksums,
             **self._daemon.followers_status(),
         }
 

@@ -1,9 +1,10 @@
 """The running bridge: its links, its store and its clock, on one event loop."""
 
 import asyncio
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import structlog
@@ -36,6 +37,16 @@ _REST_INTERVAL_S = 0.02
 _WHO_MAY_WRITE = "whoever reaches it may write missions and parameters; docs/signing.md tells how to limit that"
 
 _log = structlog.get_logger()
+
+
+@dataclass(slots=True)
+class Traffic:
+    """What went over one port or link since the start: bytes, and pieces (reads and writes, datagrams)."""
+
+    pieces_received: int = 0
+    bytes_received: int = 0
+    pieces_sent: int = 0
+    bytes_sent: int = 0
 
 
 class Follower(Protocol):
@@ -79,6 +90,9 @@ class Daemon:
         self.started = asyncio.Event()
         self._port = self._recording.port(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
         self._links: dict[str, GcsLink] = {}
+        #: By link; the flight controller's port has the name "fc".
+        self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
+        self._fc_traffic = self.traffic["fc"]
         self._followers: list[Follower] = []
         self._timer: asyncio.TimerHandle | None = None
         self._search_report: asyncio.TimerHandle | None = None
@@ -167,7 +181,10 @@ class Daemon:
         self._port.set_speed(bridge.speed)
         self._port.may_gather = bridge.is_passing_through
         if output := bridge.take_fc_output():
-            self._port.write(b"".join(output))
+            data = b"".join(output)
+            self._port.write(data)
+            self._fc_traffic.pieces_sent += 1
+            self._fc_traffic.bytes_sent += len(data)
         self._send_datagrams()
         for effect in bridge.take_store_effects():
             self._carry_out(effect)
@@ -183,6 +200,9 @@ class Daemon:
     def _send_datagrams(self) -> None:
         for peer, data in self.bridge.ground.take_datagrams():
             self._links[peer.link].send(peer, data)
+            traffic = self.traffic[peer.link]
+            traffic.pieces_sent += 1
+            traffic.bytes_sent += len(data)
 
     async def finish(self) -> None:
         """Begin no more transfers; what is under way comes to a good end if that is soon, else to a clean one."""
@@ -206,6 +226,9 @@ class Daemon:
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
         """Take bytes from a ground station."""
+        traffic = self.traffic[peer.link]
+        traffic.pieces_received += 1
+        traffic.bytes_received += len(data)
         self.bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram)
         self.flush()
 
@@ -230,6 +253,8 @@ class Daemon:
         self._report_search()
 
     def _fc_data(self, data: bytes) -> None:
+        self._fc_traffic.pieces_received += 1
+        self._fc_traffic.bytes_received += len(data)
         bridge = self.bridge
         bridge.fc_received(data, self._loop.time())
         if bridge.is_passing_through:

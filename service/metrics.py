@@ -1,0 +1,154 @@
+"""Prometheus' text of a daemon: what it counts anyway, read when somebody asks for it.
+
+Imported only where it is served: the client library costs several megabytes.
+"""
+
+import time
+from collections.abc import Iterator, Mapping
+
+from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from bridge.fc_session import State
+from bridge.journal import Level
+from bridge.mission_desk import Delivery
+from bridge.mission_log import ArrivedMission
+from bridge.vehicle_groups import Group
+from service.daemon import Daemon
+from service.mission_data import Json
+from service.version import version
+
+#: What /metrics is answered with.
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+_PREFIX = "naze_bridge_"
+#: An upload takes a second on a good link, and is given up after some more.
+_UPLOAD_S = (0.25, 0.5, 1, 2, 4, 8, 16, 32, 64)
+_BEGINS = {"mission.upload_started", "mission.push_started"}
+_ENDS = {"mission.upload_ended", "mission.refused", "mission.push_ended"}
+
+
+class Metrics:
+    """Follows a daemon from now on. Implements service.daemon.Follower."""
+
+    def __init__(self, daemon: Daemon) -> None:
+        self._registry = CollectorRegistry()
+        self._registry.register(_State(daemon))
+        self._events = self._counter("events", "Events of the log (docs/events.md).", "event", "level")
+        self._missions = self._counter("missions", "Missions that came in, by their final ack.", "ack")
+        self._findings = self._counter("findings", "Values that were changed or items dropped, by field.", "field")
+        self._durations = Histogram(
+            f"{_PREFIX}mission_transfer_seconds",
+            "From the first item of an upload, or the beginning of a push, to the final ack.",
+            ("result",),
+            buckets=_UPLOAD_S,
+            registry=self._registry,
+        )
+        self._begun: dict[object, float] = {}
+        daemon.add_follower(self)
+
+    def render(self) -> bytes:
+        """Return the text."""
+        return generate_latest(self._registry)
+
+    def telemetry(self, groups: frozenset[Group]) -> None:
+        """It is read when somebody asks."""
+
+    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
+        """Count it."""
+        self._events.labels(event, level).inc()
+        incident = facts.get("incident")
+        if event in _BEGINS:
+            self._begun[incident] = time.monotonic()
+        elif event in _ENDS and incident in self._begun:
+            elapsed_s = time.monotonic() - self._begun.pop(incident)
+            self._durations.labels(facts["ack"]).observe(elapsed_s)
+
+    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+        """Count it."""
+        self._missions.labels(delivery.ack.name).inc()
+        for finding in mission.verdict.findings:
+            self._findings.labels(finding.field).inc()
+
+    def status(self) -> Json:
+        """There is nothing to tell of it."""
+        return {}
+
+    def _counter(self, name: str, meaning: str, *labels: str) -> Counter:
+        return Counter(_PREFIX + name, meaning, labels, registry=self._registry)
+
+
+class _State(Collector):
+    """What the daemon and its bridge know at the moment of a scrape."""
+
+    def __init__(self, daemon: Daemon) -> None:
+        self._daemon = daemon
+
+    def describe(self) -> list[Metric]:
+        """Collecting is cheap and needs no rehearsal."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """Read everything."""
+        yield _gauge("build_info", "The version that runs.", {"version": version()}, 1)
+        yield from self._links()
+        yield from self._flight_controller()
+        yield from self._vehicle()
+
+    def _links(self) -> Iterator[Metric]:
+        for way in ("received", "sent"):
+            sizes = _counters(f"link_{way}_bytes", f"Bytes {way}, by link; fc: the flight controller's port.", "link")
+            pieces = _counters(f"link_{way}_pieces", f"Reads, writes or datagrams {way}, by link.", "link")
+            for name, traffic in self._daemon.traffic.items():
+                sizes.add_metric([name], getattr(traffic, f"bytes_{way}"))
+                pieces.add_metric([name], getattr(traffic, f"pieces_{way}"))
+            yield sizes
+            yield pieces
+        bridge = self._daemon.bridge
+        yield _gauge("ground_stations", "Ground stations that are heard.", {}, len(bridge.ground.peers()))
+        damaged = _counters("ground_damaged_frames", "Frames of ground stations with a wrong checksum.")
+        damaged.add_metric([], bridge.ground.bad_frames)
+        yield damaged
+        refused = _counters("refused_frames", "Frames of ground stations that may not write.", "link", "why")
+        for (link, why), count in bridge.guard.refused.items():
+            refused.add_metric([link, why], count)
+        yield refused
+
+    def _flight_controller(self) -> Iterator[Metric]:
+        session = self._daemon.bridge.session
+        state = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the state that the link is in.", labels=["state"])
+        for each in State:
+            state.add_metric([each.value], float(session.state is each))
+        yield state
+        # These begin anew with each flight controller that is found, as Prometheus lets counters do.
+        damaged = _counters("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.")
+        damaged.add_metric([], session.bad_checksums or 0)
+        yield damaged
+        if session.link is not None:
+            lost = _counters("fc_lost_requests", "MSP requests that were not answered in time.")
+            lost.add_metric([], session.link.requests_lost)
+            yield lost
+            yield _gauge("fc_round_trip_seconds", "MSP request to reply, smoothed.", {}, session.link.round_trip_s)
+
+    def _vehicle(self) -> Iterator[Metric]:
+        report = self._daemon.bridge.report.whole()
+        records = None if report.mission is None else report.mission.count
+        known: dict[str, tuple[str, float | None]] = {
+            "armed": ("1 while it is armed.", report.status.armed),
+            "battery_volts": ("Battery.", report.battery.voltage_v),
+            "satellites": ("Satellites in use.", report.gps.satellites),
+            "mission_records": ("Records that the flight controller holds.", records),
+        }
+        for name, (meaning, value) in known.items():
+            if value is not None:
+                yield _gauge(name, meaning, {}, value)
+
+
+def _gauge(name: str, meaning: str, labels: Mapping[str, str], value: float) -> Metric:
+    family = GaugeMetricFamily(_PREFIX + name, meaning, labels=list(labels))
+    family.add_metric(list(labels.values()), value)
+    return family
+
+
+def _counters(name: str, meaning: str, *labels: str) -> CounterMetricFamily:
+    return CounterMetricFamily(_PREFIX + name, meaning, labels=labels)

@@ -1,0 +1,61 @@
+"""Prometheus' text of a daemon that is at work, read by Prometheus' own parser."""
+
+import asyncio
+from pathlib import Path
+
+from plain_station import udp_station
+from plan import plain_plan
+from programs import free_port, until
+from prometheus_client.parser import text_string_to_metric_families
+
+from protocols.mission_item import MissionResult
+from service.connection import parse_fc, parse_gcs
+from service.daemon import Daemon
+from service.metrics import Metrics
+from service.settings import Settings
+
+Samples = dict[tuple[str, tuple[str, ...]], float]
+
+
+def read(metrics: Metrics) -> Samples:
+    families = text_string_to_metric_families(metrics.render().decode())
+    return {
+        (sample.name.removeprefix("naze_bridge_"), tuple(sample.labels.values())): sample.value
+        for family in families
+        for sample in family.samples
+    }
+
+
+async def test_what_a_daemon_counts(tmp_path: Path) -> None:
+    link = parse_gcs(f"udpin:127.0.0.1:{free_port()}")
+    daemon = Daemon(Settings(parse_fc("sim:"), [link], tmp_path))
+    metrics = Metrics(daemon)
+    before = read(metrics)
+    assert before["fc_state", ("no port",)] == 1
+    assert ("battery_volts", ()) not in before
+    running = asyncio.create_task(daemon.run())
+    await daemon.started.wait()
+    await asyncio.to_thread(until, lambda: ("battery_volts", ()) in read(metrics), "a word on the battery")
+
+    def write() -> list[MissionResult]:
+        with udp_station((link.host, link.port)) as station:
+            station.say_hello()
+            station.wait_for("HEARTBEAT")
+            return [station.upload(plain_plan(count)) for count in (12, 1)]
+
+    assert await asyncio.to_thread(write) == [MissionResult.ACCEPTED, MissionResult.INVALID]
+    after = read(metrics)
+    assert after["fc_state", ("MSP",)] == 1
+    assert after["missions_total", ("ACCEPTED",)] == 1
+    assert after["mission_transfer_seconds_count", ("ACCEPTED",)] == 1
+    assert after["events_total", ("mission.refused", "warning")] == 1
+    assert after["mission_records", ()] == 12
+    assert after["ground_stations", ()] == 1
+    assert 0 < after["battery_volts", ()] < 30
+    # Twelve items, the count twice, and the greeting.
+    assert after["link_received_pieces_total", (str(link),)] >= 15
+    for way in ("received", "sent"):
+        for name in ("fc", str(link)):
+            assert after[f"link_{way}_bytes_total", (name,)] > after[f"link_{way}_pieces_total", (name,)] > 0
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
