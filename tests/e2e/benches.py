@@ -40,8 +40,8 @@ class Starter:
         self.directory = directory
         self._stack = stack
 
-    def board(self, *options: str) -> Board:
-        board = self._ended_at_last(Board(self.directory, *options))
+    def board(self, *options: str, tcp: bool = False) -> Board:
+        board = self._ended_at_last(Board(self.directory, *options, tcp=tcp))
         board.wait()
         return board
 

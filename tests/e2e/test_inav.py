@@ -1,0 +1,112 @@
+"""Real ground stations write and read 120 records through the real daemon, on a simulated INAV behind a TCP socket."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from benches import Bench, Starter
+from mavproxy import MavProxy
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from plan import HOME, PlanRow, stored_fields, waypoint
+from programs import until
+from test_mavsdk import fields, raw_items, refusal_of, vehicle_at
+
+from bridge.mission_check import check_list
+from bridge.nav_check import NavRules
+from bridge.nav_rules import inav_profile
+from bridge.verdict import Verdict
+from protocols.mission_item import Command, Frame
+from protocols.msp.nav import NavRecord
+
+RULES = NavRules(inav_profile())
+
+
+def nav_plan(records: int) -> list[PlanRow]:
+    """Home and a list of so many records with everything that INAV holds as it is sent."""
+    head = [
+        PlanRow(Command.DO_SET_ROI, 45.3843398, 8.4742597, 20.0),
+        PlanRow(Command.DO_CHANGE_SPEED, p1=1.0, p2=5.0),
+        waypoint(1, p2=0.0, p1=3.0),
+        PlanRow(Command.NAV_LOITER_TIME, 45.3846003, 8.4746004, 19.5, p1=700.0),
+        PlanRow(Command.CONDITION_YAW, p1=270.0),
+        waypoint(2, p2=0.0, frame=Frame.GLOBAL, alt=180.25),
+        PlanRow(Command.DO_SET_ROI_NONE),
+        PlanRow(Command.NAV_LOITER_UNLIM, 45.3847005, 8.4747006, 33.0),
+    ]
+    tail = [PlanRow(Command.DO_JUMP, p1=3.0, p2=2.0), PlanRow(Command.NAV_RETURN_TO_LAUNCH, p1=1.0)]
+    between = records - (len(head) - 1) - len(tail)
+    return [HOME, *head, *(waypoint(number, p2=0.0) for number in range(3, 3 + between)), *tail]
+
+
+def judged(plan: list[PlanRow]) -> Verdict[NavRecord]:
+    return check_list([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)], RULES)
+
+
+def expected(plan: list[PlanRow]) -> list[tuple[float, ...]]:
+    """What is read of it; home is where the board has it."""
+    return [stored_fields(item) for item in judged(plan).items[1:]]
+
+
+def stored(bench: Bench, count: int) -> list[bytes]:
+    """The records as the next boot finds them, without their numbers."""
+    return [bytes.fromhex(record)[1:] for record in bench.board.records()[:count]]
+
+
+def records_of(plan: list[PlanRow]) -> list[bytes]:
+    return [record.pack() for record in judged(plan).records]
+
+
+@pytest.fixture(scope="module")
+def inav(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with ExitStack() as stack:
+        start = Starter(tmp_path_factory.mktemp("inav"), stack)
+        board = start.board("--kind", "inav", tcp=True)
+        daemon = start.daemon(board.fc)
+        daemon.wait()
+        yield Bench(board, daemon, stack)
+        stats = board.stats()
+        assert stats["crashes"] == 0
+        assert not stats["cli_entered"]
+
+
+async def test_mavsdk_writes_and_reads_120_records(inav: Bench) -> None:
+    plan = nav_plan(120)
+    async with vehicle_at(inav.daemon.port) as vehicle:
+        missions = MissionRawAsync(vehicle)
+        await missions.upload_mission(raw_items(plan))
+        assert stored(inav, 120) == records_of(plan)
+        read = await missions.download_mission()
+        assert [fields(item) for item in read][1:] == expected(plan)
+        read[0].current = 1  # MAVSDK sends no list without one
+        await missions.upload_mission(read)
+        assert stored(inav, 120) == records_of(plan)
+        assert await refusal_of(missions, [HOME, waypoint(1), PlanRow(Command.DO_JUMP, p1=1.0, p2=1.0)])
+    newest = inav.daemon.missions()
+    assert [mission["outcome"] for mission in newest[:3]] == ["REJECTED", "VERIFIED", "VERIFIED"]
+    assert [mission["finding_count"] for mission in newest[1:3]] == [0, 0]
+
+
+def test_mavproxy_loads_lists_and_clears_120_records(inav: Bench, tmp_path: Path) -> None:
+    plan = [*nav_plan(120)[:-2], waypoint(200, p2=0.0), waypoint(201, p2=0.0)]
+    with MavProxy(tmp_path, inav.daemon.port) as mavproxy:
+        mavproxy.load(plan)
+        mavproxy.wait_for("TYPE_MISSION: ACCEPTED")
+        assert stored(inav, 120) == records_of(plan)
+        assert mavproxy.list(len(plan))[1:] == expected(plan)
+        mavproxy.type("wp clear")
+        mavproxy.wait_for("cleared")
+        assert stored(inav, 1) == [b"\4" + bytes(18) + b"\xa5"]
+        mavproxy.type("wp list")
+        mavproxy.wait_for("Requesting 0 waypoints")
+
+
+def test_after_a_restart_of_the_board_the_daemon_says_what_is_true(start: Starter) -> None:
+    board = start.board("--kind", "inav", tcp=True)
+    daemon = start.daemon(board.fc)
+    daemon.wait()
+    daemon.push(nav_plan(20))
+    assert daemon.held()["count"] == 20
+    board.end()
+    until(lambda: (status := daemon.status()) is not None and status["flight_controller"] is None, "the loss")
+    assert daemon.is_alive
