@@ -14,7 +14,6 @@ from service.zenoh_link.settings import I_KNOW, ZenohSettings, ZenohSettingsErro
 _MAX_MESSAGE_BYTES = 16 << 20
 #: What we set where the configuration is as zenoh's own default is: key, value.
 _DEFAULTS: dict[str, object] = {
-    "mode": "peer",
     "scouting/multicast/enabled": False,
     "listen/endpoints": [],
     # A slow subscriber costs the event loop nothing, not even the millisecond that zenoh would wait.
@@ -39,6 +38,10 @@ def make_config(settings: ZenohSettings) -> zenoh.Config:
                 config.insert_json5(f"{setting}/endpoints", json.dumps(endpoints))
             except zenoh.ZError as error:
                 raise ZenohSettingsError(f"zenoh.{setting} cannot be used: {in_short(error)}") from error
+    if json.loads(config.get_json("mode")) is None:
+        # Peers that meet at a router only do not see each other through it; a client is seen by all.
+        listens = _endpoints(json.loads(config.get_json("listen/endpoints")))
+        config.insert_json5("mode", '"peer"' if listens else '"client"')
     if settings.commands or settings.mavlink_in:
         _insist_on_authentication(settings, config)
     return config

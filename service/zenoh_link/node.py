@@ -8,6 +8,7 @@ What may wait goes over the session's thread:
 """
 
 import asyncio
+import threading
 from collections.abc import Callable, Mapping
 
 import structlog
@@ -168,12 +169,13 @@ class Node:
             self._ask_why_at = now + _PATIENCE_S
         elif now >= self._ask_why_at:
             self._ask_why_at = now + _PATIENCE_S
-            self._thread.submit(self._find_out_why)
+            # A thread of its own: an endpoint that swallows everything takes seconds to try.
+            threading.Thread(target=self._find_out_why, name="zenoh why", daemon=True).start()
 
     def _find_out_why(self) -> None:
         endpoints = connect_endpoints(self._config)
         why = endpoint_trouble(endpoints, tls_files(self._config)) if endpoints else ""
-        if why != self._why_alone:
+        if why and why != self._why_alone:
             self._why_alone = why
             _log.warning("zenoh.alone", why=why)
 

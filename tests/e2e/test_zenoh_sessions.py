@@ -1,0 +1,206 @@
+"""Sessions: nobody there, a router that comes late, goes and comes back; receivers that stall; names used twice."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from pathlib import Path
+
+import pytest
+from benches import Bench, Starter
+from plan import judge, plain_plan, records_of
+from programs import until
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from zenoh_bench import I_KNOW, VEHICLE, Reader, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
+from zenoh_router import Router, running_router
+
+from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.frame import MavlinkSplitter
+
+_SUBSCRIBER = """
+import sys, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", '"peer"')
+config.insert_json5("scouting/multicast/enabled", "false")
+config.insert_json5("listen/endpoints", "[]")
+config.insert_json5("connect/endpoints", f'["{sys.argv[1]}"]')
+with zenoh.open(config) as session, session.declare_subscriber("fleet/**") as subscriber:
+    print(subscriber.recv().key_expr, flush=True)
+    for sample in subscriber:
+        pass
+"""
+
+
+@contextmanager
+def stalled_subscriber(where: str) -> Iterator[None]:
+    """A subscriber of everything that is stopped after its first sample; its kernel takes what it still can."""
+    with subprocess.Popen([sys.executable, "-c", _SUBSCRIBER, where], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline().startswith("fleet/")
+            process.send_signal(signal.SIGSTOP)
+            yield
+        finally:
+            process.kill()
+
+
+def count(bench: Bench, event: str) -> int:
+    return sum(entry["event"] == event for entry in bench.daemon.events())
+
+
+def test_a_router_that_comes_late_goes_and_comes_back(start: Starter, tmp_path: Path) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'connect = ["{where}"]')
+    with running_router(tmp_path, where) as router, session(connect=where) as opened:
+        reader = Reader(opened)
+        reader.wait("telemetry/attitude")
+        ask_surely(opened, "state")
+        router.stop()
+        until(lambda: count(bench, "zenoh.left") == 1, "the loss")
+        bench.daemon.push(plain_plan(12))
+        heard = len(reader.samples)
+        router.start_again()
+        until(lambda: count(bench, "zenoh.joined") == 2, "the daemon's return")
+        until(lambda: len(reader.samples) > heard, "samples by the new router")
+        (state,) = until(lambda: ask(opened, "state"), "an answer by the new router")
+        assert state["mission"]["count"] == 12
+
+
+def test_two_peers_without_a_router(start: Starter) -> None:
+    """The daemon was there first; who comes later gets what was said before from a query."""
+    where = endpoint()
+    bench = zenoh_bench(start, f'connect = ["{where}"]')
+    bench.daemon.push(plain_plan(12))
+    with session(listen=where) as opened:
+        (current,) = until(lambda: ask(opened, "mission/current"), "an answer")
+        assert (current["count"], len(current["items"])) == (12, 12)
+        reader = Reader(opened)
+        numbers = [each["seq"] for each in until(lambda: reader.of("telemetry/attitude")[20:], "telemetry")]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        tokens = [str(reply.ok.key_expr) for reply in opened.liveliness().get("fleet/*/alive/*") if reply.ok]
+        assert [token.rpartition("/")[0] for token in tokens] == [key("alive")]
+
+
+def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
+    """Mission Planner writes; the router gets a signal when it has begun. The board and the pilot notice nothing."""
+    planner = bench.mission_planner()
+    plan = plain_plan(146)
+    planner._start_upload(len(plan))
+    router.process.send_signal(blow)
+    planner.go_on(plan, 0)
+    assert bench.board.records() == records_of(judge(plan))
+    bench.board.assert_was_treated_well()
+    status = bench.daemon.status()
+    assert status is not None
+    assert (status["requests_lost"], status["bad_checksums"]) == (0, 0)
+
+
+def test_a_router_that_dies_in_the_middle_of_an_upload(start: Starter, tmp_path: Path) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'connect = ["{where}"]')
+    with running_router(tmp_path, where) as router, session(connect=where) as opened:
+        Reader(opened).wait("telemetry/attitude")
+        upload_while(bench, router, signal.SIGKILL)
+
+
+def test_a_router_that_hangs_in_the_middle_of_an_upload(start: Starter, tmp_path: Path) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'connect = ["{where}"]')
+    with running_router(tmp_path, where) as router, session(connect=where) as opened:
+        Reader(opened).wait("telemetry/attitude")
+        upload_while(bench, router, signal.SIGSTOP)
+        assert bench.daemon.end() == 0
+
+
+def test_a_stalled_subscriber_holds_nothing_up(start: Starter) -> None:
+    """Not the missions, not other subscribers, not the daemon's end."""
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
+    with stalled_subscriber(where), session(connect=where) as opened:
+        reader = Reader(opened, "fleet/*/telemetry/*")
+        for number in range(6):
+            bench.daemon.push(plain_plan(146, number))
+        heard = len(reader.samples)
+        until(lambda: len(reader.samples) > heard + 20, "telemetry for the other one")
+        until(lambda: len(ask(opened, "state")) == 1, "an answer for the other one")
+        bench.board.assert_was_treated_well()
+        assert bench.daemon.end() == 0
+    assert "Traceback" not in bench.daemon.printed
+
+
+@pytest.mark.parametrize("behind_a_router", [False, True])
+def test_two_vehicles_of_one_name_both_say_so(start: Starter, tmp_path: Path, *, behind_a_router: bool) -> None:
+    where = endpoint()
+    with ExitStack() as stack:
+        if behind_a_router:
+            stack.enter_context(running_router(tmp_path, where))
+        first = zenoh_bench(start, f'{"connect" if behind_a_router else "listen"} = ["{where}"]')
+        opened = stack.enter_context(session(connect=where))
+        reader = Reader(opened)
+        reader.wait("state", lambda state: state["others_of_this_name"] == 0)
+        second_directory = tmp_path / "second"
+        second_directory.mkdir()
+        config = write_config(second_directory, f'connect = ["{where}"]')
+        second = Starter(second_directory, stack).daemon("sim:", options=("--config", str(config)))
+        for daemon in (first.daemon, second):
+            taken = until(partial(daemon.has_logged, "zenoh.name_taken"), "a word about the other one")
+            assert taken["vehicle"] == VEHICLE
+        reader.wait("state", lambda state: state["others_of_this_name"] == 1)
+        assert reader.events("zenoh.name_taken")
+        status = first.daemon.status()
+        assert status is not None
+        assert status["zenoh_others_of_this_name"] == 1
+        second.end(signal.SIGKILL)
+        until(lambda: first.daemon.has_logged("zenoh.name_free"), "the end of that")
+
+
+def test_mavlink_goes_out_while_it_is_read_and_comes_in(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\nmavlink_in = true\ncommands_without_authentication = "I know"')
+    decoder = MavlinkDecoder()
+    with session(connect=where) as opened:
+        reader = Reader(opened, key("mavlink/out"))
+        until(lambda: len(reader.samples) > 30, "frames")
+        frames = [frame for each in reader.samples for frame in MavlinkSplitter().feed(each.payload.to_bytes())]
+        numbers = [frame.seq for frame in frames]
+        assert numbers == [(numbers[0] + place) % 256 for place in range(len(numbers))]
+        assert all(decoder.decode(frame) for frame in frames)
+        speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
+        opened.put(key("mavlink/in"), b"\xfd\xff no MAVLink" * 9)
+        opened.put(key("mavlink/in"), bytes(mavlink.MAVLink_mission_request_list_message(1, 1, 0).pack(speaker)))
+
+        def answered() -> bool:
+            return any(
+                frame.msgid == mavlink.MAVLINK_MSG_ID_MISSION_COUNT
+                for each in reader.samples[:]
+                for frame in MavlinkSplitter().feed(each.payload.to_bytes())
+            )
+
+        until(answered, "the answer")
+        status = bench.daemon.status()
+        assert status is not None
+        assert status["ground_stations"] == ["zenoh mavlink/out"]
+
+
+def test_nothing_comes_in_unless_it_is_switched_on(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
+    with session(connect=where) as opened:
+        reader = Reader(opened, key("mavlink/out"))
+        until(lambda: reader.samples, "a frame")
+        speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
+        opened.put(key("mavlink/in"), bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(speaker)))
+        seen = len(reader.samples)
+        until(lambda: len(reader.samples) > seen + 20, "more frames")
+        status = bench.daemon.status()
+        assert status is not None
+        assert status["ground_stations"] == []
+
+
+def test_why_nobody_is_joined_is_said(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'connect = ["{where}"]')
+    alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a word about it")
+    assert alone["why"] == f"{where}: connection refused"
