@@ -5,7 +5,6 @@ from enum import Enum
 from functools import reduce
 from operator import xor
 
-MAX_PAYLOAD = 255
 _PREAMBLE = b"$M"
 _HEADER_SIZE = 5
 FRAME_OVERHEAD = _HEADER_SIZE + 1
