@@ -7,12 +7,13 @@ from collections.abc import Callable
 
 import structlog
 
-from benchmarks import forward, idle, push, resync, search, telemetry, upload
+from benchmarks import forward, idle, inav, push, resync, search, telemetry, upload
 from benchmarks.figure import Figure
 from benchmarks.report import keep_json, print_table
 
 _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "push": push.measure,
+    "inav": inav.measure,
     "upload": upload.measure,
     "idle": idle.measure,
     "telemetry": telemetry.measure,

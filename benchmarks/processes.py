@@ -81,6 +81,25 @@ def simulated_naze(folder: Path, *options: str) -> Iterator[Board]:
         yield board
 
 
+@contextmanager
+def inav_on_a_socket(folder: Path) -> Iterator[tuple[str, int]]:
+    """Run `naze-bridge sim --kind inav --tcp`; yield where it listens."""
+    host, port = "127.0.0.1", free_tcp_port()
+    log = folder / "sim.log"
+    with running([*_NAZE_BRIDGE, "sim", "--kind", "inav", "--tcp", f"{host}:{port}"], log):
+        wait_for(lambda: b"Simulated " in log.read_bytes(), "the simulated INAV is there")
+        yield host, port
+
+
+@contextmanager
+def inav_on_a_uart(folder: Path) -> Iterator[str]:
+    """Run benchmarks.paced_inav; yield the path of its terminal."""
+    log = folder / "paced.log"
+    with running([sys.executable, "-m", "benchmarks.paced_inav"], log):
+        wait_for(lambda: log.read_bytes().endswith(b"\n"), "the simulated INAV is there")
+        yield log.read_text().strip()
+
+
 @dataclass(frozen=True, slots=True)
 class DaemonProcess:
     """A running `naze-bridge run`."""
@@ -126,6 +145,14 @@ def floor_program(folder: Path, *arguments: str) -> Iterator[tuple[int, Path]]:
 def free_udp_port() -> int:
     """Return a port of the loopback on which nobody listens."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def free_tcp_port() -> int:
+    """Return a port of the loopback on which nobody listens for TCP."""
+    with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port

@@ -1,0 +1,40 @@
+"""`python -m benchmarks.paced_inav`: a simulated INAV on a pseudo-terminal that keeps a UART's pace to the microsecond.
+
+`naze-bridge sim` sleeps until its next byte is due, and an event loop oversleeps by up to a millisecond. Where a frame
+waits for the other that is a third of what is to be measured, so this one does not sleep for the last two of them.
+MSP is served every 50 us, which is as good as at once. The terminal's name is the first line that is printed.
+"""
+
+import os
+import pty
+import select
+import time
+import tty
+
+from service.simulator.fc_kinds import make_board
+from service.simulator.msp_options import MspOptions
+
+_AWAKE_S = 0.002
+_LONGEST_SLEEP_S = 0.05
+_READ_SIZE = 4096
+
+
+def main() -> None:
+    """Run until killed."""
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    print(os.ttyname(theirs), flush=True)
+    board = make_board("inav", MspOptions(serial_task_ms=0.05))
+    board.power_on_booted(time.monotonic())
+    while True:
+        now = time.monotonic()
+        data = board.advance(now)
+        if data:
+            os.write(ours, data)
+        left = board.next_wakeup(now) - now - _AWAKE_S
+        if select.select([ours], [], [], min(max(left, 0), _LONGEST_SLEEP_S))[0]:
+            board.receive(os.read(ours, _READ_SIZE), time.monotonic())
+
+
+if __name__ == "__main__":
+    main()
