@@ -7,23 +7,23 @@ import struct
 from enum import IntEnum
 
 from service.simulator.flight import Craft
-from service.simulator.inav_boxes import ARM, BOXES, NAV_RTH, NAV_WP, box_names
+from service.simulator.inav_boxes import ANGLE, ARM, BOXES, NAV_ALTHOLD, NAV_RTH, NAV_WP, box_names
 from service.simulator.inav_mission import CAPACITY, FAKE, InavMission
 from service.simulator.inav_navigation import InavNavigation
 from service.simulator.msp_firmware import Boot, PortHabits, error, reply
 from service.simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
-from service.simulator.waypoint_craft import WaypointCraft
+from service.simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
 
 _STEP_S = 0.05
 _STATUS_FLAGS = 32
-_SENSORS = 0b1000_0000_0000_1111  # accelerometer, barometer, compass, GPS; bit 15: hardware is healthy
+_SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
 _CYCLE_TIME_US = 500
 _API_VERSION = bytes((0, 2, 5))
 _FIX_3D = 2
 _HDOP_E2 = 130
 _RSSI = 920
 _LOWEST, _MIDDLE, _CRUISE, _HIGHEST = 1000, 1500, 1450, 2000
-_HOME, _DESIRED, _PRESENT = 0, 254, 255
+_FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
 
 
 class InavCommand(IntEnum):
@@ -120,7 +120,10 @@ class InavFirmware:
 
     def _flags(self) -> int:
         """Return the modes as MSP_STATUS has them: those of the navigation are what it does, not the switch."""
-        flown = {ARM: self._armed, NAV_WP: self._navigation.is_in_mission, NAV_RTH: self._navigation.is_returning}
+        in_mission, returning = self._navigation.is_in_mission, self._navigation.is_returning
+        flown = {ARM: self._armed, NAV_WP: in_mission, NAV_RTH: returning}
+        if in_mission or returning:
+            flown |= {ANGLE: True, NAV_ALTHOLD: True}
         return sum(flown.get(box, self._is_on(box)) << bit for bit, box in enumerate(self._boxes[:_STATUS_FLAGS]))
 
     # -- MSP -------------------------------------------------------------------------------------------------
@@ -168,12 +171,13 @@ class InavFirmware:
         return reply(InavCommand.SET_WP)
 
     def _waypoint(self, payload: bytes) -> bytes:
-        number = payload[0] if payload else _HOME
+        number = payload[0] if payload else 0
         flight = self._craft.state()
         match number:
-            case 0 if self._home:
-                waypoint = NavWaypoint(FAKE.action, *self._home, 0)
-            case 255 if self._home:
+            case 0:
+                # With a fix, and this craft always has one, home is here until it arms.
+                waypoint = NavWaypoint(FAKE.action, *(self._home or self._craft.position), _FIELD_ALTITUDE_CM)
+            case 255:
                 waypoint = NavWaypoint(FAKE.action, flight.lat_e7, flight.lon_e7, round(flight.altitude_m * 100))
             case _:
                 waypoint = self._mission.read(number, self._armed)
@@ -225,5 +229,5 @@ class InavFirmware:
             case InavCommand.BOXIDS:
                 return bytes(self._boxes)
             case InavCommand.NAV_STATUS:
-                return self._navigation.status(self._armed).pack()
+                return self._navigation.status().pack()
         return None

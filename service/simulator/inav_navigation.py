@@ -69,11 +69,9 @@ class InavNavigation:
         self._restarts = True
         self.index = 0
 
-    def status(self, armed: bool) -> NavStatus:
+    def status(self) -> NavStatus:
         """Return what MSP_NAV_STATUS tells, which names a waypoint at all times."""
         mode, state, error = self.phase.value
-        if mode is Mode.NONE and armed:
-            mode = Mode.HOLD
         number = self.index + 1
         return NavStatus(mode, state, self._mission[self.index].action, number, error, round(self._craft.heading))
 

@@ -12,7 +12,7 @@ from service.simulator.nav_waypoint import Action, NavWaypoint
 from service.simulator.options import Faults
 
 NAV_WP = 1 << 13
-NAV, RTH, HOLD, NONE = 3, 2, 1, 0
+NAV, RTH, NONE = 3, 2, 0
 
 
 class Flight:
@@ -38,6 +38,12 @@ class Flight:
     def numbers(self) -> list[int]:
         """The waypoints in the order in which they were active."""
         return [number for number, _ in groupby(status[3] for status in self.seen)]
+
+    def modes(self) -> set[str]:
+        """The names of the modes that MSP_STATUS tells."""
+        flags = struct.unpack_from("<I", self.bench.payload(101), 6)[0]
+        names = self.bench.payload(116).decode().split(";")
+        return {name for bit, name in enumerate(names[:32]) if flags >> bit & 1}
 
     def away_from(self, target: NavWaypoint) -> float:
         truth = self.bench.board.truth(self.bench.now)
@@ -76,6 +82,12 @@ def test_the_speed_of_a_leg(speed: int, seconds: int) -> None:
     assert flight.bench.now == pytest.approx(seconds, abs=1.5)
 
 
+def test_in_a_mission_the_modes_below_it_are_told_too() -> None:
+    flight = Flight(waypoint(20), waypoint(40))
+    flight.until(lambda status: status[1] == 5)
+    assert flight.modes() == {"ARM", "ANGLE", "NAV WP", "NAV ALTHOLD"}
+
+
 def test_a_hold_takes_its_seconds() -> None:
     flight = Flight(waypoint(3, Action.POSHOLD_TIME, p1=20, p2=400), waypoint(6))
     flight.until(is_finished)
@@ -111,8 +123,7 @@ def test_a_return_home_ends_above_it_or_on_it(p1: int, state: int) -> None:
     assert flight.seen[-1][:2] == (RTH, state)
     assert flight.away_from(waypoint(0)) < 1
     # The flight mode is NAV RTH then, not NAV WP.
-    flags = struct.unpack_from("<I", flight.bench.payload(101), 6)[0]
-    assert flags & (NAV_WP | 1 << 12) == 1 << 12
+    assert flight.modes() == {"ARM", "ANGLE", "NAV RTH", "NAV ALTHOLD"}
 
 
 def test_a_landing_ends_the_mission_on_the_ground() -> None:
@@ -142,7 +153,7 @@ def test_the_switch_stops_the_mission_and_goes_on_with_it() -> None:
     flight.until(lambda status: status[3] == 2)
     flight.bench.faults.boxes = 0
     flight.bench.run(1)
-    assert flight.status() == (HOLD, 0, 1, 2, 0)
+    assert flight.status() == (NONE, 0, 1, 2, 0)
     flight.bench.faults.boxes = NAV_WP
     flight.until(is_finished)
     assert flight.numbers() == [1, 2, 3]
@@ -153,4 +164,4 @@ def test_disarming_ends_it() -> None:
     flight.until(lambda status: status[3] == 2)
     flight.bench.faults.armed = False
     flight.bench.run(1)
-    assert flight.status()[:2] == (NONE, 0)
+    assert flight.status() == (NONE, 0, 1, 1, 0)

@@ -3,7 +3,7 @@
 import struct
 
 import pytest
-from msp_bench import MspBench
+from msp_bench import MspBench, waypoint
 
 from service.simulator.msp_options import MspOptions
 from service.simulator.options import Faults
@@ -74,12 +74,20 @@ def test_a_box_whose_bit_is_beyond_the_32_is_not_told() -> None:
     assert struct.unpack_from("<I", bench.payload(101), 6)[0] == 1 << 4
 
 
-def test_home_is_known_once_armed() -> None:
+def test_home_and_the_present_place_are_told_with_their_altitude_above_the_sea() -> None:
     bench = MspBench("inav")
-    assert bench.read(0).lat_e7 == 0
-    bench.faults.armed = True
-    bench.run(0.5)
-    assert (bench.read(0).lat_e7, bench.read(0).lon_e7) == (453838000, 84733000)
+    for number in (0, 255):
+        place = bench.read(number)
+        assert (place.lat_e7, place.lon_e7, place.alt_cm) == (453838000, 84733000, 13100)
+
+
+def test_home_stays_where_it_armed() -> None:
+    bench = MspBench("inav", faults=Faults(boxes=0))
+    bench.upload([waypoint(100)])
+    bench.faults.armed, bench.faults.boxes = True, 1 << 13
+    bench.run(60)
+    assert bench.read(0).lat_e7 == 453838000
+    assert bench.read(255).lat_e7 > 453838000 + 10000
 
 
 def test_a_question_for_a_waypoint_without_its_number_is_answered_with_home() -> None:
