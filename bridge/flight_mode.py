@@ -15,9 +15,10 @@ class FlightMode(Enum):
     AUTO = auto()
 
 
-#: The first whose box is active wins. Harakiri's, baseflight's and Cleanflight's names, then INAV's and Betaflight's.
+#: The first whose box is active wins. Harakiri's, baseflight's and Cleanflight's names, then those of MultiWii NAV,
+#: INAV and Betaflight.
 _BOXES: tuple[tuple[FlightMode, frozenset[str]], ...] = (
-    (FlightMode.AUTO, frozenset({"GPS AUTO", "NAV WP"})),
+    (FlightMode.AUTO, frozenset({"GPS AUTO", "NAV WP", "MISSION"})),
     (FlightMode.RTL, frozenset({"GPS HOME", "NAV RTH", "GPS RESCUE"})),
     (FlightMode.LOITER, frozenset({"GPS HOLD", "NAV POSHOLD", "POS HOLD"})),
     (FlightMode.ALT_HOLD, frozenset({"BARO", "NAV ALTHOLD", "ALT HOLD"})),

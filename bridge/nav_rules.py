@@ -10,6 +10,8 @@ from protocols.msp.nav import NavAction
 
 #: POSHOLD_TIME with this time stands for a hold without end, which INAV does not know: nine hours.
 ENDLESS_S = 32767
+#: INAV's; MultiWii's hangs on its EEPROM.
+NAV_CAPACITY = 120
 #: Speeds below this are none to INAV, cm/s.
 LEAST_SPEED_CMS = 50
 ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
@@ -39,7 +41,7 @@ class NavProfile:
         return (2 if self.leg_speed else 1) * self.capacity + 1
 
 
-def inav_profile(capacity: int = 120) -> NavProfile:
+def inav_profile(capacity: int = NAV_CAPACITY) -> NavProfile:
     """INAV. It stores no POSHOLD_UNLIM."""
     return NavProfile(
         "INAV",
@@ -52,7 +54,7 @@ def inav_profile(capacity: int = 120) -> NavProfile:
     )
 
 
-def multiwii_profile(capacity: int = 120) -> NavProfile:
+def multiwii_profile(capacity: int = NAV_CAPACITY) -> NavProfile:
     """MultiWii 2.4 NAV."""
     return NavProfile(
         "MultiWii",

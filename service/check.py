@@ -1,6 +1,6 @@
 """`naze-bridge check`: what would become of a mission file, offline."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,8 @@ import click
 from bridge.finding import DROPPED
 from bridge.harakiri_check import HarakiriRules
 from bridge.mission_check import MissionRules, check_list
+from bridge.nav_check import NavRules
+from bridge.nav_rules import NAV_CAPACITY, inav_profile, multiwii_profile
 from bridge.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem
@@ -19,6 +21,12 @@ from service.mission_table import mission_table
 from service.printing import print_json, print_table
 
 _DEFAULT = HarakiriRules()
+#: Rules by kind of flight controller, from its capacity (None: the usual one) and its hit radius, cm.
+_RULES: Mapping[str, Callable[[int | None, int], MissionRules]] = {
+    "harakiri": lambda capacity, radius_cm: HarakiriRules(capacity or _DEFAULT.capacity, radius_cm),
+    "inav": lambda capacity, _: NavRules(inav_profile(capacity or NAV_CAPACITY)),
+    "multiwii": lambda capacity, _: NavRules(multiwii_profile(capacity or NAV_CAPACITY)),
+}
 
 
 class ExitCode(IntEnum):
@@ -32,30 +40,35 @@ class ExitCode(IntEnum):
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
 @click.option("--strict", is_flag=True, help="Changed values and dropped items count as rejection (exit code 1).")
+@click.option("--kind", type=click.Choice(list(_RULES)), default="harakiri", show_default=True, help="Whose rules.")
 @click.option(
     "--wp-radius-cm",
     type=click.IntRange(0, 2000),
     default=_DEFAULT.wp_radius_cm,
     show_default=True,
-    help="The flight controller's gps_wp_radius.",
+    help="Harakiri's gps_wp_radius.",
 )
 @click.option(
     "--capacity",
     type=click.IntRange(2, 65535),
-    default=_DEFAULT.capacity,
-    show_default=True,
-    help="Records that the flight controller holds, home included.",
+    help=f"Records that it holds; without: Harakiri {_DEFAULT.capacity}, home included, others {NAV_CAPACITY}.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each file.")
 @click.pass_context
 def check(
-    ctx: click.Context, files: Sequence[Path], strict: bool, wp_radius_cm: int, capacity: int, as_json: bool
+    ctx: click.Context,
+    files: Sequence[Path],
+    strict: bool,
+    kind: str,
+    wp_radius_cm: int,
+    capacity: int | None,
+    as_json: bool,
 ) -> None:
     """Show what would become of mission files (QGC WPL 110, QGroundControl .plan) on the flight controller.
 
     Nothing is sent anywhere. Exit code 0: every file would be accepted, 1: one would be rejected, 2: one is unreadable.
     """
-    rules = HarakiriRules(capacity=capacity, wp_radius_cm=wp_radius_cm)
+    rules = _RULES[kind](capacity, wp_radius_cm)
     ctx.exit(max(_check_file(path, rules, strict, as_json) for path in files))
 
 

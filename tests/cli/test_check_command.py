@@ -1,6 +1,7 @@
 """`naze-bridge check` as a person and as a script use it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -160,3 +161,15 @@ def test_the_examples_show_what_they_are_meant_to() -> None:
             assert (held.lat_e7, held.lon_e7, held.height_m) == (item["lat_e7"], item["lon_e7"], item["alt_m"])
     assert {item["command"] for item in documents[0]["items"]} >= {16, 18, 19, 20, 21, 22, 201}
     assert {finding["becomes"] for finding in documents[0]["findings"]} >= {"dropped", 15}
+
+
+@pytest.mark.parametrize(("kind", "stored", "findings"), [("harakiri", 2, 1), ("inav", 3, 0), ("multiwii", 2, 1)])
+def test_each_kind_of_flight_controller_has_its_rules(tmp_path: Path, kind: str, stored: int, findings: int) -> None:
+    home, point = (replace(item, p2=2.0 if kind == "harakiri" else 0.0) for item in (HOME, POINT))
+    file = tmp_path / "speed.waypoints"
+    file.write_text(write_qgc_wpl([home, SPEED, replace(point, seq=2)]))
+    (found,) = objects(run("--json", "--kind", kind, file))
+    assert (len(found["items"]), len(found["findings"])) == (stored, findings)
+    assert len(found["records"][0]) == 2 * (16 if kind == "harakiri" else 20)
+    assert run("--kind", kind, "--capacity", "1000", LONG).exit_code == 0
+    assert run("--kind", kind, LONG).exit_code == (0 if kind == "harakiri" else 1)
