@@ -21,7 +21,7 @@ ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHON
     "PYTHONPYCACHEPREFIX": str(RESULTS / "bytecode")
 }
 #: The console script, without depending on where it is installed.
-_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main()"]
+NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main()"]
 _PATIENCE_S = 30.0
 _POLL_S = 0.002
 
@@ -74,7 +74,7 @@ class Board:
 def simulated_naze(folder: Path, *options: str) -> Iterator[Board]:
     """Run `naze-bridge sim` with `options`."""
     board = Board(folder / "naze", folder / "sim.sock")
-    command = [*_NAZE_BRIDGE, "sim", "--link", str(board.link), "--control", str(board.control), *options]
+    command = [*NAZE_BRIDGE, "sim", "--link", str(board.link), "--control", str(board.control), *options]
     log = folder / "sim.log"
     with running(command, log):
         wait_for(lambda: b"Simulated Naze at" in log.read_bytes(), "the simulated Naze is there")
@@ -128,7 +128,7 @@ def logged_at(event: dict[str, Any]) -> float:
 @contextmanager
 def daemon(folder: Path, fc: Path, gcs: str, *options: str) -> Iterator[DaemonProcess]:
     """Run the daemon with a mission store of its own."""
-    command = [*_NAZE_BRIDGE, "run", "--fc", str(fc), "--gcs", gcs, "--state-dir", str(folder / "state"), *options]
+    command = [*NAZE_BRIDGE, "run", "--fc", str(fc), "--gcs", gcs, "--state-dir", str(folder / "state"), *options]
     started_at = time.time()
     with running(command, folder / "daemon.log") as process:
         yield DaemonProcess(process.pid, started_at, folder / "daemon.log")

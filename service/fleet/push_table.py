@@ -19,7 +19,8 @@ from service.mission_data import Json
 def progress_bars(fleet: FleetPush, item_count: int) -> Iterator[Callable[[FleetPush], None]]:
     """Show a bar for each vehicle on standard error, if that is a terminal, as long as the push runs."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+    console = Console(stderr=True)
+    with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
         tasks = {name: bars.add_task(name, total=item_count) for name in fleet.vehicles}
 
         def show(now: FleetPush) -> None:
@@ -64,5 +65,6 @@ def _words(progress: Progress) -> str:
         return progress.error
     assert progress.result is not None
     findings = progress.result.get("findings")
-    changes = len(findings) if isinstance(findings, list) else 0
-    return (text(progress.result, "text") or "") + (f"; {changes} values changed or items dropped" if changes else "")
+    count = len(findings) if isinstance(findings, list) else 0
+    corrections = f"; {count} correction{'s' if count > 1 else ''}" if count else ""
+    return (text(progress.result, "text") or "") + corrections

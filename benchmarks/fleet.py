@@ -1,0 +1,155 @@
+"""A fleet of 5 and of 50 through one router: `fleet list`, `fleet push` to all, and what one more vehicle costs.
+
+Each vehicle is the daemon itself (`naze-bridge run`) in a process of its own, with the simulated Naze within it, which
+keeps the pace of a UART. The router is a zenoh session in router mode, in a process of its own, too. What is timed are
+whole commands, from their start to their end, as a person waits for them; the floor is a Python that opens a zenoh
+session and leaves.
+"""
+
+import json
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import zenoh
+
+from benchmarks.figure import Figure, Floor
+from benchmarks.missions import COUNT, random_mission
+from benchmarks.processes import ENVIRONMENT, NAZE_BRIDGE, ROOT, daemon, free_udp_port, running, wait_for
+from protocols.mission_file import write_qgc_wpl
+
+_FEW, _MANY = 5, 50
+_LISTS = 7
+_WATCHED_S = 10.0
+_OPEN = "import json, sys, zenoh; c = zenoh.Config(); c.insert_json5('mode', json.dumps('client'))"
+_OPEN_AND_LEAVE = f"{_OPEN}; c.insert_json5('connect/endpoints', json.dumps([sys.argv[1]])); zenoh.open(c).close()"
+
+
+@dataclass(frozen=True, slots=True)
+class _Cost:
+    """What a fleet costs. Times in seconds; CPU in percent of one core: the router's, and all vehicles' together."""
+
+    list_s: float
+    push_s: float
+    failed: int
+    router_percent: float
+    vehicles_percent: float
+
+
+def measure() -> list[Figure]:
+    """Measure both fleets; the first vehicles of the greater one are the smaller one."""
+    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
+        folder = Path(name)
+        endpoint, router = stack.enter_context(router_program(folder))
+        start_s = statistics.median(_timed([sys.executable, "-c", _OPEN_AND_LEAVE, endpoint]) for _ in range(_LISTS))
+        pids: list[int] = []
+        costs = {}
+        for count in (_FEW, _MANY):
+            pids += [stack.enter_context(vehicle(folder, number, endpoint)) for number in range(len(pids), count)]
+            _wait_for_vehicles(endpoint, count)
+            costs[count] = _cost(folder, count, endpoint, router, pids)
+    few, many = costs[_FEW], costs[_MANY]
+    floor = Floor(start_s, "Python, a zenoh session")
+    return [
+        Figure(f"fleet list of {_FEW}, median of {_LISTS}", few.list_s, "s", floor),
+        Figure(f"fleet list of {_MANY}, median of {_LISTS}", many.list_s, "s", floor, 1.0),
+        Figure(f"fleet push of {COUNT} items to {_FEW}", few.push_s, "s"),
+        Figure(f"fleet push of {COUNT} items to {_MANY}", many.push_s, "s", Floor(few.push_s, f"the push to {_FEW}")),
+        Figure(f"vehicles of {_FEW + _MANY} that a push failed for", few.failed + many.failed, "", None, 0),
+        _each("router, all telemetry read: CPU a vehicle", few.router_percent, many.router_percent),
+        _each("daemon, all telemetry read: CPU a vehicle", few.vehicles_percent, many.vehicles_percent),
+    ]
+
+
+def _each(name: str, few: float, many: float) -> Figure:
+    """Make a figure of a cost for each of many vehicles, as a multiple of that for each of few."""
+    floor = Floor(few / _FEW, f"the same among {_FEW}")
+    return Figure(f"{name} among {_MANY}", many / _MANY, "% of a core", floor, 1.5, times_floor=True)
+
+
+def _cost(folder: Path, count: int, endpoint: str, router: int, vehicles: Sequence[int]) -> _Cost:
+    list_s = statistics.median(_timed(_fleet("list", endpoint)) for _ in range(_LISTS))
+    mission = folder / "mission.waypoints"
+    mission.write_text(write_qgc_wpl(random_mission(count)))
+    began_at = time.perf_counter()
+    pushed = subprocess.run(
+        _fleet("push", endpoint, str(mission), "--all"), cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=False
+    )
+    push_s = time.perf_counter() - began_at
+    answers = json.loads(pushed.stdout)["vehicles"]
+    failed = count - sum(answer["ok"] for answer in answers)
+    with _client(endpoint) as session, session.declare_subscriber("fleet/*/telemetry/*", lambda _: None):
+        time.sleep(1.0)
+        before = cpu_s(router), sum(map(cpu_s, vehicles))
+        time.sleep(_WATCHED_S)
+        after = cpu_s(router), sum(map(cpu_s, vehicles))
+    router_percent, vehicles_percent = (100 * (b - a) / _WATCHED_S for a, b in zip(before, after, strict=True))
+    return _Cost(list_s, push_s, failed, router_percent, vehicles_percent)
+
+
+def _fleet(command: str, endpoint: str, *arguments: str) -> list[str]:
+    return [*NAZE_BRIDGE, "fleet", command, *arguments, "--connect", endpoint, "--json"]
+
+
+def _timed(command: Sequence[str]) -> float:
+    began_at = time.perf_counter()
+    subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=True)
+    return time.perf_counter() - began_at
+
+
+def _wait_for_vehicles(endpoint: str, count: int) -> None:
+    def are_there() -> bool:
+        time.sleep(0.2)
+        states = [json.loads(reply.ok.payload.to_bytes()) for reply in session.get("fleet/*/state") if reply.ok]
+        return sum(state["mission"] is not None for state in states) == count
+
+    with _client(endpoint) as session:
+        wait_for(are_there, f"{count} vehicles know what their flight controllers hold")
+
+
+def _client(endpoint: str) -> zenoh.Session:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    return zenoh.open(config)
+
+
+@contextmanager
+def router_program(folder: Path) -> Iterator[tuple[str, int]]:
+    """Run a router; yield its endpoint and its process id."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    log = folder / "router.log"
+    with running([sys.executable, str(ROOT / "examples" / "zenoh_router.py"), endpoint], log) as process:
+        wait_for(lambda: b"is up" in log.read_bytes(), "the router is up")
+        yield endpoint, process.pid
+
+
+@contextmanager
+def vehicle(folder: Path, number: int, endpoint: str) -> Iterator[int]:
+    """Run a daemon on a simulated Naze that takes commands; yield its process id."""
+    own = folder / f"naze-{number}"
+    own.mkdir()
+    config = own / "config.toml"
+    config.write_text(
+        f'[zenoh]\nvehicle = "naze-{number}"\nconnect = ["{endpoint}"]\n'
+        'commands = true\ncommands_without_authentication = "I know"\n'
+    )
+    gcs = f"udpin:127.0.0.1:{free_udp_port()}"
+    with daemon(own, Path("sim:"), gcs, "--config", str(config)) as process:
+        yield process.pid
+
+
+def cpu_s(pid: int) -> float:
+    """Return the seconds for which a process has had a core, by its own clock: far finer than the ticks in /proc.
+
+    The clock's number is made as clock_getcpuclockid(3) makes it on Linux.
+    """
+    return time.clock_gettime(~pid << 3 | 2)

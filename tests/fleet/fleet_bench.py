@@ -1,0 +1,76 @@
+"""A fleet of real daemons behind a real router, each a process of its own."""
+
+import json
+import signal
+import subprocess
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from programs import Board, Daemon, run_naze_bridge, until
+from zenoh_router import Router, running_router
+
+_I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
+Vehicle = dict[str, Any]
+
+
+class Fleet:
+    """A router, and the vehicles that were started, by the names of their folders."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        self.folder = folder
+        self._stack = stack
+        self.router: Router = stack.enter_context(running_router(folder))
+        self.daemons: dict[str, Daemon] = {}
+        self.boards: dict[str, Board] = {}
+
+    def start(
+        self, folder: str, *, name: str = "", fc: str = "sim:", commands: str = _I_KNOW, encoding: str = "json"
+    ) -> Daemon:
+        """Start a vehicle; `name`: another one than that of its folder."""
+        own = self.folder / folder
+        own.mkdir(exist_ok=True)
+        config = own / "config.toml"
+        config.write_text(
+            f'[zenoh]\nvehicle = "{name or folder}"\nconnect = ["{self.router.endpoint}"]\nencoding = "{encoding}"\n'
+            + commands
+        )
+        daemon = Daemon(own, fc, options=("--config", str(config)))
+        self._stack.callback(daemon.end, signal.SIGKILL)
+        self.daemons[folder] = daemon
+        return daemon
+
+    def board(self, folder: str, *options: str) -> Board:
+        """Start a simulated Naze as a program of its own, which can be told to arm."""
+        own = self.folder / folder
+        own.mkdir(exist_ok=True)
+        board = Board(own, *options)
+        self._stack.callback(board.end, signal.SIGKILL)
+        board.wait()
+        self.boards[folder] = board
+        return board
+
+    def ask(self, *arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+        """Run a `fleet` command to its end."""
+        return run_naze_bridge("fleet", *arguments, "--connect", self.router.endpoint, **options)
+
+    def listed(self) -> dict[str, Vehicle]:
+        """Return what `fleet list` tells of each vehicle, by name."""
+        listed = self.ask("list", "--json")
+        assert listed.returncode == 0, listed
+        return {vehicle["name"]: vehicle for vehicle in json.loads(listed.stdout)["vehicles"]}
+
+    def wait(self, *names: str) -> None:
+        """Wait until vehicles are seen, and know what their flight controllers hold."""
+
+        def ready() -> bool:
+            vehicles = self.listed()
+            return all(vehicles.get(name, {}).get("mission_count") is not None for name in names)
+
+        until(ready, f"{names} in the fleet")
+
+    def pushed(self, *arguments: str | Path, code: int) -> dict[str, Vehicle]:
+        """Return what became of a push, by vehicle."""
+        ended = self.ask("push", *arguments, "--json")
+        assert ended.returncode == code, ended
+        return {vehicle["vehicle"]: vehicle for vehicle in json.loads(ended.stdout)["vehicles"]}

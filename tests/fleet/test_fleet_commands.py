@@ -1,0 +1,208 @@
+"""`naze-bridge fleet` as a person and a script use it: three daemons behind a router."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import zenoh
+from fleet_bench import Fleet
+from plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
+from programs import run_naze_bridge, until
+from zenoh_router import EXAMPLES
+
+from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_item import Command
+
+NAMES = ("kite", "owl", "swift")
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
+    """`owl` speaks CBOR, and `swift` has its flight controller elsewhere, where it can be armed."""
+    with ExitStack() as stack:
+        fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
+        board = fleet.board("swift")
+        fleet.start("kite")
+        fleet.start("owl", encoding="cbor")
+        fleet.start("swift", fc=str(board.link))
+        fleet.wait(*NAMES)
+        yield fleet
+
+
+def plan_file(folder: Path, plan: list[PlanRow]) -> Path:
+    path = folder / "plan.waypoints"
+    path.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
+    return path
+
+
+def session_of(fleet: Fleet) -> zenoh.Session:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([fleet.router.endpoint]))
+    return zenoh.open(config)
+
+
+def test_list(fleet: Fleet) -> None:
+    vehicles = fleet.listed()
+    assert list(vehicles) == list(NAMES)
+    for name, vehicle in vehicles.items():
+        status = fleet.daemons[name].status()
+        assert status is not None
+        assert (vehicle["protocol"], vehicle["flight_controller"]) == ("MSP", status["flight_controller"])
+        assert vehicle["armed"] is False
+        assert vehicle["mission_checksum"] == status["mission_checksum"]
+        assert 5 < vehicle["battery_v"] < 30
+        assert -90 < vehicle["lat_deg"] < 90
+    table = fleet.ask("list").stdout
+    assert [name for name in NAMES if name not in table] == []
+    assert [line for line in table.splitlines() if len(line) > 80 or line != line.rstrip()] == []
+
+
+def test_push_to_all_and_pull_it_back(fleet: Fleet, tmp_path: Path) -> None:
+    plan = plain_plan(9, start=20)
+    pushed = fleet.ask("push", plan_file(tmp_path, plan), "--all")
+    assert (pushed.returncode, pushed.stderr) == (0, ""), pushed
+    assert pushed.stdout.endswith("3 of 3 vehicles hold the mission, verified\n")
+    records = records_of(judge(plan))
+    assert [fleet.daemons[name].held()["records"] for name in NAMES] == [records] * 3
+    until(lambda: {each["mission_count"] for each in fleet.listed().values()} == {9}, "the news")
+    assert len({each["mission_checksum"] for each in fleet.listed().values()}) == 1
+    folder = tmp_path / "pulled"
+    assert fleet.ask("pull", folder).returncode == 0
+    assert sorted(path.name for path in folder.iterdir()) == [f"{name}.waypoints" for name in NAMES]
+    for path in folder.iterdir():
+        held = read_mission_file(path.read_bytes(), path.name)
+        assert [item.lat_e7 for item in held[1:]] == [int(row.lat * 1e7) for row in plan[1:]]
+
+
+def test_push_to_one_and_pull_it_into_a_file(fleet: Fleet, tmp_path: Path) -> None:
+    before = fleet.daemons["kite"].held()["records"]
+    pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=60)), "--vehicle", "owl", code=0)
+    assert (list(pushed), pushed["owl"]["ok"]) == (["owl"], True)
+    assert fleet.daemons["kite"].held()["records"] == before
+    until(lambda: fleet.listed()["owl"]["mission_count"] == 4, "the news")
+    shown = fleet.ask("pull", "--vehicle", "owl").stdout
+    assert shown.startswith(f"owl: 4 records, checksum {fleet.daemons['owl'].held()['checksum']}\n")
+    file = tmp_path / "owls"
+    assert fleet.ask("pull", file, "--vehicle", "owl").returncode == 0
+    assert len(read_mission_file(file.read_bytes(), "owls")) == 4
+    data = json.loads(fleet.ask("pull", "--vehicle", "owl", "--vehicle", "kite", "--json").stdout)["vehicles"]
+    assert [(each["vehicle"], each["error"]) for each in data] == [("owl", None), ("kite", None)]
+
+
+def test_changes_are_told(fleet: Fleet, tmp_path: Path) -> None:
+    plan = [*plain_plan(4, start=90), PlanRow(178, p2=5.0)]
+    pushed = fleet.ask("push", plan_file(tmp_path, plan), "--vehicle", "kite")
+    assert "Mission verified: 4 records; 2 corrections\n" in pushed.stdout, pushed
+
+
+def test_a_list_against_the_rules(fleet: Fleet, tmp_path: Path) -> None:
+    file = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
+    pushed = fleet.pushed(file, "--all", code=1)
+    assert {name: each["error"] for name, each in pushed.items()} == dict.fromkeys(
+        NAMES, "WP 1: rejected, LAND must be the last item"
+    )
+
+
+def test_one_is_armed(fleet: Fleet, tmp_path: Path) -> None:
+    file = plan_file(tmp_path, plain_plan(5, start=100))
+    swift, board = fleet.daemons["swift"], fleet.boards["swift"]
+    before = board.records()
+    board.set("armed 1")
+    try:
+        until(lambda: fleet.listed()["swift"]["armed"], "the news that it is armed")
+        assert "ARMED" in fleet.ask("list").stdout
+        pushed = fleet.pushed(file, "--all", code=1)
+        assert {name: each["ok"] for name, each in pushed.items()} == {"kite": True, "owl": True, "swift": False}
+        assert "rmed" in pushed["swift"]["error"]
+        assert board.records() == before
+        told = fleet.ask("push", file, "--all")
+        assert told.returncode == 1
+        assert told.stdout.endswith("2 of 3 vehicles hold the mission, verified; 1 failed\n")
+    finally:
+        board.set("armed 0")
+        until(lambda: (swift.status() or {}).get("armed") is False, "the landing")
+
+
+def test_a_name_that_nobody_has(fleet: Fleet, tmp_path: Path) -> None:
+    file = plan_file(tmp_path, plain_plan(4))
+    for command in (["push", file], ["pull"]):
+        ended = fleet.ask(*command, "--vehicle", "kita")
+        assert (ended.returncode, ended.stdout) == (1, "")
+        assert ended.stderr == "naze-bridge: no vehicle 'kita' is alive; there are kite, owl, swift\n"
+
+
+def test_strangers_say_strange_things(fleet: Fleet) -> None:
+    """Tokens and states of what is no bridge of ours neither stop the list nor reach the terminal."""
+    with ExitStack() as stack:
+        session = stack.enter_context(session_of(fleet))
+        liveliness = session.liveliness()
+        for key in ("fleet/ghost/alive/0", "fleet/spa ce/alive/1", "fleet/ghost/alive/0/more", "fleet/\x1b[2J/alive/2"):
+            stack.enter_context(liveliness.declare_token(key))
+        answers = (b"\xff", b"[" * 100_000, b'{"link": 3, "battery": {"voltage_v": "\x1b[2J"}}', b"[]")
+
+        def lie(query: zenoh.Query) -> None:
+            with query:
+                for answer in answers:
+                    query.reply("fleet/ghost/state", answer)
+
+        stack.enter_context(session.declare_queryable("fleet/ghost/state", lie))
+        until(lambda: "ghost" in fleet.listed(), "the ghost")
+        listed = fleet.ask("list")
+        assert (listed.returncode, listed.stderr) == (0, ""), listed
+        assert "\x1b" not in listed.stdout
+        assert set(fleet.listed()) == {"ghost", *NAMES}
+
+
+def test_the_examples(fleet: Fleet, tmp_path: Path) -> None:
+    file = plan_file(tmp_path, plain_plan(6, start=120))
+    upload = [sys.executable, str(EXAMPLES / "zenoh_upload.py")]
+    uploaded = subprocess.run(
+        [*upload, "kite", str(file), fleet.router.endpoint], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (uploaded.returncode, uploaded.stderr) == (0, ""), uploaded
+    assert "Mission verified: 6 records" in uploaded.stdout
+    output = tmp_path / "positions"
+    with output.open("w") as log:
+        positions = subprocess.Popen(
+            [sys.executable, str(EXAMPLES / "zenoh_positions.py"), fleet.router.endpoint], stdout=log, stderr=log
+        )
+    try:
+        until(lambda: {"kite:", "swift:"} <= set(output.read_text().split()), "positions of two vehicles")
+    finally:
+        positions.kill()
+        positions.wait()
+
+
+def test_a_name_for_two(fleet: Fleet, tmp_path: Path) -> None:
+    other = fleet.start("other", name="owl")
+    try:
+        until(lambda: fleet.listed()["owl"]["bridges"] == 2, "the second owl")
+        assert "owl: 2 bridges use this name" in " ".join(fleet.ask("list").stdout.split())
+        before = fleet.daemons["owl"].held()["records"]
+        pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=7)), "--vehicle", "owl", code=1)
+        assert "several bridges use this name" in pushed["owl"]["error"]
+        assert fleet.daemons["owl"].held()["records"] == before
+        assert "several bridges use this name" in fleet.ask("pull", "--vehicle", "owl").stderr
+    finally:
+        other.end()
+    until(lambda: fleet.listed()["owl"]["bridges"] == 1, "the end of the second owl")
+
+
+def test_commands_are_off(fleet: Fleet, tmp_path: Path) -> None:
+    deaf = fleet.start("deaf", commands="")
+    try:
+        fleet.wait("deaf")
+        pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=8)), "--vehicle", "deaf", code=1)
+        assert "takes no commands" in pushed["deaf"]["error"]
+    finally:
+        deaf.end()
+
+
+def test_help_names_every_command() -> None:
+    told = run_naze_bridge("fleet", "--help").stdout
+    assert [name for name in ("list", "watch", "push", "pull") if f"  {name} " not in told] == []

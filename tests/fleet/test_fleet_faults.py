@@ -1,0 +1,188 @@
+"""What goes away or hangs while the fleet is looked at or written to; nothing of it stops the others."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fleet_bench import Fleet
+from plan import judge, plain_plan, records_of
+from programs import PATIENCE, comes, until
+
+from protocols.mission_file import write_qgc_wpl
+
+#: 146 records at this speed take some seconds: time enough for something to go wrong.
+_SLOW_BAUD = 19200
+_LONG = plain_plan(146)
+_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')", "fleet"]
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Iterator[Fleet]:
+    """`kite` is quick, `snail` has a slow line."""
+    with ExitStack() as stack:
+        fleet = Fleet(tmp_path, stack)
+        board = fleet.board("snail", "--baud", str(_SLOW_BAUD))
+        fleet.start("kite")
+        fleet.start("snail", fc=f"{board.link},{_SLOW_BAUD}")
+        fleet.wait("kite", "snail")
+        yield fleet
+
+
+class Command:
+    """A `fleet` command that runs while something happens to the fleet."""
+
+    def __init__(self, fleet: Fleet, *arguments: str | Path) -> None:
+        self.process = subprocess.Popen(
+            [*_NAZE_BRIDGE, *map(str, arguments), "--connect", fleet.router.endpoint],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def end(self) -> tuple[int, str, str]:
+        """Return exit status, standard output and standard error."""
+        try:
+            output, error = self.process.communicate(timeout=60)
+        finally:
+            self.process.kill()
+        return self.process.returncode, output, error
+
+
+def long_push(fleet: Fleet, *options: str) -> Command:
+    """Begin to write the long mission to all, and return when the slow vehicle is in the middle of it."""
+    file = fleet.folder / "long.waypoints"
+    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(_LONG)]))
+    PLACE
+    command = Command(fleet, "push", file, "--all", *options)
+    until(lambda: fleet.boards["snail"].stats()["rx_bytes"] > before + 1000, "the middle of the push")
+    return command
+
+
+def outcomes(ended: tuple[int, str, str]) -> dict[str, Any]:
+    code, output, error = ended
+    assert (code, error) == (1, ""), ended
+    return {vehicle["vehicle"]: vehicle for vehicle in json.loads(output)["vehicles"]}
+
+
+def test_the_router_stops_in_the_middle_of_a_push(fleet: Fleet) -> None:
+    """The command says that it does not know; the vehicle ends what it has begun; the fleet is seen again."""
+    command = long_push(fleet, "--json")
+    fleet.router.stop()
+    snail = outcomes(command.end())["snail"]
+    assert (snail["ok"], "router, went away" in snail["error"]) == (False, True), snail
+    until(lambda: fleet.boards["snail"].records() == records_of(judge(_LONG)), "the end of the push on the vehicle")
+    gone = fleet.ask("list")
+    assert (gone.returncode, "connection refused" in gone.stderr) == (1, True)
+    fleet.router.start_again()
+    until(
+        lambda: {each["mission_count"] for each in fleet.listed().values()} == {146}, "both vehicles with the mission"
+    )
+    fleet.boards["snail"].assert_was_treated_well()
+
+
+def test_a_vehicle_vanishes_in_the_middle_of_a_push(fleet: Fleet) -> None:
+    command = long_push(fleet, "--json")
+    fleet.daemons["snail"].end(signal.SIGKILL)
+    found = outcomes(command.end())
+    assert found["kite"]["ok"]
+    assert "went away" in found["snail"]["error"]
+    assert list(fleet.listed()) == ["kite"]
+
+
+def test_ctrl_c_in_the_middle_of_a_push(fleet: Fleet) -> None:
+    command = long_push(fleet)
+    command.process.send_signal(signal.SIGINT)
+    code, output, error = command.end()
+    assert (code, output) == (130, "")
+    assert error.startswith("naze-bridge: stopped; what has begun goes on there: "), error
+    assert len(error.splitlines()) == 1
+    until(lambda: fleet.boards["snail"].records() == records_of(judge(_LONG)), "the end of the push on the vehicle")
+
+
+def test_a_second_push_meanwhile_is_refused(fleet: Fleet) -> None:
+    command = long_push(fleet, "--json")
+    second = fleet.ask("push", fleet.folder / "long.waypoints", "--vehicle", "snail", "--json")
+    assert second.returncode == 1, second
+    (snail,) = json.loads(second.stdout)["vehicles"]
+    assert not snail["ok"]
+    code, _, _ = command.end()
+    assert code == 0
+
+
+def test_a_bridge_that_hangs_is_listed_as_such(fleet: Fleet) -> None:
+    kite = fleet.daemons["kite"].process
+    kite.send_signal(signal.SIGSTOP)
+    try:
+        until(lambda: not fleet.listed()["kite"]["answers"], "the silence of the one that hangs")
+        vehicles = fleet.listed()
+        assert (vehicles["kite"]["answers"], vehicles["snail"]["answers"]) == (False, True)
+        assert "kite: alive, but tells no state" in fleet.ask("list").stdout
+    finally:
+        kite.send_signal(signal.SIGCONT)
+    fleet.wait("kite", "snail")
+
+
+class Terminal:
+    """A `fleet watch` on a terminal of its own; `text` is what was shown so far."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        near, far = pty.openpty()
+        environment = os.environ | {"TERM": "xterm", "COLUMNS": "120", "LINES": "40"}
+        self.process = subprocess.Popen(
+            [*_NAZE_BRIDGE, "watch", "--connect", fleet.router.endpoint], stdout=far, stderr=far, env=environment
+        )
+        os.close(far)
+        self._near = near
+        self.text = ""
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self) -> None:
+        # A terminal whose other end is closed gives an error.
+        try:
+            while data := os.read(self._near, 4096):
+                self.text += data.decode(errors="replace")
+        except OSError:
+            pass
+
+    def shows(self, text: str) -> None:
+        """Wait until something is shown that was not shown before."""
+        seen = len(self.text)
+        until(lambda: text in self.text[seen:], f"{text!r} on the terminal")
+
+    def end(self) -> int:
+        self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(PATIENCE)
+        finally:
+            self.process.kill()
+            self._reader.join(PATIENCE)
+            os.close(self._near)
+
+
+def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
+    terminal = Terminal(fleet)
+    try:
+        terminal.shows("kite")
+        terminal.shows("snail")
+        fleet.boards["snail"].set("armed 1")
+        terminal.shows("ARMED")
+        fleet.daemons["snail"].end()
+        until(lambda: comes(lambda: "snail" not in terminal.text[-600:], 0.0), "its end on the terminal")
+        fleet.router.stop()
+        terminal.shows("The router is gone")
+        fleet.router.start_again()
+        terminal.shows("kite")
+    finally:
+        code = terminal.end()
+    assert code == 0
+    assert "Traceback" not in terminal.text
