@@ -4,6 +4,7 @@
 """
 
 import queue
+import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -18,6 +19,8 @@ from service.zenoh_link.keys import ALIVE, UPLOAD, full
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
 _PATIENCE_S = 120.0
+#: Of a vehicle that dies, the end of its answers may be heard a little before the end of its token.
+_GRACE_S = 0.5
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _LOOK = "`naze-bridge fleet list` tells what it holds"
 _LOST = f"it, or the router, went away before the end of the push was known; {_LOOK} when it is back"
@@ -122,7 +125,12 @@ def push(
 
     def ended(name: str) -> None:
         if not fleet.vehicles[name].is_done:
-            fleet.ended(name, is_alive=name in {bridge.vehicle for bridge in alive(session, prefix)})
+            later = threading.Timer(_GRACE_S, lambda: events.put(lambda: judged(name)))
+            later.daemon = True
+            later.start()
+
+    def judged(name: str) -> None:
+        fleet.ended(name, is_alive=name in {bridge.vehicle for bridge in alive(session, prefix)})
 
     def start(name: str) -> None:
         send_query(

@@ -15,12 +15,12 @@ from typing import Any
 import pytest
 from fleet_bench import Fleet
 from plan import judge, plain_plan, records_of
-from programs import PATIENCE, comes, until
+from programs import PATIENCE, until
 
 from protocols.mission_file import write_qgc_wpl
 
 #: 146 records at this speed take some seconds: time enough for something to go wrong.
-_SLOW_BAUD = 19200
+_SLOW_BAUD = 9600
 _LONG = plain_plan(146)
 _NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')", "fleet"]
 
@@ -61,9 +61,8 @@ def long_push(fleet: Fleet, *options: str) -> Command:
     """Begin to write the long mission to all, and return when the slow vehicle is in the middle of it."""
     file = fleet.folder / "long.waypoints"
     file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(_LONG)]))
-    PLACE
     command = Command(fleet, "push", file, "--all", *options)
-    until(lambda: fleet.boards["snail"].stats()["rx_bytes"] > before + 1000, "the middle of the push")
+    until(lambda: fleet.daemons["snail"].has_logged("mission.push_started"), "the beginning of the slow push")
     return command
 
 
@@ -154,6 +153,11 @@ class Terminal:
         except OSError:
             pass
 
+    @property
+    def newest(self) -> str:
+        """The last picture that is complete."""
+        return (self.text.split("Ctrl-C ends.")[-2:] or [""])[0]
+
     def shows(self, text: str) -> None:
         """Wait until something is shown that was not shown before."""
         seen = len(self.text)
@@ -177,7 +181,7 @@ def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
         fleet.boards["snail"].set("armed 1")
         terminal.shows("ARMED")
         fleet.daemons["snail"].end()
-        until(lambda: comes(lambda: "snail" not in terminal.text[-600:], 0.0), "its end on the terminal")
+        until(lambda: "kite" in terminal.newest and "snail" not in terminal.newest, "its end on the terminal")
         fleet.router.stop()
         terminal.shows("The router is gone")
         fleet.router.start_again()
