@@ -86,7 +86,7 @@ def inav_on_a_socket(folder: Path) -> Iterator[tuple[str, int]]:
     """Run `naze-bridge sim --kind inav --tcp`; yield where it listens."""
     host, port = "127.0.0.1", free_tcp_port()
     log = folder / "sim.log"
-    with running([*_NAZE_BRIDGE, "sim", "--kind", "inav", "--tcp", f"{host}:{port}"], log):
+    with running([*NAZE_BRIDGE, "sim", "--kind", "inav", "--tcp", f"{host}:{port}"], log):
         wait_for(lambda: b"Simulated " in log.read_bytes(), "the simulated INAV is there")
         yield host, port
 
