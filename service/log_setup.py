@@ -4,6 +4,7 @@ For journald each line has its priority in front (sd-daemon(3)).
 """
 
 import os
+import select
 import sys
 import time
 from collections.abc import Mapping
@@ -21,10 +22,12 @@ _MOST, _WITHIN_S = 20, 10.0
 
 
 class _StandardError:
-    """Prints a line, or loses it: a full disk behind a log must not stop the bridge."""
+    """Prints a line, or loses it: a full disk behind a log, or a pipe that nobody reads, must not stop the bridge."""
 
     def msg(self, line: str) -> None:
         with suppress(OSError):
+            if not select.select([], [sys.stderr], [], 0)[1]:
+                return
             print(line, file=sys.stderr, flush=True)  # noqa: T201
 
     debug = info = warning = error = msg

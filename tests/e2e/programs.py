@@ -18,8 +18,8 @@ from service.control import ControlError, ask_daemon
 
 #: Seconds after which something that must come at all counts as not coming.
 PATIENCE = 20.0
-_REPOSITORY = Path(__file__).resolve().parents[2]
-_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')"]
+REPOSITORY = Path(__file__).resolve().parents[2]
+NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')"]
 T = TypeVar("T")
 
 
@@ -50,8 +50,8 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
 
 def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run a subcommand to its end; `options` are those of subprocess.run."""
-    usual: dict[str, Any] = {"cwd": _REPOSITORY, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    command = [*_NAZE_BRIDGE, *map(str, arguments)]
+    usual: dict[str, Any] = {"cwd": REPOSITORY, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    command = [*NAZE_BRIDGE, *map(str, arguments)]
     ended: subprocess.CompletedProcess[str]
     ended = subprocess.run(command, timeout=PATIENCE, check=False, **usual | options)
     return ended
@@ -67,7 +67,7 @@ class Program:
 
     def _start(self) -> subprocess.Popen[bytes]:
         with self._output.open("ab") as file:
-            return subprocess.Popen([*_NAZE_BRIDGE, *self._arguments], cwd=_REPOSITORY, stdout=file, stderr=file)
+            return subprocess.Popen([*NAZE_BRIDGE, *self._arguments], cwd=REPOSITORY, stdout=file, stderr=file)
 
     @property
     def printed(self) -> str:

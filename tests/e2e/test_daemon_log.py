@@ -3,16 +3,19 @@
 import asyncio
 import os
 import signal
+import subprocess
 import tty
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 from benches import Starter
-from programs import until
+from programs import NAZE_BRIDGE, REPOSITORY, free_port, until
 from structlog.testing import capture_logs
 
 from service import daemon as daemon_module
 from service.connection import SerialFc
+from service.control import ControlError, ask_daemon
 from service.daemon import Daemon
 from service.settings import Settings
 
@@ -43,6 +46,30 @@ def test_a_port_that_is_pulled_is_a_loss(start: Starter) -> None:
     bench.board.set("unplug")
     lost = until(lambda: bench.daemon.has_logged("fc.port_lost"), "the loss")
     assert lost["level"] == "warning"
+
+
+def test_a_log_that_nobody_reads_stops_nothing(tmp_path: Path) -> None:
+    """`naze-bridge run 2>&1 | less`, or a journal that stands still: the pipe is full before the first line."""
+    unread, full = os.pipe()
+    os.set_blocking(full, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(full, bytes(4096))
+    os.set_blocking(full, True)
+    options = ("run", "--fc", "sim:", "--gcs", f"udpin:127.0.0.1:{free_port()}", "--state-dir", str(tmp_path))
+    with subprocess.Popen([*NAZE_BRIDGE, *options], cwd=REPOSITORY, stderr=full) as daemon:
+
+        def has_found() -> bool:
+            with suppress(ControlError):
+                return bool(ask_daemon(tmp_path, {"do": "status"})["flight_controller"])
+            return False
+
+        try:
+            until(has_found, "the flight controller")
+        finally:
+            daemon.kill()
+    os.close(full)
+    os.close(unread)
 
 
 async def test_a_search_that_finds_nobody_says_so_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
