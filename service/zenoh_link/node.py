@@ -41,7 +41,7 @@ _STATE_INTERVAL_S = 1.0
 #: An autopilot may send faster than this; nobody reads it so.
 _LEAST_INTERVAL_S = 0.004
 #: How long nobody is there before it is looked into, and until it is looked again.
-_PATIENCE_S = 10.0
+_PATIENCE_S = 5.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
 
 _log = structlog.get_logger()

@@ -22,7 +22,8 @@ def endpoint() -> str:
 
 def write_config(directory: Path, table: str, vehicle: str = VEHICLE, name: str = "config.toml") -> Path:
     path = directory / name
-    path.write_text(f'[zenoh]\nvehicle = "{vehicle}"\n{table}\n')
+    name_line = f'vehicle = "{vehicle}"\n' if vehicle else ""
+    path.write_text(f"[zenoh]\n{name_line}{table}\n")
     return path
 
 

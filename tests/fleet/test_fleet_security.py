@@ -5,50 +5,16 @@ import json
 import shutil
 import socket
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import trustme
 import zenoh
 from programs import free_port, run_naze_bridge, until
-from zenoh_router import EXAMPLES, running_router
-
-_ELSEWHERE = "/etc/naze-bridge"
-
-
-@dataclass(frozen=True)
-class Fleet:
-    """A router, and the folder with everybody's files. `endpoint` is what the examples call router.local."""
-
-    folder: Path
-    endpoint: str
-
-    def config(self, of: str, name: str) -> Path:
-        """The example `of` (vehicle or pilot) as `name` would have it."""
-        path = self.folder / f"{name}-{of}.json5"
-        text = (self.folder / f"{of}.json5").read_text()
-        path.write_text(text.replace({"vehicle": "naze-1", "pilot": "pilot"}[of], name) if of != name else text)
-        return path
-
-    def open(self, of: str, name: str) -> zenoh.Session:
-        return zenoh.open(zenoh.Config.from_file(self.config(of, name)))
-
-    def fleet_list(self, config: Path) -> subprocess.CompletedProcess[str]:
-        return run_naze_bridge("fleet", "list", "--zenoh-config", config)
-
-
-def example(folder: Path, of: str, endpoint: str) -> None:
-    """Copy an example to where it will be used; only places are changed."""
-    shutil.copytree(EXAMPLES / of, folder, dirs_exist_ok=True)
-    scheme, _, port = endpoint.partition("/")[0], None, endpoint.rpartition(":")[2]
-    for path in folder.glob("*.json5"):
-        text = path.read_text().replace(f"{_ELSEWHERE}/tls", str(folder)).replace(_ELSEWHERE, str(folder))
-        text = text.replace(f"{scheme}/router.local:7447", endpoint).replace("/0.0.0.0:7447", f"/127.0.0.1:{port}")
-        path.write_text(text)
+from secured_fleet import Fleet, password_fleet, tls_fleet
+from zenoh_router import running_router
 
 
 @pytest.fixture(scope="module")
@@ -59,25 +25,12 @@ def stack() -> Iterator[ExitStack]:
 
 @pytest.fixture(scope="module")
 def tls(tmp_path_factory: pytest.TempPathFactory, stack: ExitStack) -> Fleet:
-    folder = tmp_path_factory.mktemp("tls")
-    endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
-    example(folder, "zenoh-tls", endpoint)
-    script = [sys.executable, str(folder / "make_certificates.py"), str(folder), "localhost,127.0.0.1"]
-    subprocess.run([*script, "naze-1", "naze-2", "pilot"], check=True)
-    before = (folder / "pilot.pem").read_bytes()
-    subprocess.run([*script, "pilot", "guest", "stranger"], check=True)
-    assert (folder / "pilot.pem").read_bytes() == before
-    stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))
-    return Fleet(folder, endpoint)
+    return tls_fleet(tmp_path_factory.mktemp("tls"), stack)
 
 
 @pytest.fixture(scope="module")
 def passwords(tmp_path_factory: pytest.TempPathFactory, stack: ExitStack) -> Fleet:
-    folder = tmp_path_factory.mktemp("passwords")
-    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-    example(folder, "zenoh-password", endpoint)
-    stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))
-    return Fleet(folder, endpoint)
+    return password_fleet(tmp_path_factory.mktemp("passwords"), stack)
 
 
 @pytest.fixture(params=["tls", "passwords"])

@@ -1,0 +1,67 @@
+"""The examples for a fleet behind a router, copied to where a test can use them, and the router itself."""
+
+import shutil
+import socket
+import subprocess
+import sys
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import zenoh
+from programs import free_port, run_naze_bridge
+from zenoh_router import EXAMPLES, running_router
+
+_ELSEWHERE = "/etc/naze-bridge"
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """A router, and the folder with everybody's files. `endpoint` is what the examples call router.local."""
+
+    folder: Path
+    endpoint: str
+
+    def config(self, of: str, name: str) -> Path:
+        """The example `of` (vehicle or pilot) as `name` would have it."""
+        path = self.folder / f"{name}-{of}.json5"
+        text = (self.folder / f"{of}.json5").read_text()
+        path.write_text(text.replace({"vehicle": "naze-1", "pilot": "pilot"}[of], name) if of != name else text)
+        return path
+
+    def open(self, of: str, name: str) -> zenoh.Session:
+        return zenoh.open(zenoh.Config.from_file(self.config(of, name)))
+
+    def fleet_list(self, config: Path) -> subprocess.CompletedProcess[str]:
+        return run_naze_bridge("fleet", "list", "--zenoh-config", config)
+
+
+def example(folder: Path, of: str, endpoint: str) -> None:
+    """Copy an example to where it will be used; only places are changed."""
+    shutil.copytree(EXAMPLES / of, folder, dirs_exist_ok=True)
+    scheme, _, port = endpoint.partition("/")[0], None, endpoint.rpartition(":")[2]
+    for path in folder.glob("*.json5"):
+        text = path.read_text().replace(f"{_ELSEWHERE}/tls", str(folder)).replace(_ELSEWHERE, str(folder))
+        text = text.replace(f"{scheme}/router.local:7447", endpoint).replace("/0.0.0.0:7447", f"/127.0.0.1:{port}")
+        path.write_text(text)
+
+
+def tls_fleet(folder: Path, stack: ExitStack) -> Fleet:
+    """Everybody shows a certificate."""
+    endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
+    example(folder, "zenoh-tls", endpoint)
+    script = [sys.executable, str(folder / "make_certificates.py"), str(folder), "localhost,127.0.0.1"]
+    subprocess.run([*script, "naze-1", "naze-2", "pilot"], check=True)
+    before = (folder / "pilot.pem").read_bytes()
+    subprocess.run([*script, "pilot", "guest", "stranger"], check=True)
+    assert (folder / "pilot.pem").read_bytes() == before
+    stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))
+    return Fleet(folder, endpoint)
+
+
+def password_fleet(folder: Path, stack: ExitStack) -> Fleet:
+    """Everybody has a name and a password."""
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    example(folder, "zenoh-password", endpoint)
+    stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))
+    return Fleet(folder, endpoint)

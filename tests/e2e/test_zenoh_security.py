@@ -1,0 +1,136 @@
+"""The daemon in a fleet where everybody proves who it is, by the examples as they stand: what strangers may do."""
+
+import datetime
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import trustme
+from benches import Bench, Starter
+from plan import judge, plain_plan, records_of
+from programs import run_naze_bridge, until
+from secured_fleet import Fleet, password_fleet, tls_fleet
+from zenoh_bench import Reader, ask, ask_surely, body, key, write_config, zenoh_bench
+
+from protocols.mission_file import write_qgc_wpl
+from service.zenoh_link.keys import COMMANDS
+
+UPLOAD = f"{COMMANDS}/mission/upload"
+EXPIRED = {"not_before": datetime.datetime(2020, 1, 1), "not_after": datetime.datetime(2021, 1, 1)}
+MISSION = write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(12))]).encode()
+
+
+@pytest.fixture(params=[tls_fleet, password_fleet], ids=["certificates", "passwords"], scope="module")
+def fleet(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
+    with ExitStack() as stack:
+        yield request.param(tmp_path_factory.mktemp("fleet"), stack)
+
+
+def secured_bench(start: Starter, config: Path) -> Bench:
+    return zenoh_bench(start, f'config_file = "{config}"\ncommands = true')
+
+
+def test_the_pilot_commands_and_a_guest_looks(start: Starter, fleet: Fleet) -> None:
+    bench = secured_bench(start, fleet.config("vehicle", "naze-1"))
+    with fleet.open("pilot", "pilot") as pilot, fleet.open("pilot", "guest") as guest:
+        ask_surely(pilot, UPLOAD, MISSION)
+        assert bench.board.records() == records_of(judge(plain_plan(12)))
+        reader = Reader(guest, key("telemetry/*"))
+        reader.wait("telemetry/attitude")
+        assert ask_surely(guest, "state")["mission"]["count"] == 12
+        for suffix in (UPLOAD, f"{COMMANDS}/mission/clear", f"{COMMANDS}/status"):
+            refused = guest.get(key(suffix), timeout=3.0)
+            assert [body(reply.ok) for reply in refused if reply.ok] == []
+        assert len(bench.board.records()) == 12
+        guest.put(key("mavlink/in"), b"anything")
+        bench.daemon.push(plain_plan(9))
+    bench.board.assert_was_treated_well()
+
+
+def test_a_vehicle_that_may_not_publish_goes_on_flying(start: Starter, fleet: Fleet) -> None:
+    """The router denies it every key: it has another vehicle's name. The ground station notices nothing."""
+    bench = secured_bench(start, fleet.config("vehicle", "naze-2"))
+    with fleet.open("pilot", "pilot") as pilot:
+        reader = Reader(pilot)
+        until(lambda: bench.daemon.has_logged("zenoh.joined"), "the daemon in the fleet")
+        planner = bench.mission_planner()
+        planner.write(plain_plan(60))
+        assert bench.board.records() == records_of(judge(plain_plan(60)))
+        assert reader.samples == []
+        assert ask(pilot, "state") == []
+    bench.board.assert_was_treated_well()
+
+
+@pytest.mark.parametrize("fault", ["expired", "of another name", "none"])
+def test_a_vehicle_whose_certificate_does_not_hold_says_so(start: Starter, tmp_path: Path, fault: str) -> None:
+    with ExitStack() as stack:
+        folder = tmp_path / "tls"
+        folder.mkdir()
+        fleet = tls_fleet(folder, stack)
+        config = fleet.config("vehicle", "naze-1")
+        if fault == "none":
+            (folder / "naze-1.pem").unlink()
+            said = f"there is no file {folder / 'naze-1.pem'}"
+        else:
+            authority = trustme.CA() if fault == "of another name" else own_authority(folder)
+            past = {} if fault == "of another name" else EXPIRED
+            issued = authority.issue_cert("naze-1", common_name="naze-1", **past)
+            issued.private_key_pem.write_to_path(str(folder / "naze-1.key"))
+            issued.cert_chain_pems[0].write_to_path(str(folder / "naze-1.pem"))
+            said = "the router refuses our certificate"
+        bench = secured_bench(start, config)
+        alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a word about the certificate")
+        assert said in alone["why"]
+        bench.daemon.push(plain_plan(9))
+
+
+def own_authority(folder: Path) -> trustme.CA:
+    return trustme.CA.from_pem((folder / "ca.pem").read_bytes(), (folder / "ca.key").read_bytes())
+
+
+SETTINGS_THAT_END_IT = {
+    "a configuration that is not there": ('config_file = "nothing.json5"', None, "No such file"),
+    "a configuration that is none": ('config_file = "zenoh.json5"', "{mode: ", "zenoh.config_file"),
+    "an unknown field": ('config_file = "zenoh.json5"', "{moode: 'peer'}", "unknown field `moode`"),
+    "no endpoint": ('connect = ["tcp/"]', None, "zenoh.connect"),
+    "commands for everybody": ('listen = ["tcp/127.0.0.1:1"]\ncommands = true', None, "nobody who comes in at tcp/"),
+    "frames for everybody": ('connect = ["tcp/127.0.0.1:1"]\nmavlink_in = true', None, "zenoh.mavlink_in is on"),
+    "a certificate that nobody asks for": (
+        'config_file = "zenoh.json5"\ncommands = true',
+        json.dumps({"listen": {"endpoints": ["tls/127.0.0.1:1"]}}),
+        "nobody who comes in at tls/",
+    ),
+    "half a knowledge": ('connect = ["tcp/127.0.0.1:1"]\ncommands = true\ncommands_without_authentication = "yes"',
+                         None, "I know"),
+    "scouting for commanders": (
+        'config_file = "zenoh.json5"\ncommands = true',
+        json.dumps({"scouting": {"multicast": {"enabled": True}}}),
+        "multicast scouting",
+    ),
+    "a name with a wildcard": ('vehicle = "naze*"', None, "zenoh.vehicle is 'naze*'"),
+    "a name of two chunks": ('prefix = "our/fleet"', None, "zenoh.prefix is 'our/fleet'"),
+    "no name": ('vehicle = ""', None, "text in quotes (This vehicle"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SETTINGS_THAT_END_IT)
+def test_settings_that_cannot_be_used_end_the_start_with_a_sentence(tmp_path: Path, name: str) -> None:
+    table, zenoh_file, said = SETTINGS_THAT_END_IT[name]
+    if zenoh_file is not None:
+        (tmp_path / "zenoh.json5").write_text(zenoh_file)
+    config = write_config(tmp_path, table, vehicle="")
+    ended = run_naze_bridge("run", "--fc", "sim:", "--config", config, "--state-dir", tmp_path / "state")
+    assert ended.returncode == 2, ended
+    assert said in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize("of", ["zenoh-tls", "zenoh-password"])
+def test_the_examples_are_proof_enough_for_commands(tmp_path: Path, of: str) -> None:
+    """No "I know" is needed where everybody proves who it is."""
+    example = Path(__file__).parents[2] / "examples" / of / "vehicle.json5"
+    config = write_config(tmp_path, f'config_file = "{example}"\ncommands = true\nmavlink_in = true')
+    ended = run_naze_bridge("run", "--fc", "sim:", "--config", config, "--check-config")
+    assert ended.returncode == 0, ended
