@@ -9,7 +9,7 @@ import serial
 import structlog
 
 from service.connection import FcAddress
-from service.fc_device import Device, PortError, device_opener
+from service.fc_device import Device, PortError, acknowledge, device_opener
 
 #: What `on_close` is told when the port is closed because it is needed no more.
 STOPPED = "the daemon stops"
@@ -172,6 +172,8 @@ class FcPort:
             return b""
         if not data:
             self._shut("the other end hung up")
+        else:
+            acknowledge(self._device)
         return data
 
     def _shut(self, why: str) -> None:

@@ -1,0 +1,45 @@
+"""A flight controller behind TCP whose replies come byte by byte, each waiting for the acknowledgement of the last."""
+
+import asyncio
+import fcntl
+import socket
+import struct
+import termios
+
+from service.connection import TcpFc
+from service.fc_port import FcPort
+
+PATIENCE_S = 20.0
+
+
+def unacknowledged(connection: socket.socket) -> int:
+    """How many bytes the other end's kernel has not acknowledged."""
+    (count,) = struct.unpack("i", fcntl.ioctl(connection, termios.TIOCOUTQ, bytes(4)))
+    return int(count)
+
+
+async def test_what_was_read_is_acknowledged_before_the_next_byte_is_awaited() -> None:
+    loop = asyncio.get_running_loop()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setblocking(False)
+        heard: asyncio.Queue[int] = asyncio.Queue()
+        port = FcPort(
+            TcpFc("127.0.0.1", listener.getsockname()[1]),
+            lambda: None,
+            lambda data: heard.put_nowait(unacknowledged(board)),
+            lambda _: None,
+        )
+        task = loop.create_task(port.run())
+        board, _ = await asyncio.wait_for(loop.sock_accept(listener), PATIENCE_S)
+        with board:
+            left = []
+            # Linux acknowledges late only to an end that it knows to answer.
+            for _ in range(30):
+                board.send(b"$")
+                left.append(await asyncio.wait_for(heard.get(), PATIENCE_S))
+                port.write(b"?")
+                board.setblocking(True)
+                assert board.recv(1) == b"?"
+            assert left == [0] * 30
+            task.cancel()
+            await asyncio.wait([task])
