@@ -6,6 +6,7 @@
 #   make test           run all tests (ARGS="tests/storage -x" runs some)
 #   make lint           check style, format and types
 #   make bench          measure speed and memory
+#   make pictures       take the docs' pictures of the status page
 #   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
@@ -21,13 +22,24 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench soak lock message-table config-sample zenoh-schemas clean
+.PHONY: demo test lint bench pictures soak lock message-table config-sample zenoh-schemas clean
+
+# Installed if they are missing and this is root, as the compilers of firmware/ are.
+BROWSER_PACKAGES := chromium chromium-driver
+BROWSER := { command -v chromium && command -v chromedriver; } >/dev/null
+INSTALL = if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  echo "installing $(1)"; \
+	  apt-get update -q >/dev/null && DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends $(1) >/dev/null; \
+	fi
 
 demo: $(VENV)/.demo-ready
 	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
 
 test: $(VENV)/.test-ready
-	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(ARGS)
+	@$(BROWSER) || { $(call INSTALL,$(BROWSER_PACKAGES)); } || true
+	@$(BROWSER) || echo 'The status page: NOT TESTED in a browser: none here (apt-get install $(BROWSER_PACKAGES))'
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile \
+	    $$($(BROWSER) || echo --ignore=tests/web/test_web_page.py) $(ARGS)
 	$(if $(ARGS),,$(MAKE) -C firmware test)
 
 lint: $(VENV)/.test-ready
@@ -37,6 +49,10 @@ lint: $(VENV)/.test-ready
 
 bench: $(VENV)/.test-ready
 	$(BIN)/python -m benchmarks $(ARGS)
+
+# The pictures of the status page in the docs, taken by what tests it.
+pictures: $(VENV)/.test-ready
+	PYTHONPATH=.:tests/e2e:tests/web $(BIN)/python tests/web/take_pictures.py
 
 soak: $(VENV)/.test-ready
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)

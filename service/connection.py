@@ -68,7 +68,7 @@ def parse_fc(text: str) -> FcAddress:
     if text == "sim:":
         return SimulatedFc()
     if text.startswith("tcp:"):
-        host, port = _host_port(text, text.removeprefix("tcp:"), _FC_FORMS)
+        host, port = parse_host_port(text, text.removeprefix("tcp:"), _FC_FORMS)
         return TcpFc(host, port)
     path, comma, baud = text.partition(",")
     if not path.startswith("/"):
@@ -86,7 +86,7 @@ def parse_gcs(text: str) -> GcsAddress:
     kind, _, rest = text.partition(":")
     if kind not in _GCS_KINDS:
         raise AddressError(f"{text!r} is no ground station connection: {_GCS_FORMS}")
-    return GcsAddress(kind, *_host_port(text, rest, _GCS_FORMS))
+    return GcsAddress(kind, *parse_host_port(text, rest, _GCS_FORMS))
 
 
 def family_of(host: str) -> socket.AddressFamily:
@@ -94,7 +94,8 @@ def family_of(host: str) -> socket.AddressFamily:
     return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
-def _host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
+def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
+    """Read "HOST:PORT", the `rest` of `text`; AddressError says what is wrong with `text`, and which `forms` it has."""
     host, colon, port = rest.rpartition(":")
     if host.startswith("[") and host.endswith("]"):
         host = host[1:-1]

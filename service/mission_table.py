@@ -8,8 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from bridge.finding import DROPPED, Finding
-from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem
+from service.command_name import command_name
 
 _CHANGED = "yellow"
 _DROPPED = "red"
@@ -45,12 +45,6 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
             held = next(left, None)
             table.add_row(*map(_cell, before, _values(held) if held else before))
     return table
-
-
-def command_name(command: int) -> str:
-    """Return a MAV_CMD's name as Mission Planner lists it, or its number."""
-    entry = messages.enums["MAV_CMD"].get(command)
-    return str(entry.name).removeprefix("MAV_CMD_").removeprefix("NAV_") if entry else str(command)
 
 
 def _values(item: MissionItem) -> list[str]:

@@ -19,11 +19,13 @@ from service.notify import Notifier
 from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
 from service.uart_recorder import UartFileError
+from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 from storage.state_lock import StateLock
 from storage.store_error import StoreError
 
 if TYPE_CHECKING:
+    from service.web.server import WebServer
     from service.zenoh_link.node import Node
 
 
@@ -76,13 +78,18 @@ async def _main(settings: Settings, load: Callable[[], Settings], socket_path: P
     daemon = Daemon(settings)
     control = ControlServer(daemon, socket_path)
     zenoh_node = None if settings.zenoh is None else _zenoh_node(settings.zenoh, daemon)
+    page = None if settings.web is None else _web_server(settings.web, daemon)
     await control.start()
     if zenoh_node is not None:
         zenoh_node.start()
+    if page is not None:
+        await page.start()
     try:
         await run_until_signal(daemon, Notifier(), load)
     finally:
         await control.close()
+        if page is not None:
+            await page.close()
         if zenoh_node is not None:
             await zenoh_node.close()
 
@@ -91,3 +98,9 @@ def _zenoh_node(settings: ZenohSettings, daemon: Daemon) -> "Node":
     from service.zenoh_link.node import Node  # 10 MB that only its users pay for
 
     return Node(settings, daemon)
+
+
+def _web_server(settings: WebSettings, daemon: Daemon) -> "WebServer":
+    from service.web.server import WebServer  # 20 MB that only its users pay for
+
+    return WebServer(daemon, settings)

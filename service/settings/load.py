@@ -12,6 +12,7 @@ from service.settings.ports import port_conflicts
 from service.settings.problem import Problem, SettingsError
 from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 from service.settings.table import KEYS
+from service.web.settings import WebSettings
 from service.write_access import WriteAccess
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 
@@ -61,9 +62,10 @@ def load_settings(
     links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
     addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
     tlog = _tlog_limits(values, given, problems)
-    zenoh = _zenoh(values) if "zenoh" in given else None
+    zenoh = ZenohSettings(**_table("zenoh", values)) if "zenoh" in given else None
+    web = WebSettings(**_table("web", values)) if "web" in given else None
     used = Given(None, "--gcs") if gcs else given.get("gcs", Given(None, ""))
-    problems += [Problem(used.where, text) for text in port_conflicts(addresses, zenoh)]
+    problems += [Problem(used.where, text) for text in port_conflicts(addresses, zenoh, web)]
     if zenoh is not None:
         problems += _zenoh_problems(zenoh, given)
     if problems:
@@ -77,6 +79,7 @@ def load_settings(
         state_dir=values.pop("state_dir", None) or default_state_dir(),
         tlog=tlog,
         zenoh=zenoh,
+        web=web,
         **{name: values[name] for name in _AS_THEY_ARE if name in values},
     )
 
@@ -136,9 +139,9 @@ def _tlog_limits(values: dict[str, Any], given: Mapping[str, Given], problems: l
     return TlogLimits(file_mb << 20, total_mb << 20, values.get("tlog_days", default.days))
 
 
-def _zenoh(values: Mapping[str, Any]) -> ZenohSettings:
-    mine = {name.removeprefix("zenoh."): value for name, value in values.items() if name.startswith("zenoh.")}
-    return ZenohSettings(**mine)
+def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    start = f"{table}."
+    return {name.removeprefix(start): value for name, value in values.items() if name.startswith(start)}
 
 
 def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:

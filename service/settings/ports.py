@@ -6,6 +6,7 @@ from ipaddress import ip_address
 from itertools import combinations
 
 from service.connection import GcsAddress
+from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings
 
 _TCP_LINKS = ("tcp", "tls", "ws")
@@ -19,13 +20,15 @@ class _Use:
     port: int
 
 
-def port_conflicts(gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None) -> Iterator[str]:
+def port_conflicts(gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None, web: WebSettings | None) -> Iterator[str]:
     """Yield one sentence for each two of them that listen on one port."""
     uses = [
         _Use(f"gcs {address}", "TCP" if address.kind == "tcpin" else "UDP", address.host, address.port)
         for address in gcs
         if address.kind in ("udpin", "tcpin")
     ]
+    if web is not None:
+        uses.append(_Use(f"web.listen {web.listen}", "TCP", web.listen.host, web.listen.port))
     for endpoint in () if zenoh is None else zenoh.listen:
         protocol, _, rest = endpoint.partition("/")
         host, _, port = rest.partition("#")[0].partition("?")[0].rpartition(":")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bridge.fc_session import Autopilot
 from service.connection import FcAddress, GcsAddress
+from service.web.settings import WebSettings
 from service.write_access import WriteAccess
 from service.zenoh_link.settings import ZenohSettings
 
@@ -29,7 +30,7 @@ class Settings:
     """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
 
     `access`: who may write over a link, by its address as text; over others everyone may. `zenoh` None: it is not
-    joined. `log_level`: debug, info, warning or error.
+    joined. `web` None: no status page is served. `log_level`: debug, info, warning or error.
     """
 
     fc: FcAddress
@@ -42,4 +43,5 @@ class Settings:
     autopilot: Autopilot = Autopilot.AUTO
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
     zenoh: ZenohSettings | None = None
+    web: WebSettings | None = None
     log_level: str = DEFAULT_LOG_LEVEL

@@ -12,6 +12,7 @@ from service.settings.settings import (
     DEFAULT_TAKEOFF_MAX_M,
     TlogLimits,
 )
+from service.web.settings import DEFAULT_LISTEN, parse_listen
 from service.write_access import parse_link
 from service.zenoh_link.settings import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, check_name
 
@@ -141,7 +142,24 @@ KEYS = (
         "Whether raw MAVLink frames are taken from zenoh, under the same condition as commands.",
         "false",
     ),
+    Key(
+        "web.listen",
+        Text('"HOST:PORT"', parse_listen),
+        "Where browsers reach the status page: 0.0.0.0:8080 for everybody on the network, 127.0.0.1:8080 for this "
+        "machine alone.",
+        f'"{DEFAULT_LISTEN}"',
+    ),
+    Key(
+        "web.token_file",
+        FileName(beside=True),
+        "File with the token that a restore from the page needs, made if it is not there. By default web-token in "
+        "state_dir.",
+        example='"/etc/naze-bridge/web-token"',
+    ),
 )
 
 #: Tables that switch a part on by being there.
-TABLES = {"zenoh": "Eclipse zenoh: telemetry and missions for subscribers anywhere, off without this table."}
+TABLES = {
+    "zenoh": "Eclipse zenoh: telemetry and missions for subscribers anywhere, off without this table.",
+    "web": "The status page, off without this table.",
+}

@@ -1,0 +1,9 @@
+"""What a mission command is called where a person reads it."""
+
+from protocols.mavlink.dialect import messages
+
+
+def command_name(command: int) -> str:
+    """Return a MAV_CMD's name as Mission Planner lists it, or its number."""
+    entry = messages.enums["MAV_CMD"].get(command)
+    return str(entry.name).removeprefix("MAV_CMD_").removeprefix("NAV_") if entry else str(command)

@@ -1,0 +1,1 @@
+"""The status page: what a browser on the Pi's Wi-Fi sees of the daemon. Imported only if it is configured."""

@@ -1,0 +1,142 @@
+"""What the page asks for: JSON over GET; and the one thing that it does, a restore.
+
+GET  /api/state                          how everything is now; asked once a second by an open page
+GET  /api/held                           the list that the flight controller holds
+GET  /api/missions                       the missions that came in lately, newest first
+GET  /api/missions/N                     one of them, as sent beside as stored
+GET  /api/missions/N/difference/M        two of them as sent
+POST /api/missions/N/restore             write it again; needs the token; its progress is in the state
+GET  /metrics                            for Prometheus
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import asdict
+from http import HTTPStatus
+
+from aiohttp import web
+
+from protocols.mission_item import MissionItem
+from service.control import MOST, ControlError, MissionJobs
+from service.daemon import Daemon
+from service.metrics import CONTENT_TYPE, Metrics
+from service.mission_data import Json, mission_items, to_json
+from service.version import version
+from service.web.access import Refused, check_token
+from service.web.comparison import difference, shown, stored_mission
+from service.web.restoring import Restoring
+from service.web.token import Token
+from storage.store_error import StoreError
+
+_LISTED = 50
+
+
+class Api:
+    """Answers with what MissionJobs and the bridge's report tell. `token` None: nothing can be changed."""
+
+    def __init__(self, daemon: Daemon, token: Token | None) -> None:
+        self._daemon = daemon
+        self._jobs = MissionJobs(daemon)
+        self._token = token
+        self._metrics = Metrics(daemon)
+        self.restoring = Restoring(self._jobs)
+
+    def routes(self) -> list[web.RouteDef]:
+        """Return the table above."""
+        return [
+            web.get("/api/state", self._state),
+            web.get("/api/held", self._held),
+            web.get("/api/missions", self._missions),
+            web.get("/api/missions/{number}", self._mission),
+            web.get("/api/missions/{number}/difference/{other}", self._difference),
+            web.post("/api/missions/{number}/restore", self._restore),
+            web.get("/metrics", self._render_metrics),
+        ]
+
+    async def _state(self, _request: web.Request) -> web.Response:
+        daemon = self._daemon
+        try:
+            listed = (await self._jobs.list_missions(1))["missions"]
+            newest, store = {key: listed[0][key] for key in ("number", "outcome")} if listed else None, ""
+        except StoreError as error:
+            newest, store = None, str(error)
+        return _json(
+            {
+                "version": version(),
+                **asdict(daemon.bridge.report.whole()),
+                "traffic": {name: asdict(traffic) for name, traffic in daemon.traffic.items()},
+                "port": {"address": str(daemon.settings.fc), "trouble": daemon.fc_trouble},
+                "refused": [f"{count} x {why} ({link})" for (link, why), count in daemon.bridge.guard.refused.items()],
+                "recording": daemon.recording,
+                "newest_mission": newest,
+                "store_trouble": store,
+                "restore": self.restoring.state,
+            }
+        )
+
+    async def _held(self, _request: web.Request) -> web.Response:
+        """Tell what was last read: a stranger who asks keeps the flight controller's line free."""
+        held = self._daemon.bridge.desk.held
+        if held is None:
+            return _json({"count": None, "checksum": None, "items": []})
+        return _json(
+            {
+                "count": held.identity.count,
+                "checksum": f"{held.identity.checksum:08x}",
+                "items": [shown(item) for item in held.items],
+            }
+        )
+
+    async def _missions(self, _request: web.Request) -> web.Response:
+        return _json(await _told(self._jobs.list_missions(_LISTED)))
+
+    async def _mission(self, request: web.Request) -> web.Response:
+        mission = await self._find(request, "number")
+        return await _made(lambda: stored_mission(mission))
+
+    async def _difference(self, request: web.Request) -> web.Response:
+        first, second = await self._find(request, "number"), await self._find(request, "other")
+        return await _made(lambda: {"rows": difference(_sent(first), _sent(second))})
+
+    async def _restore(self, request: web.Request) -> web.Response:
+        check_token(request, self._token)
+        await self.restoring.begin(_number(request, "number"))
+        return _json({"begun": True}, HTTPStatus.ACCEPTED)
+
+    async def _render_metrics(self, _request: web.Request) -> web.Response:
+        return web.Response(body=self._metrics.render(), headers={"Content-Type": CONTENT_TYPE})
+
+    async def _find(self, request: web.Request, name: str) -> Json:
+        """Return the stored mission whose number the path has under this name."""
+        return await _told(self._jobs.show_mission(_number(request, name)))
+
+
+def _number(request: web.Request, name: str) -> int:
+    text = request.match_info[name]
+    if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
+        raise Refused(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is no mission's number.")
+    return int(text)
+
+
+def _sent(mission: Json) -> list[MissionItem]:
+    return mission_items(mission["received"]["items"])
+
+
+async def _told(asked: Awaitable[Json]) -> Json:
+    """Wait for the store; what it cannot tell becomes a refusal."""
+    try:
+        return await asked
+    except ControlError as error:
+        raise Refused(HTTPStatus.NOT_FOUND, str(error)) from error
+    except StoreError as error:
+        raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+
+
+async def _made(make: Callable[[], Json]) -> web.Response:
+    """Make an answer of hundreds of items beside the loop that serves the links."""
+    text = await asyncio.to_thread(lambda: to_json(make()))
+    return web.Response(text=text, content_type="application/json")
+
+
+def _json(value: Json, status: HTTPStatus = HTTPStatus.OK) -> web.Response:
+    return web.Response(text=to_json(value), status=status, content_type="application/json")

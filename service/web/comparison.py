@@ -1,0 +1,99 @@
+"""Two mission lists side by side: as sent and as stored, or two that were sent."""
+
+import difflib
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
+
+from bridge.finding import DROPPED, REJECTED, Finding
+from protocols.mission_item import MissionItem
+from service.command_name import command_name
+from service.mission_data import Json, mission_items
+
+#: No flight controller holds more; a longer list was refused, and its end tells nothing new.
+MAX_ROWS = 500
+
+_VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
+
+
+def stored_mission(mission: Json) -> Json:
+    """Return a mission of the store (MissionJobs.show_mission) with its rows, as sent beside as stored."""
+    received = mission["received"]
+    findings = [Finding(**finding) for finding in received["findings"]]
+    sent, stored = mission_items(received["items"]), mission_items(received["stored_items"])
+    return {
+        "number": mission["number"],
+        "received_at": received["received_at"],
+        "source": received["source"],
+        "verdict": received["verdict"],
+        "ack": received["ack"],
+        "outcome": mission["outcome"],
+        "detail": mission["detail"],
+        "checksum": received["checksum"],
+        "findings": [finding.full_text() for finding in findings[:MAX_ROWS]],
+        "rows": sent_and_stored(sent[:MAX_ROWS], stored, findings),
+        "rows_left_out": max(len(sent) - MAX_ROWS, 0),
+        "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],
+    }
+
+
+def sent_and_stored(
+    sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]
+) -> list[Json]:
+    """Return one row per item sent. `stored`: empty for a list that was rejected or cleared."""
+    dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}
+    rejected = {finding.seq: finding.why for finding in findings if finding.becomes == REJECTED}
+    reasons = {(finding.seq, finding.field): finding.why for finding in findings}
+    left = iter(stored)
+    rows = []
+    for seq, item in enumerate(sent):  # findings go by the place in the list, whatever number an item says it has
+        if seq in dropped:
+            rows.append(_row("dropped", item, None, {"command": dropped[seq]}))
+        elif seq in rejected:
+            rows.append(_row("rejected", item, None, {"command": rejected[seq]}))
+        elif (held := next(left, None)) is not None:
+            changes = {name: why for name in _VALUES if (why := reasons.get((seq, name)))}
+            rows.append(_row("changed" if changes else "same", item, held, changes))
+        else:
+            rows.append(_row("same", item, None, {}))
+    return rows
+
+
+def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[Json]:
+    """Return one row per item of either list; items that are new or gone stand alone."""
+    rows = []
+    for before, after in _pairs(first[:MAX_ROWS], second[:MAX_ROWS]):
+        if before is None or after is None:
+            rows.append(_row("added" if before is None else "removed", before, after, {}))
+        else:
+            was, becomes = _key(before), _key(after)
+            changes = {name: "" for name, old, new in zip(_VALUES, was, becomes, strict=True) if old != new}
+            rows.append(_row("changed" if changes else "same", before, after, changes))
+    return rows
+
+
+def shown(item: MissionItem) -> Json:
+    """Return an item for the page: numbers, None for what is not given, and the command's name."""
+    return {"seq": item.seq, "name": command_name(item.command), **dict(zip(_VALUES, _key(item), strict=True))}
+
+
+def _pairs(
+    first: Sequence[MissionItem], second: Sequence[MissionItem]
+) -> Iterator[tuple[MissionItem | None, MissionItem | None]]:
+    matcher = difflib.SequenceMatcher(None, list(map(_key, first)), list(map(_key, second)), autojunk=False)
+    for _, at, to, other_at, other_to in matcher.get_opcodes():
+        yield from zip_longest(first[at:to], second[other_at:other_to])
+
+
+def _key(item: MissionItem) -> tuple[float | None, ...]:
+    """Return an item's values but for its number, comparable: what is not given is equal to itself."""
+    values = (getattr(item, name) for name in _VALUES)
+    return tuple(None if value is None or value != value else value for value in values)
+
+
+def _row(kind: str, left: MissionItem | None, right: MissionItem | None, changes: dict[str, str]) -> Json:
+    return {
+        "kind": kind,
+        "left": None if left is None else shown(left),
+        "right": None if right is None else shown(right),
+        "changes": changes,
+    }

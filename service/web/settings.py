@@ -1,0 +1,34 @@
+"""Where the status page is served: the `[web]` table of the configuration file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from service.connection import parse_host_port
+
+DEFAULT_LISTEN = "127.0.0.1:8080"
+_FORMS = 'write "0.0.0.0:8080" for everybody on the network, "127.0.0.1:8080" for this machine alone'
+
+
+@dataclass(frozen=True, slots=True)
+class ListenAddress:
+    """Where browsers connect. Only this machine's own can reach 127.0.0.1."""
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class WebSettings:
+    """`token_file` None: `web-token` in the state directory."""
+
+    listen: ListenAddress = ListenAddress()
+    token_file: Path | None = None
+
+
+def parse_listen(text: str) -> ListenAddress:
+    """Read "HOST:PORT"; AddressError says what is wrong with it."""
+    return ListenAddress(*parse_host_port(f"web.listen {text}", text, _FORMS))

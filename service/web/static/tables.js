@@ -1,0 +1,56 @@
+// Mission lists as tables: one list, as sent beside as stored, or two lists compared.
+import { make } from "./dom.js";
+
+const NAMES = { p1: "p1", p2: "p2", p3: "p3", p4: "p4", alt_m: "height", frame: "frame", lat_e7: "lat", lon_e7: "lon" };
+const KINDS = {
+  changed: "changed", dropped: "dropped: not stored", rejected: "this is why the list was refused",
+  added: "new", removed: "gone",
+};
+
+export function listTable(items) {
+  const rows = items.map((item) => make("tr", {}, number(item), make("td", {}, ...values(item, {}))));
+  return table(["No.", "Command"], rows);
+}
+
+// rows: of /api/missions/N or of a difference; titles: what stands left and right.
+export function pairTable(rows, titles) {
+  const whole = table(["No.", ...titles], rows.map((row) => pairRow(row, titles)));
+  whole.className = "pairs";
+  return whole;
+}
+
+export function pairKey(kinds) {
+  return make("p", {}, ...kinds.flatMap((kind) => [make("span", { class: `key ${kind}` }, KINDS[kind]), " "]));
+}
+
+function pairRow(row, titles) {
+  const reasons = Object.entries(row.changes).filter(([, why]) => why)
+    .map(([name, why]) => make("span", { class: "why" }, name === "command" ? why : `${NAMES[name]}: ${why}`));
+  const left = make("td", { "data-title": titles[0] }, ...(row.left ? values(row.left, row.changes) : ["–"]));
+  const right = make("td", { "data-title": titles[1] }, ...(row.right ? values(row.right, row.changes) : [KINDS[row.kind] && row.left ? KINDS[row.kind] : "–"]), ...reasons);
+  return make("tr", { class: row.kind }, number(row.left ?? row.right, row.right), left, right);
+}
+
+function number(item, becomes = item) {
+  const text = becomes && becomes.seq !== item.seq ? `${item.seq} → ${becomes.seq}` : String(item.seq);
+  return make("td", { class: "number" }, text);
+}
+
+function values(item, changes) {
+  const shown = Object.keys(NAMES).filter((name) => name in changes || (name !== "frame" && item[name]));
+  const command = make("span", { class: `value${"command" in changes ? " is-changed" : ""}` }, make("b", {}, item.name));
+  return [command, ...shown.flatMap((name) => [" ", make(
+    "span", { class: `value${name in changes ? " is-changed" : ""}` }, `${NAMES[name]} ${text(name, item[name])}`)])];
+}
+
+function text(name, value) {
+  if (value === null) return "not given";
+  if (name === "lat_e7" || name === "lon_e7") return (value / 1e7).toFixed(7);
+  if (typeof value === "string") return value;
+  return `${Math.round(value * 1000) / 1000}${name === "alt_m" ? " m" : ""}`;
+}
+
+function table(titles, rows) {
+  const head = make("tr", {}, ...titles.map((title) => make("th", { scope: "col" }, title)));
+  return make("table", {}, make("thead", {}, head), make("tbody", {}, ...rows));
+}

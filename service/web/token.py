@@ -1,0 +1,60 @@
+"""The token that a browser must show for anything that is not reading."""
+
+import hmac
+import secrets
+import stat
+from pathlib import Path
+
+from service.bounded_file import read_bounded
+from storage.atomic_file import replace_file
+
+DEFAULT_NAME = "web-token"
+#: Letters and digits that a phone's keyboard has and nobody confuses: 16 of them are 78 bits.
+_ALPHABET = "23456789abcdefghjkmnpqrstuvwxyz"
+_LENGTH = 16
+_LEAST_LENGTH = 12
+_MAX_FILE = 4096
+
+
+class TokenError(Exception):
+    """There is no token that could be shown; one sentence."""
+
+
+class Token:
+    """The secret in a file, made there if there is none."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._secret = _read(path) or _make(path)
+
+    def is_shown_by(self, authorization: str | None) -> bool:
+        """Tell whether an Authorization header holds it ("Bearer TOKEN")."""
+        kind, _, shown = (authorization or "").partition(" ")
+        is_right = hmac.compare_digest(shown.strip().encode(errors="replace"), self._secret)
+        return kind.lower() == "bearer" and is_right
+
+
+def _read(path: Path) -> bytes | None:
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise TokenError(f"{path} is no file: name another token_file")
+        if status.st_mode & 0o007:
+            raise TokenError(f"everybody can read the token in {path}: chmod 600 {path}")
+        secret = read_bounded(path, _MAX_FILE).strip()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise TokenError(f"the token in {path} cannot be read: {error.strerror}") from error
+    if len(secret) < _LEAST_LENGTH:
+        raise TokenError(f"the token in {path} is shorter than {_LEAST_LENGTH} letters: delete the file for a new one")
+    return secret
+
+
+def _make(path: Path) -> bytes:
+    secret = "".join(secrets.choice(_ALPHABET) for _ in range(_LENGTH)).encode()
+    try:
+        replace_file(path, secret + b"\n")
+    except OSError as error:
+        raise TokenError(f"no token can be written to {path}: {error.strerror}") from error
+    return secret

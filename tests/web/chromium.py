@@ -1,0 +1,111 @@
+"""Debian's Chromium without a window, as a pilot's phone or laptop."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from programs import PATIENCE, until
+from selenium.webdriver import Chrome, ChromeOptions, ChromeService
+from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.webelement import WebElement
+
+PHONE = (360, 740)
+LAPTOP = (1280, 900)
+
+
+class Browser:
+    """One tab that looks at the page of a daemon."""
+
+    def __init__(self, driver: Chrome, port: int) -> None:
+        self.driver = driver
+        self.url = f"http://127.0.0.1:{port}/"
+
+    def open(self) -> None:
+        """Load the page, and wait until it has shown the daemon's state."""
+        self.driver.get(self.url)
+        self.wait_for_looks(1)
+
+    def wait_for_looks(self, more: int) -> None:
+        """Wait until the page has asked for the state so many times more."""
+        wanted = self._looks() + more
+        until(lambda: self._looks() >= wanted, "another look of the page at the daemon")
+
+    def _looks(self) -> int:
+        return int(self.run("return document.body ? document.body.dataset.looks || 0 : 0"))
+
+    def run(self, script: str, *arguments: object) -> Any:
+        return self.driver.execute_script(script, *arguments)
+
+    def find(self, selector: str) -> WebElement:
+        return self.driver.find_element(By.CSS_SELECTOR, selector)
+
+    def all(self, selector: str) -> list[WebElement]:
+        return self.driver.find_elements(By.CSS_SELECTOR, selector)
+
+    def text(self, selector: str) -> str:
+        """What a reader sees there at this moment, even if the page is just being drawn anew."""
+        script = "const e = document.querySelector(arguments[0]); return e?.innerText ?? e?.textContent ?? ''"
+        return str(self.run(script, selector))
+
+    def wait_text(self, selector: str, text: str) -> None:
+        until(lambda: text in self.text(selector), f"{text!r} in {selector}")
+
+    def press(self, selector: str) -> None:
+        """Click it wherever it is."""
+        self.run("document.querySelector(arguments[0]).scrollIntoView({block: 'center'})", selector)
+        self.find(selector).click()
+
+    def value(self, name: str) -> str:
+        """The value that the overview shows under a name."""
+        script = "return [...document.querySelectorAll('dt')].find(e => e.innerText === arguments[0])"
+        return str(self.run(f"{script}?.nextElementSibling.innerText ?? ''", name))
+
+    def complaints(self) -> list[str]:
+        """Errors and refusals (Content-Security-Policy) that the browser has noted since the last time."""
+        return [entry["message"] for entry in self._log("browser") if entry["level"] in ("SEVERE", "WARNING")]
+
+    def traffic(self) -> tuple[set[str], int]:
+        """The addresses that were asked for since the last time, and how many bytes came over the wire."""
+        addresses, size = set(), 0
+        for entry in self._log("performance"):
+            event = json.loads(entry["message"])["message"]
+            if event["method"] == "Network.requestWillBeSent":
+                addresses.add(event["params"]["request"]["url"])
+            if event["method"] == "Network.loadingFinished":
+                size += int(event["params"]["encodedDataLength"])
+        return addresses, size
+
+    def _log(self, kind: str) -> list[dict[str, Any]]:
+        entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
+        return entries
+
+    def picture(self, path: Path) -> None:
+        """Save what is seen."""
+        assert self.driver.save_screenshot(str(path))
+
+
+@contextmanager
+def browser(port: int, size: tuple[int, int] = LAPTOP, *, dark: bool = False) -> Iterator[Browser]:
+    """A browser with a window of `size` pixels: Debian's packages chromium and chromium-driver."""
+    programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
+    assert all(programs.values()), "install Debian's packages: apt-get install chromium chromium-driver"
+    options = ChromeOptions()
+    options.binary_location = str(programs["chromium"])
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--hide-scrollbars", "--disable-gpu"):
+        options.add_argument(argument)
+    if dark:
+        options.add_argument("--blink-settings=preferredColorScheme=0")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = Chrome(options, ChromeService(str(programs["chromedriver"])))
+    try:
+        driver.set_page_load_timeout(PATIENCE * 2)
+        width, height = size
+        # The window's own size has a least width; a phone's is narrower.
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        yield Browser(driver, port)
+    finally:
+        driver.quit()

@@ -1,0 +1,33 @@
+"""Takes the pictures in docs/pictures: `make pictures`."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from chromium import LAPTOP, PHONE, browser
+from plan import plain_plan
+from web_bench import web_bench
+
+PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
+
+
+def take_pictures(folder: Path) -> None:
+    """Save the page as a laptop and as a phone shows it, light and dark."""
+    with tempfile.TemporaryDirectory() as name, web_bench(Path(name)) as bench:
+        bench.daemon.push(plain_plan(9))
+        bench.push_example()
+        with browser(bench.port, LAPTOP) as laptop:
+            laptop.open()
+            laptop.wait_for_looks(2)
+            laptop.picture(folder / "status-page.png")
+            laptop.run("document.getElementById('upload-title').scrollIntoView()")
+            laptop.picture(folder / "sent-and-stored.png")
+        with browser(bench.port, PHONE, dark=True) as phone:
+            phone.open()
+            phone.wait_for_looks(2)
+            phone.run("document.getElementById('map-title').scrollIntoView()")
+            phone.picture(folder / "on-a-phone.png")
+
+
+if __name__ == "__main__":
+    take_pictures(Path(sys.argv[1]) if len(sys.argv) > 1 else PICTURES)

@@ -1,0 +1,84 @@
+"""Lists side by side: nothing is left out, and nothing differs without a reason."""
+
+import math
+from dataclasses import asdict, replace
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridge.harakiri_check import HarakiriRules
+from bridge.mission_check import check_list
+from bridge.verdict import Result
+from protocols.mission_item import MissionItem
+from service.mission_data import to_json
+from service.web.comparison import MAX_ROWS, difference, sent_and_stored, stored_mission
+
+RULES = HarakiriRules(capacity=146, wp_radius_cm=200)
+numbers = st.one_of(st.sampled_from([0.0, 1.0, 0.5, 2.0, 15.0, 300.0, math.nan, math.inf]), st.floats(width=32))
+places = st.sampled_from([453838000, 84733000, 0, None])
+items = st.builds(
+    MissionItem,
+    seq=st.integers(0, 65535),
+    command=st.sampled_from([16, 16, 16, 18, 19, 20, 80, 197, 178]),
+    frame=st.sampled_from([0, 3, 6, 10]),
+    p1=numbers,
+    p2=numbers,
+    p3=numbers,
+    p4=numbers,
+    lat_e7=places,
+    lon_e7=places,
+    alt_m=st.one_of(st.sampled_from([0.0, 12.0, 18.5]), numbers),
+)
+HOME = MissionItem(0, 16, 0, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 131.0)
+lists = st.lists(items, min_size=1, max_size=20).map(lambda each: [HOME, *each])
+#: A frame other than relative is named as a change only where the height counts.
+COMPARED = ("p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
+
+
+@settings(deadline=None)
+@given(lists)
+def test_what_differs_has_a_reason(sent: list[MissionItem]) -> None:
+    verdict = check_list(sent, RULES)
+    rows = sent_and_stored(sent, verdict.items, verdict.findings)
+    assert [row["left"]["command"] for row in rows] == [item.command for item in sent]
+    if verdict.result is not Result.ACCEPTED:
+        assert all(row["right"] is None for row in rows)
+        return
+    stored = [row["right"] for row in rows if row["right"]]
+    assert [item["seq"] for item in stored] == list(range(len(verdict.items)))
+    for row in rows:
+        assert (row["right"] is None) == (row["kind"] == "dropped")
+        assert bool(row["changes"]) == (row["kind"] != "same")
+        assert all(row["changes"].values())
+        for name in COMPARED if row["right"] else ():
+            same = (row["left"][name] or 0) == (row["right"][name] or 0)
+            assert same == (name not in row["changes"]), (name, row)
+
+
+@settings(deadline=None)
+@given(lists, lists)
+def test_a_difference_holds_both_lists_in_their_order(first: list[MissionItem], second: list[MissionItem]) -> None:
+    rows = difference(first, second)
+    for side, whole in (("left", first), ("right", second)):
+        assert [row[side]["command"] for row in rows if row[side]] == [item.command for item in whole]
+    to_json(rows)
+    assert {row["kind"] for row in difference(first, first)} == {"same"}
+
+
+def test_an_item_more_is_one_row_more() -> None:
+    route = [replace(HOME, seq=seq, lat_e7=453838000 + seq) for seq in range(9)]
+    kinds = [row["kind"] for row in difference(route, route[:4] + route[5:])]
+    assert kinds == ["same"] * 4 + ["removed"] + ["same"] * 4
+    changed = [*route[:8], replace(route[8], p2=7.0)]
+    assert difference(route, changed)[8]["changes"] == {"p2": ""}
+
+
+def test_a_list_of_thousands_is_cut_and_that_is_said() -> None:
+    """`push` takes a megabyte of items; they are refused and kept."""
+    long = [asdict(replace(HOME, seq=seq)) for seq in range(5000)]
+    received = {
+        "received_at": 0.0, "source": "", "verdict": "REJECTED", "ack": "", "checksum": "",
+        "items": long, "stored_items": [], "findings": [],
+    }  # fmt: skip
+    shown = stored_mission({"number": 1, "received": received, "outcome": "REJECTED", "detail": ""})
+    assert (len(shown["rows"]), shown["rows_left_out"]) == (MAX_ROWS, 5000 - MAX_ROWS)

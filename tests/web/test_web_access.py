@@ -1,0 +1,226 @@
+"""The status page and strangers: who may read, who may change something, and what a bad request comes to."""
+
+import socket
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from programs import PATIENCE, until
+from web_bench import WebBench, web_daemon
+
+pytest_plugins = ("web_fixtures",)
+
+RESTORE = "/api/missions/1/restore"
+
+
+def test_reading_needs_no_token(lasting_web: WebBench) -> None:
+    page = lasting_web.ask("/")
+    assert (page.status, page.headers["Content-Type"]) == (200, "text/html; charset=utf-8")
+    assert lasting_web.ask("/api/missions").data["missions"][0]["source"] == "push of naze-field.waypoints"
+
+
+def test_every_answer_tells_the_browser_what_it_must_not_do(lasting_web: WebBench) -> None:
+    for path in ("/", "/page.js", "/api/state", "/api/missions/99", "/nothing"):
+        headers = lasting_web.ask(path).headers
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Cache-Control"] in ("no-store", "no-cache")
+        assert not [name for name in headers if name.startswith("Access-Control")]
+        assert "Set-Cookie" not in headers
+        assert "Server" not in headers
+
+
+def test_a_file_that_the_browser_has_is_not_sent_again(lasting_web: WebBench) -> None:
+    first = lasting_web.ask("/style.css")
+    again = lasting_web.ask("/style.css", **{"If-None-Match": first.headers["ETag"]})
+    assert (again.status, again.body) == (304, b"")
+    assert lasting_web.ask("/style.css", **{"If-None-Match": '"other"'}).body == first.body
+
+
+STRANGERS = {
+    "no token": {},
+    "a wrong one": {"Authorization": "Bearer 2222222222222222"},
+    "an empty one": {"Authorization": "Bearer "},
+    "half of it": {"Authorization": "Bearer {half}"},
+    "in a cookie": {"Cookie": "token={token}; Authorization=Bearer {token}"},
+    "as a password": {"Authorization": "Basic {token}"},
+    "in no header's place": {"X-Token": "{token}"},
+    "letters that are none": {"Authorization": "Bearer \xff\xfe"},
+}
+
+
+@pytest.mark.parametrize("name", STRANGERS)
+def test_a_stranger_restores_nothing(lasting_web: WebBench, name: str) -> None:
+    before = lasting_web.daemon.missions()
+    token = lasting_web.token
+    headers = {key: value.format(token=token, half=token[:8]) for key, value in STRANGERS[name].items()}
+    answer = lasting_web.ask(f"{RESTORE}?token={token}", "POST", **headers)
+    assert answer.status == 403
+    assert answer.data == {
+        "error": f"This needs the token that stands in {lasting_web.daemon.state_dir}/web-token on the Pi."
+    }
+    assert lasting_web.state()["restore"] is None
+    assert lasting_web.daemon.missions() == before
+    assert token not in lasting_web.daemon.printed
+
+
+def test_a_link_alone_restores_nothing(lasting_web: WebBench) -> None:
+    answer = lasting_web.ask(RESTORE, Authorization=f"Bearer {lasting_web.token}")
+    assert (answer.status, answer.headers["Allow"]) == (405, "POST")
+    assert lasting_web.ask(RESTORE, "OPTIONS", Origin="http://evil.example").status == 405
+    assert lasting_web.state()["restore"] is None
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "[::1].evil.example", "local.evil.example."]
+)
+def test_a_name_that_could_be_bought_is_not_ours(lasting_web: WebBench, host: str) -> None:
+    """DNS rebinding: another site's name is turned to our address, and its page reads ours as its own."""
+    answer = lasting_web.ask("/api/state", Host=host)
+    assert answer.status == 421
+    assert "by the Pi's address" in answer.data["error"]
+
+
+@pytest.mark.parametrize(
+    "host", ["10.42.0.1:8080", "[fe80::1]:8080", "localhost", "naze", "naze.local:8080", "Naze.LOCAL", "naze.lan"]
+)
+def test_a_local_name_is_ours(lasting_web: WebBench, host: str) -> None:
+    assert lasting_web.ask("/api/state", Host=host).status == 200
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/nothing",
+        "/../settings.py",
+        "/%2e%2e/settings.py",
+        "/static/../../settings.py",
+        "/web-token",
+        "/api/missions/0",
+        "/api/missions/99",
+        "/api/missions/-1",
+        "/api/missions/1.5",
+        "/api/missions/%00",
+        "/api/missions/" + "9" * 300,
+        "/api/missions/%D9%A2",  # a digit, but not of ours
+        "/api/missions/1/difference/99",
+        "/api/missions/1/difference/x",
+    ],
+)
+def test_what_is_not_there(lasting_web: WebBench, path: str) -> None:
+    answer = lasting_web.ask(path)
+    assert answer.status == 404
+    assert 0 < len(answer.data["error"]) < 200
+
+
+def raw(bench: WebBench, *parts: bytes) -> bytes:
+    """Send bytes as they are; return all that is answered until the end."""
+    with bench.connect() as connection:
+        answer = b""
+        try:
+            for part in parts:
+                connection.sendall(part)
+            connection.shutdown(socket.SHUT_WR)
+            while data := connection.recv(65536):
+                answer += data
+        except OSError:
+            pass  # hung up on, in the middle of what nobody reads
+        return answer
+
+
+BAD_REQUESTS = {
+    "noise": [bytes(range(256)) * 8],
+    "a TLS hello": [b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(500)],
+    "a line without end": [b"GET /" + b"a" * (1 << 20)],
+    "a header without end": [b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * (1 << 20)],
+    "headers without end": [b"GET / HTTP/1.1\r\nHost: localhost\r\n" + b"X: a\r\n" * 100_000],
+    "two lengths": [
+        b"POST /api/missions/1/restore HTTP/1.1\r\nHost: a\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nxx"
+    ],
+    "a length that is none": [b"POST /api/missions/1/restore HTTP/1.1\r\nHost: a\r\nContent-Length: -1\r\n\r\n"],
+    "no host": [b"GET / HTTP/1.0\r\n\r\n"],
+    "half a request": [b"GET /api/state HTTP/1.1\r\nHost: loc"],
+    "many at once": [b"GET /api/missions/1 HTTP/1.1\r\nHost: localhost\r\n\r\n" * 1000],
+    "an upgrade": [b"GET /api/state HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\r\n"],
+}
+
+
+@pytest.mark.parametrize("name", BAD_REQUESTS)
+def test_bad_bytes_end_their_connection_and_nothing_else(lasting_web: WebBench, name: str) -> None:
+    answer = raw(lasting_web, *BAD_REQUESTS[name])
+    assert answer.count(b"HTTP/1.") <= 1  # a connection carries one request
+    assert lasting_web.ask("/api/state").status == 200
+    assert "Traceback" not in lasting_web.daemon.printed
+
+
+@pytest.mark.parametrize("head", [b"Content-Length: 1000000000000", b"Transfer-Encoding: chunked"])
+def test_a_huge_body_is_refused_unread(lasting_web: WebBench, head: bytes) -> None:
+    before = resident_kb(lasting_web.daemon.process.pid)
+    chunk = b"100000\r\n" + bytes(1 << 20) + b"\r\n"
+    start = b"POST %b HTTP/1.1\r\nHost: a\r\nAuthorization: Bearer %b\r\n%b\r\n\r\n"
+    answer = raw(lasting_web, start % (RESTORE.encode(), lasting_web.token.encode(), head), *[chunk] * 64)
+    assert answer.startswith((b"HTTP/1.1 413", b""))
+    assert lasting_web.state()["restore"] is None
+    assert resident_kb(lasting_web.daemon.process.pid) - before < 8 << 10
+
+
+def resident_kb(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/status").read_text().partition("VmRSS:")[2].split()[0])
+
+
+def test_one_address_does_not_lock_out_another(web: WebBench) -> None:
+    """Dozens of connections that say nothing; then the pilot comes, from elsewhere."""
+    silent = [socket.create_connection(("127.0.0.1", web.port), PATIENCE) for _ in range(60)]
+    try:
+        with socket.create_connection(("127.0.0.1", web.port), PATIENCE, ("127.0.0.2", 0)) as pilot:
+            pilot.sendall(b"GET /api/state HTTP/1.1\r\nHost: 10.42.0.1\r\n\r\n")
+            assert pilot.recv(100).startswith(b"HTTP/1.1 200")
+    finally:
+        for connection in silent:
+            connection.close()
+    assert web.ask("/api/state").status == 200
+
+
+def test_without_the_setting_there_is_no_page(start: Starter) -> None:
+    daemon = start.daemon("sim:")
+    daemon.wait()
+    assert "aiohttp" not in Path(f"/proc/{daemon.process.pid}/maps").read_text()
+    assert daemon.has_logged("web.listening") is None
+
+
+def test_a_page_that_cannot_be_served_holds_up_nothing(start: Starter) -> None:
+    """An access point's address that comes up late, or a port that somebody has: the bridge is there all the same."""
+    with socket.socket() as owner:
+        owner.bind(("127.0.0.1", 0))
+        owner.listen()
+        port = owner.getsockname()[1]
+        config = start.directory / "late.toml"
+        config.write_text(f'web = {{listen = "127.0.0.1:{port}"}}\n')
+        daemon = start.daemon("sim:", options=("--config", str(config)))
+        daemon.wait()
+        event = until(lambda: daemon.has_logged("web.unavailable"), "a word about the page")
+        assert event["address"] == f"127.0.0.1:{port}"
+    until(lambda: daemon.has_logged("web.listening"), "the page")
+    assert daemon.end() == 0
+
+
+def test_without_a_token_the_page_can_be_read_and_nothing_more(start: Starter) -> None:
+    token_file = start.directory / "token"
+    token_file.write_text("short")
+    token_file.chmod(0o600)
+    web = web_daemon(start, web='token_file = "token"')
+    event = until(lambda: web.daemon.has_logged("web.no_token"), "a word about the token")
+    assert event["why"].startswith(f"the token in {token_file} is shorter than 12 letters")
+    answer = web.ask(RESTORE, "POST", Authorization="Bearer short")
+    assert (answer.status, answer.data["error"][:17]) == (403, "There is no token")
+    assert web.ask("/api/state").status == 200
+
+
+def test_a_stop_hangs_up_on_browsers(web: WebBench) -> None:
+    with web.connect() as silent:
+        assert web.ask("/api/state").status == 200
+        assert web.daemon.end() == 0
+        assert silent.recv(1) == b""
+    assert "Traceback" not in web.daemon.printed

@@ -1,0 +1,97 @@
+"""Who gets in at the status page's door: bounded in number, in rate and in time."""
+
+import asyncio
+from collections import Counter
+from functools import partial
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from service.web.door import (
+    MAX_CONNECTIONS,
+    MAX_FROM_ONE,
+    MAX_IN_A_SECOND,
+    MAX_IN_A_SECOND_FROM_ONE,
+    BoundedConnection,
+    Door,
+)
+
+visits = st.lists(
+    st.tuples(st.sampled_from(["a", "a", "b", "c", "d"]), st.sampled_from([0.0, 0.0, 0.01, 0.4]), st.booleans()),
+    max_size=300,
+)
+
+
+@settings(deadline=None)
+@given(visits)
+def test_never_more_than_the_bounds(visits: list[tuple[str, float, bool]]) -> None:
+    door, now = Door(), 100.0
+    inside: Counter[str] = Counter()
+    admitted: list[tuple[float, str]] = []
+    for address, wait_s, leaves in visits:
+        now += wait_s
+        if leaves and inside[address]:
+            door.leave(address)
+            inside[address] -= 1
+        elif door.admit(address, now):
+            inside[address] += 1
+            admitted.append((now, address))
+        lately = [one for at, one in admitted if at > now - 1]
+        assert inside.total() <= MAX_CONNECTIONS
+        assert inside[address] <= MAX_FROM_ONE
+        assert len(lately) <= MAX_IN_A_SECOND
+        assert lately.count(address) <= MAX_IN_A_SECOND_FROM_ONE
+    for address, count in inside.items():
+        for _ in range(count):
+            door.leave(address)
+    assert door.admit("a", now + 2)
+
+
+_VISITORS = 3
+
+
+class _Giver(asyncio.Protocol):
+    """Answers with more than the sockets between them hold, and hangs up when all is read."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        transport.write(bytes(16 << 20))
+        transport.close()
+
+
+class _NoticedDoor(Door):
+    """Tells when everybody who came has left."""
+
+    def __init__(self) -> None:
+        super().__init__(lifetime_s=0.2)
+        self.emptied = asyncio.Event()
+        self._left = 0
+
+    def leave(self, address: str) -> None:
+        super().leave(address)
+        self._left += 1
+        if self._left == _VISITORS:
+            self.emptied.set()
+
+
+async def _is_cut_off(serve: type[asyncio.Protocol]) -> None:
+    """Connect and do nothing; return when the door knows of nobody."""
+    door = _NoticedDoor()
+    server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, serve), "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    connections = [await asyncio.open_connection("127.0.0.1", port, limit=1024) for _ in range(_VISITORS)]
+    try:
+        async with asyncio.timeout(30):
+            await door.emptied.wait()
+    finally:
+        for _, writer in connections:
+            writer.close()
+        server.close()
+
+
+async def test_who_says_nothing_is_cut_off() -> None:
+    await _is_cut_off(asyncio.Protocol)
+
+
+async def test_who_reads_nothing_is_cut_off() -> None:
+    await _is_cut_off(_Giver)

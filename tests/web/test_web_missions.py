@@ -1,0 +1,123 @@
+"""The status page and missions: looked at, compared, restored by the rules of every other way."""
+
+from benches import Starter
+from plan import plain_plan
+from programs import until
+from web_bench import WebBench, web_daemon
+
+pytest_plugins = ("web_fixtures",)
+
+
+def test_the_list_on_the_flight_controller(lasting_web: WebBench) -> None:
+    held = lasting_web.ask("/api/held").data
+    assert held["count"] == len(held["items"]) == 13
+    assert held["checksum"] == lasting_web.state()["mission"]["checksum"] == lasting_web.daemon.held()["checksum"]
+    assert [item["name"] for item in held["items"][:4]] == ["WAYPOINT", "TAKEOFF", "WAYPOINT", "DO_SET_ROI"]
+
+
+def test_the_state(lasting_web: WebBench) -> None:
+    state = until(lambda: (now := lasting_web.state())["gps"]["satellites"] and now, "telemetry")
+    assert (state["link"]["state"], state["link"]["speed_baud"]) == ("MSP", 115200)
+    assert (state["status"]["armed"], state["status"]["mode"]) == (False, "STABILIZE")
+    assert state["newest_mission"] == {"number": 1, "outcome": "VERIFIED"}
+    received = state["traffic"]["fc"]["bytes_received"]
+    until(lambda: lasting_web.state()["traffic"]["fc"]["bytes_received"] > received, "more telemetry")
+
+
+def test_metrics(lasting_web: WebBench) -> None:
+    """For Prometheus; what they say is tested where they are made."""
+    answer = lasting_web.ask("/metrics")
+    assert answer.status == 200
+    assert answer.headers["Content-Type"].startswith("text/plain; version=0.0.4")
+    assert b'naze_bridge_missions_total{ack="ACCEPTED"} 1.0' in answer.body
+
+
+def test_every_change_is_explained(lasting_web: WebBench) -> None:
+    mission = lasting_web.ask("/api/missions/1").data
+    changes = {row["left"]["seq"]: row["changes"] for row in mission["rows"] if row["changes"]}
+    assert changes == {
+        0: {"p2": "hit radius 2..255 m"},
+        1: {"alt_m": "take-off 2..15 m"},
+        5: {"command": "command 178 is not supported"},
+        6: {"alt_m": "whole numbers only"},
+        7: {"p1": "0 fast corner, 1 brake"},
+        8: {"p2": "hit radius 2..255 m"},
+        9: {"alt_m": "0 is no flying height"},
+        10: {"p1": "seconds 1..255"},
+    }
+    assert [row["kind"] for row in mission["rows"]].count("dropped") == 1
+    assert len(mission["findings"]) == 8
+
+
+def test_an_earlier_mission_is_restored(web: WebBench) -> None:
+    assert web.board is not None
+    web.daemon.push(plain_plan(9))
+    first = web.board.records()
+    web.push_example()
+    ended = web.restore(1)
+    assert (ended["ok"], ended["text"], ended["mission"]) == (True, "Mission verified: 9 records", 1)
+    assert web.board.records() == first
+    newest = web.daemon.missions()[0]
+    assert (newest["number"], newest["source"], newest["outcome"]) == (3, "restore of mission 1", "VERIFIED")
+    rows = web.ask("/api/missions/1/difference/3").data["rows"]
+    assert {row["kind"] for row in rows} == {"same"}
+    assert {row["kind"] for row in web.ask("/api/missions/1/difference/2").data["rows"]} > {"changed"}
+
+
+def test_nothing_is_restored_while_armed(web: WebBench) -> None:
+    assert web.board is not None
+    web.daemon.push(plain_plan(9))
+    web.push_example()
+    held = web.board.records()
+    web.board.set("armed 1")
+    until(lambda: web.state()["status"]["armed"], "the armed craft")
+    ended = web.restore(1)
+    assert (ended["ok"], ended["text"]) == (False, "Armed: disarm to change the mission")
+    assert web.board.records() == held
+
+
+def test_one_restore_at_a_time(web: WebBench) -> None:
+    assert web.board is not None
+    web.daemon.push(plain_plan(9))
+    web.board.set("hang 1")
+    begin = ("/api/missions/1/restore", "POST")
+    headers = {"Authorization": f"Bearer {web.token}"}
+    assert web.ask(*begin, **headers).status == 202
+    second = web.ask(*begin, **headers)
+    assert (second.status, second.data["error"]) == (409, "A mission is being restored already.")
+    web.board.set("hang 0")
+    until(lambda: web.state()["restore"]["done"], "the end of the first")
+
+
+def test_a_restore_of_nothing(lasting_web: WebBench) -> None:
+    ended = lasting_web.restore(77)
+    assert not ended["ok"]
+    assert ended["text"].startswith("there is no mission 77")
+
+
+def test_a_stop_ends_a_restore(web: WebBench) -> None:
+    assert web.board is not None
+    web.daemon.push(plain_plan(9))
+    web.board.set("hang 1")
+    assert web.ask("/api/missions/1/restore", "POST", Authorization=f"Bearer {web.token}").status == 202
+    assert web.daemon.end() == 0
+    assert "Traceback" not in web.daemon.printed
+    web.board.set("hang 0")
+
+
+def test_a_refused_list_is_shown_with_its_reason(start: Starter) -> None:
+    web = web_daemon(start)
+    answer = web.daemon.ask({"do": "push", "source": "<b>mine</b>", "items": REFUSED})
+    assert answer["verdict"] == "REJECTED"
+    mission = web.ask("/api/missions/1").data
+    assert mission["source"] == "<b>mine</b>"
+    assert [row["kind"] for row in mission["rows"]] == ["same", "same", "rejected"]
+    assert mission["rows"][2]["changes"]["command"] == "TAKEOFF must be item 1"
+
+
+def _item(seq: int, command: int) -> dict[str, float]:
+    place = {"lat_e7": 453838000 + seq * 1000, "lon_e7": 84733000, "alt_m": 10.0}
+    return {"seq": seq, "command": command, "frame": 3, "p1": 0, "p2": 3, "p3": 0, "p4": 0, **place}
+
+
+REFUSED = [_item(0, 16), _item(1, 16), _item(2, 22)]

@@ -1,0 +1,244 @@
+"""The status page in Chromium: what a pilot sees and does, on a laptop and on a phone."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from chromium import LAPTOP, PHONE, Browser, browser
+from plan import plain_plan
+from programs import run_naze_bridge, until
+from take_pictures import PICTURES, take_pictures
+from web_bench import WebBench, web_bench
+
+pytest_plugins = ("web_fixtures",)
+
+FIRST_PAINT_BYTES = 200_000
+PICTURE_BYTES = 250_000
+CONTRAST = 4.5  # WCAG 2.2, level AA
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WebBench]:
+    with web_bench(tmp_path_factory.mktemp("page")) as bench:
+        bench.daemon.push(plain_plan(9))
+        bench.push_example()
+        yield bench
+
+
+@pytest.fixture(scope="module")
+def laptop(bench: WebBench) -> Iterator[Browser]:
+    with browser(bench.port, LAPTOP) as laptop:
+        yield laptop
+
+
+@pytest.fixture
+def page(laptop: Browser) -> Iterator[Browser]:
+    """The page, just opened; whatever a test does there, the browser finds nothing to complain of."""
+    laptop.complaints()
+    laptop.traffic()
+    laptop.open()
+    yield laptop
+    assert laptop.complaints() == []
+
+
+def test_the_first_paint_is_small_and_asks_nobody_else(page: Browser) -> None:
+    addresses, size = page.traffic()
+    assert addresses
+    assert {address for address in addresses if not address.startswith(page.url)} == set()
+    assert 5_000 < size <= FIRST_PAINT_BYTES
+
+
+def test_how_everything_is(page: Browser) -> None:
+    assert page.text("#headline") == "Harakiri with the mission extension, disarmed"
+    assert (page.value("State"), page.value("Mode")) == ("disarmed", "STABILIZE")
+    assert page.value("Battery") == "12.6 V"
+    assert page.value("Protocol") == "MSP"
+    assert "115200 baud" in page.value("Port")
+    until(lambda: page.value("Line").endswith("/s out"), "a rate")
+    assert not page.value("Line").startswith("0 B/s")
+    assert page.value("Mission").startswith("13 records, ")
+
+
+def test_the_map(page: Browser) -> None:
+    assert len(page.all("#map .track")) == 2  # out, and home
+    assert [mark.text for mark in page.all("#map .number")] == ["2", "3", "4", "5", "6", "7", "8", "9", "10"]
+    assert len(page.all("#map .roi")) == 1
+    assert len(page.all("#map .home")) == len(page.all("#craft")) == len(page.all("#map .north")) == 1
+    assert page.text("#map .scale + text").endswith(" m")
+    words = page.find("#map svg").get_attribute("aria-label")
+    assert words == "Map with 9 places of the list; the craft is 0 m from home"
+    inside = """
+        const box = document.querySelector('#map svg').getBoundingClientRect();
+        return [...document.querySelectorAll('#map circle, #map path')].every((mark) => {
+          const own = mark.getBoundingClientRect();
+          return own.left >= box.left && own.right <= box.right && own.top >= box.top && own.bottom <= box.bottom;
+        });"""
+    assert page.run(inside)
+
+
+def test_the_scale_is_true(page: Browser) -> None:
+    """Home and waypoint 2 are 37.1 m apart; the bar says how long that is on the screen."""
+    bar = page.run("return document.querySelector('#map .scale').getBBox().width")
+    metres = float(page.text("#map .scale + text").removesuffix(" m"))
+    track = page.run("return document.querySelector('#map .track').getAttribute('points')")
+    (x1, y1), (x2, y2) = ([float(number) for number in point.split(",")] for point in track.split()[:2])
+    assert ((x1 - x2) ** 2 + (y1 - y2) ** 2) ** 0.5 * metres / bar == pytest.approx(37.1, abs=0.4)
+
+
+def test_the_last_upload_as_sent_and_as_stored(page: Browser) -> None:
+    assert page.text("#upload b") == "VERIFIED"
+    assert len(page.all("#upload tr.changed")) == 7
+    dropped = page.text("#upload tr.dropped")
+    assert "DO_CHANGE_SPEED" in dropped
+    assert "command 178 is not supported" in dropped
+    assert page.text("#upload tr:nth-child(2) td:nth-child(2) .is-changed") == "height 20 m"
+    assert page.text("#upload tr:nth-child(2) td:nth-child(3) .is-changed") == "height 15 m"
+    assert page.text("#upload tr:nth-child(2) .why") == "height: take-off 2..15 m"
+    colours = [page.run("return getComputedStyle(document.querySelector(arguments[0])).backgroundColor", selector)
+               for selector in ("#upload tr.changed .is-changed", "#upload tr.dropped", "#upload tr.same")]  # fmt: skip
+    assert len(set(colours)) == 3
+
+
+def test_two_missions_compared(page: Browser) -> None:
+    page.find("#first").send_keys("1")
+    page.find("#second").send_keys("2")
+    page.press("#compare-form button")
+    page.wait_text("#chosen h3", "Mission 1 and mission 2, as sent")
+    assert page.all("#chosen tr.changed")
+    assert page.all("#chosen tr.added")
+    page.find("#second").clear()
+    page.find("#second").send_keys("77")
+    page.press("#compare-form button")
+    page.wait_text("#chosen .bad", "there is no mission 77")
+    page.complaints()  # the browser notes the 404
+
+
+@pytest.fixture
+def own_bench(tmp_path: Path) -> Iterator[WebBench]:
+    with web_bench(tmp_path) as bench:
+        bench.daemon.push(plain_plan(9))
+        yield bench
+
+
+def test_a_mission_is_restored_by_who_has_the_token(own_bench: WebBench) -> None:
+    bench = own_bench
+    assert bench.board is not None
+    first = bench.board.records()
+    bench.push_example()
+    with browser(bench.port, PHONE) as page:
+        page.open()
+        page.press("button[aria-label='Show mission 1']")
+        page.wait_text("#chosen h3", "Mission 1")
+        page.find("#chosen input").send_keys("not the token")
+        page.press("#chosen button.restore")
+        page.wait_text("#restore-state", "This needs the token that stands in ")
+        assert page.run("return window.innerWidth") == PHONE[0]  # a long path makes nothing wider
+        assert bench.board.records() != first
+        page.find("#chosen input").clear()
+        page.find("#chosen input").send_keys(bench.token)
+        page.press("#chosen button.restore")
+        page.wait_text("#restore-state", "Restore of mission 1: Mission verified: 9 records")
+        assert bench.board.records() == first
+        page.wait_text("#held-text", "9 records")  # without a reload
+        page.wait_text("#upload", "restore of mission 1")
+
+        bench.board.set("armed 1")
+        page.wait_text("#headline", "ARMED")
+        assert not page.find("#chosen button.restore").is_enabled()
+
+        bench.board.set("armed 0")
+        bench.board.set("unplug")
+        page.wait_text("#headline", "naze")
+        until(lambda: "bad" in str(page.find("#headline").get_attribute("class")), "the colour of trouble")
+        assert page.value("State") == "unknown"
+
+        bench.daemon.end()
+        page.wait_text("#trouble", "The Pi does not answer. What is shown may be old.")
+
+
+def test_what_strangers_say_is_text(own_bench: WebBench) -> None:
+    """A file's name and a ground station's words come from outside."""
+    evil = "<img src=x onerror=alert(1)><script>alert(2)</script>"
+    item = {"command": 16, "frame": 3, "p1": 0, "p2": 3, "p3": 0, "p4": 0, "lat_e7": 453838000, "lon_e7": 84733000}
+    items = [item | {"seq": seq, "alt_m": 10} for seq in range(3)]
+    own_bench.daemon.ask({"do": "push", "source": evil, "items": items})
+    with browser(own_bench.port) as page:
+        page.open()
+        assert evil in page.text("#missions")
+        assert evil in page.text("#upload")
+        assert page.all("main img, main script") == []
+        assert page.complaints() == []
+
+
+def test_it_fits_on_a_phone(bench: WebBench) -> None:
+    with browser(bench.port, PHONE) as phone:
+        phone.open()
+        phone.press("button[aria-label='Show mission 2']")
+        phone.wait_text("#chosen h3", "Mission 2")
+        assert phone.run("return window.innerWidth") == PHONE[0]
+        assert phone.run("return document.documentElement.scrollWidth") <= PHONE[0]
+        cut = "e => e.scrollWidth > e.clientWidth + 1"
+        assert phone.run(f"return [...document.querySelectorAll('.scrolls, section')].filter({cut}).length") == 0
+        small = "e => e.getBoundingClientRect().height < 38"  # a finger's width
+        assert phone.run(f"return [...document.querySelectorAll('button, input')].filter({small}).length") == 0
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_everybody_can_read_it(bench: WebBench, *, dark: bool) -> None:
+    with browser(bench.port, dark=dark) as page:
+        page.open()
+        page.press("button[aria-label='Show mission 2']")
+        page.wait_text("#chosen h3", "Mission 2")
+        assert page.run("return matchMedia('(prefers-color-scheme: dark)').matches") == dark
+        assert page.run(_LEAST_CONTRAST) >= CONTRAST
+        assert page.run("return [...document.querySelectorAll('input')].filter(e => !e.labels.length).length") == 0
+        assert page.run("return document.documentElement.lang") == "en"
+        names = page.run("return [...document.querySelectorAll('button')].map(e => e.ariaLabel || e.innerText)")
+        assert len(names) == len(set(names)) > 3
+        assert all(names)
+
+
+#: The least contrast of any text with what is behind it.
+_LEAST_CONTRAST = """
+const numbers = (colour) => colour.match(/[\\d.]+/g).map(Number);
+const linear = (part) => part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4;
+const light = ([r, g, b]) => 0.2126 * linear(r / 255) + 0.7152 * linear(g / 255) + 0.0722 * linear(b / 255);
+const behind = (element) => {
+  for (let one = element; one; one = one.parentElement) {
+    const colour = numbers(getComputedStyle(one).backgroundColor);
+    if (colour.length < 4 || colour[3] > 0) return colour.slice(0, 3);
+  }
+  return [255, 255, 255];
+};
+const hasText = (element) => [...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+let least = 21;
+for (const element of document.querySelectorAll('body *')) {
+  if (element.disabled || element.closest('svg') || !hasText(element)) continue;
+  const shades = [light(numbers(getComputedStyle(element).color)), light(behind(element))];
+  least = Math.min(least, (Math.max(...shades) + 0.05) / (Math.min(...shades) + 0.05));
+}
+return least;"""
+
+
+def test_without_a_mission_and_without_a_position(tmp_path: Path) -> None:
+    with web_bench(tmp_path) as bench, browser(bench.port) as page:
+        page.open()
+        page.wait_text("#missions", "No mission has come in yet.")
+        page.wait_text("#upload", "No mission has come in yet.")
+        page.wait_text("#held-text", "No mission.")
+        ended = run_naze_bridge("push", "--state-dir", bench.daemon.state_dir, "examples/long-146.waypoints")
+        assert ended.returncode == 0, ended.stderr
+        page.wait_text("#held-text", "146 records")
+        assert len(page.all("#map .number")) > 100
+        assert page.complaints() == []
+
+
+def test_the_pictures_in_the_docs(tmp_path: Path) -> None:
+    """They are taken by what is tested here, and are what the docs show."""
+    take_pictures(tmp_path)
+    taken = sorted(path.name for path in tmp_path.iterdir())
+    assert taken == sorted(path.name for path in PICTURES.glob("*.png"))
+    page = (PICTURES.parent / "status-page.md").read_text()
+    for name in taken:
+        assert f"(pictures/{name})" in page
+        assert 5_000 < (PICTURES / name).stat().st_size <= PICTURE_BYTES

@@ -1,0 +1,90 @@
+"""The `[web]` table and the token's file: what is taken, and what is said of what cannot be."""
+
+from pathlib import Path
+
+import pytest
+
+from service.settings import SettingsError, load_settings
+from service.web.settings import ListenAddress, WebSettings
+from service.web.token import Token, TokenError
+
+
+def load(tmp_path: Path, text: str) -> WebSettings | None:
+    config = tmp_path / "naze.toml"
+    config.write_text(text)
+    return load_settings(config, "sim:", (), tmp_path).web
+
+
+def test_the_table(tmp_path: Path) -> None:
+    assert load(tmp_path, "") is None
+    assert load(tmp_path, "[web]\n") == WebSettings(ListenAddress("127.0.0.1", 8080), None)
+    given = load(tmp_path, '[web]\nlisten = "[::]:80"\ntoken_file = "mine"\n')
+    assert given == WebSettings(ListenAddress("::", 80), tmp_path / "mine")
+    assert str(given.listen) == "[::]:80"
+
+
+def test_one_word_in_the_environment_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NAZE_BRIDGE_WEB_LISTEN", "0.0.0.0:8080")
+    assert load(tmp_path, "") == WebSettings(ListenAddress("0.0.0.0", 8080))  # noqa: S104 - only read
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("web = true", ["web", "a table"]),
+        ("[web]\nlisen = 'x'", ["web.lisen", "web.listen"]),
+        ("[web]\nlisten = 8080", ["web.listen is 8080", '"HOST:PORT"']),
+        ("[web]\nlisten = '8080'", ["web.listen 8080", "needs a host and a port", "0.0.0.0:8080"]),
+        ("[web]\nlisten = ':::80'", ["brackets"]),
+        ("[web]\nlisten = '0.0.0.0:99999'", ["99999", "no port number"]),
+        ("[web]\ntoken_file = ''", ["web.token_file is ''", "text in quotes"]),
+        (
+            "gcs = ['tcpin:127.0.0.1:8080']\n[web]",
+            ["gcs tcpin:127.0.0.1:8080 and web.listen 127.0.0.1:8080", "TCP port 8080"],
+        ),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(tmp_path: Path, text: str, said: list[str]) -> None:
+    with pytest.raises(SettingsError) as caught:
+        load(tmp_path, text)
+    (problem,) = map(str, caught.value.problems)
+    assert problem.startswith(str(tmp_path / "naze.toml"))
+    for part in said:
+        assert part in problem
+
+
+def test_a_token_is_made_once(tmp_path: Path) -> None:
+    path = tmp_path / "token"
+    token = Token(path)
+    text = path.read_text().strip()
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert token.is_shown_by(f"Bearer {text}")
+    assert Token(path).is_shown_by(f"bearer {text} ")
+    assert Token(tmp_path / "other").path.read_text() != f"{text}\n"
+
+
+@pytest.mark.parametrize(
+    "shown", [None, "", "Bearer", "Bearer ", "Bearer x", "Basic {}", "{}", "Bearer {}x", "Bearer \udcff"]
+)
+def test_what_is_not_the_token(tmp_path: Path, shown: str | None) -> None:
+    token = Token(tmp_path / "token")
+    text = token.path.read_text().strip()
+    assert not token.is_shown_by(None if shown is None else shown.format(text))
+
+
+def test_files_that_hold_no_token(tmp_path: Path) -> None:
+    (tmp_path / "open").write_text("a token that all can read")
+    (tmp_path / "open").chmod(0o644)
+    (tmp_path / "empty").touch(0o600)
+    (tmp_path / "long").touch(0o600)
+    (tmp_path / "long").write_bytes(bytes(5000))
+    for path, said in {
+        tmp_path / "open": f"everybody can read the token in {tmp_path}/open: chmod 600 {tmp_path}/open",
+        tmp_path / "empty": "is shorter than 12 letters",
+        tmp_path / "long": "cannot be read: it is larger than",
+        tmp_path: "is no file",
+        tmp_path / "nowhere" / "token": "no token can be written to",
+        tmp_path / "open" / "token": "cannot be read: Not a directory",
+    }.items():
+        with pytest.raises(TokenError, match=said):
+            Token(path)

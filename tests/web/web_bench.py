@@ -1,0 +1,100 @@
+"""A daemon that serves its status page, beside a simulated board."""
+
+import json
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from email.message import Message
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+
+from benches import Starter
+from programs import PATIENCE, Board, Daemon, free_port, run_naze_bridge, until
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "naze-field.waypoints"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the page's server has answered."""
+
+    status: int
+    headers: Message
+    body: bytes
+
+    @property
+    def data(self) -> Any:
+        return json.loads(self.body)
+
+
+class WebBench:
+    """The daemon, its board (None: the one within it), and what a browser does by hand."""
+
+    def __init__(self, daemon: Daemon, board: Board | None, port: int) -> None:
+        self.daemon = daemon
+        self.board = board
+        self.port = port
+
+    @property
+    def token(self) -> str:
+        return (self.daemon.state_dir / "web-token").read_text().strip()
+
+    def ask(self, path: str, method: str = "GET", **headers: str) -> Answer:
+        """Ask until there is room at the door: tests ask more often than a page."""
+        return until(lambda: self.ask_once(path, method, **headers), "an answer")
+
+    def ask_once(self, path: str, method: str = "GET", **headers: str) -> Answer | None:
+        """Ask; None if the door has no room."""
+        connection = HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+        try:
+            connection.request(method, path, None, headers)
+            response = connection.getresponse()
+            return Answer(response.status, response.headers, response.read())
+        except ConnectionError:
+            return None
+        finally:
+            connection.close()
+
+    def state(self) -> dict[str, Any]:
+        state: dict[str, Any] = self.ask("/api/state").data
+        return state
+
+    def restore(self, number: int) -> dict[str, Any]:
+        """Restore a mission as the page does; return how it ended."""
+        answer = self.ask(f"/api/missions/{number}/restore", "POST", Authorization=f"Bearer {self.token}")
+        assert answer.status == 202, answer
+        ended: dict[str, Any]
+        ended = until(lambda: (state := self.state()["restore"])["done"] and state, "the end of the restore")
+        return ended
+
+    def connect(self) -> socket.socket:
+        return socket.create_connection(("127.0.0.1", self.port), PATIENCE)
+
+    def push_example(self) -> None:
+        """Write a list of which much is changed."""
+        ended = run_naze_bridge("push", "--state-dir", self.daemon.state_dir, EXAMPLE)
+        assert ended.returncode == 0, ended.stderr
+
+
+def web_daemon(start: Starter, fc: str = "sim:", web: str = "") -> WebBench:
+    """Start a daemon with a page; `web`: more lines of its table."""
+    port = free_port(socket.SOCK_STREAM)
+    config = start.directory / "naze-bridge.toml"
+    config.write_text(f'[web]\nlisten = "127.0.0.1:{port}"\n{web}')
+    daemon = start.daemon(fc, options=("--config", str(config)))
+    daemon.wait()
+    until(lambda: daemon.has_logged("web.listening"), "the page")
+    return WebBench(daemon, None, port)
+
+
+@contextmanager
+def web_bench(directory: Path) -> Iterator[WebBench]:
+    """A daemon that has found a board behind a pseudo-terminal."""
+    with ExitStack() as stack:
+        start = Starter(directory, stack)
+        board = start.board()
+        bench = web_daemon(start, str(board.link))
+        yield WebBench(bench.daemon, board, bench.port)
+        board.assert_was_treated_well()

@@ -1,0 +1,30 @@
+"""What the tests of the status page start with."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from web_bench import WebBench, web_bench
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Starter]:
+    with ExitStack() as stack:
+        yield Starter(tmp_path, stack)
+
+
+@pytest.fixture
+def web(tmp_path: Path) -> Iterator[WebBench]:
+    """A daemon with its page and a board, of one test's own."""
+    with web_bench(tmp_path) as bench:
+        yield bench
+
+
+@pytest.fixture(scope="module")
+def lasting_web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WebBench]:
+    """The same for all tests of a module that break nothing; two missions are in its store."""
+    with web_bench(tmp_path_factory.mktemp("web")) as bench:
+        bench.push_example()
+        yield bench
