@@ -6,6 +6,7 @@ when somebody does.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from bridge.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from protocols.mavlink.codec import MavlinkDecoder
@@ -25,6 +26,8 @@ _TOLD_BY: dict[int, frozenset[Group]] = {
     m.MAVLINK_MSG_ID_VFR_HUD: frozenset(),
     m.MAVLINK_MSG_ID_HOME_POSITION: frozenset(),
 }
+#: Harakiri has no GLOBAL_POSITION_INT.
+_TOLD_BY_HARAKIRI = _TOLD_BY | {m.MAVLINK_MSG_ID_GPS_RAW_INT: frozenset({Group.GPS, Group.POSITION})}
 #: Where a heartbeat says what kind of autopilot sends it. Cameras and gimbals are none.
 _AUTOPILOT_AT = 5
 _UNKNOWN_U16 = 0xFFFF
@@ -42,10 +45,14 @@ _FIXES = {m.GPS_FIX_TYPE_NO_GPS: None, m.GPS_FIX_TYPE_NO_FIX: "none", m.GPS_FIX_
 
 
 class MavlinkGroups:
-    """Keeps what one autopilot sends. `fresh`: groups that there is news of, if `is_watched`."""
+    """Keeps what one autopilot sends. `fresh`: groups that there is news of, if `is_watched`.
 
-    def __init__(self, fresh: set[Group]) -> None:
+    A Harakiri's VFR_HUD has the height above the launch where MAVLink wants that above the sea.
+    """
+
+    def __init__(self, fresh: set[Group], *, is_harakiri: bool) -> None:
         self._fresh = fresh
+        self._is_harakiri = is_harakiri
         self._decoder = MavlinkDecoder()
         self._newest: dict[int, MavlinkFrame] = {}
         #: By the bytes of a frame's header that hold sender and message id.
@@ -70,7 +77,8 @@ class MavlinkGroups:
         for frame in frames:
             if frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT and frame.payload[_AUTOPILOT_AT] != m.MAV_AUTOPILOT_INVALID:
                 sender = bytes((frame.sysid, frame.compid))
-                for msgid, groups in _TOLD_BY.items():
+                table = _TOLD_BY_HARAKIRI if self._is_harakiri else _TOLD_BY
+                for msgid, groups in table.items():
                     self._told_by[sender + msgid.to_bytes(3, "little")] = msgid, groups
                     self._told_by[sender + bytes((msgid,))] = msgid, groups
                 return
@@ -84,11 +92,13 @@ class MavlinkGroups:
         return Attitude(_degrees(now.roll), _degrees(now.pitch), None if heading is None else heading % 360)
 
     def position(self) -> Position:
-        """GLOBAL_POSITION_INT; HOME_POSITION if the autopilot sends it."""
+        """GLOBAL_POSITION_INT, else GPS_RAW_INT and VFR_HUD; HOME_POSITION if the autopilot sends it."""
         now = self._message(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
         home = self._message(m.MAVLINK_MSG_ID_HOME_POSITION)
         home_lat, home_lon = (None, None) if home is None else (home.latitude / 1e7, home.longitude / 1e7)
-        if now is None or not (now.lat or now.lon):
+        if now is None:
+            return replace(self._raw_position(), home_lat_deg=home_lat, home_lon_deg=home_lon)
+        if not (now.lat or now.lon):
             return Position(home_lat_deg=home_lat, home_lon_deg=home_lon)
         return Position(
             lat_deg=now.lat / 1e7,
@@ -100,6 +110,18 @@ class MavlinkGroups:
             east_m_s=now.vy / 100,
             home_lat_deg=home_lat,
             home_lon_deg=home_lon,
+        )
+
+    def _raw_position(self) -> Position:
+        raw, hud = self._message(m.MAVLINK_MSG_ID_GPS_RAW_INT), self._message(m.MAVLINK_MSG_ID_VFR_HUD)
+        if raw is not None and raw.fix_type < m.GPS_FIX_TYPE_2D_FIX:
+            raw = None
+        return Position(
+            lat_deg=None if raw is None else raw.lat / 1e7,
+            lon_deg=None if raw is None else raw.lon / 1e7,
+            altitude_m=None if raw is None else raw.alt / 1000,
+            height_m=_finite(hud.alt) if hud is not None and self._is_harakiri else None,
+            climb_m_s=None if hud is None else _finite(hud.climb),
         )
 
     def gps(self) -> Gps:
@@ -157,6 +179,10 @@ class MavlinkGroups:
     def _message(self, msgid: int) -> Message | None:
         frame = self._newest.get(msgid)
         return None if frame is None else self._decoder.decode(frame)
+
+
+def _finite(value: float) -> float | None:
+    return round(value, 2) if math.isfinite(value) else None
 
 
 def _degrees(radians: float) -> float | None:

@@ -1,5 +1,7 @@
 """A vehicle's groups from what MSP telemetry has told: the values of docs/telemetry.md, not in MAVLink's units."""
 
+from functools import cache
+
 from bridge.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from bridge.vehicle_state import Fix, VehicleState
 from protocols.msp.commands import Msp
@@ -104,5 +106,9 @@ class MspGroups:
         now = vehicle.status
         if now is None:
             return Status(vehicle.armed, mode)
-        sensors = tuple(str(sensor.name).lower() for sensor in Sensor if sensor & now.sensors)
-        return Status(vehicle.armed, mode, sensors, now.cycle_time_us, now.i2c_errors)
+        return Status(vehicle.armed, mode, _names(now.sensors), now.cycle_time_us, now.i2c_errors)
+
+
+@cache
+def _names(sensors: Sensor) -> tuple[str, ...]:
+    return tuple(str(sensor.name).lower() for sensor in Sensor if sensor & sensors)

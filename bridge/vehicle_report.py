@@ -1,9 +1,11 @@
 """One place to ask what is known of the vehicle, whatever protocol its flight controller speaks now. Sans-IO."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from bridge.fc_session import FcSession, State
+from bridge.flight_controller import Kind
 from bridge.ground import Ground
 from bridge.mavlink_groups import MavlinkGroups
 from bridge.mission_desk import MissionDesk
@@ -27,7 +29,7 @@ class VehicleReporter:
         self._want = want
         self._fresh: set[Group] = set()
         self._watched: frozenset[Group] = frozenset()
-        self._mavlink = MavlinkGroups(self._fresh)
+        self._mavlink = MavlinkGroups(self._fresh, is_harakiri=False)
 
     # What the bridge tells.
 
@@ -42,7 +44,9 @@ class VehicleReporter:
 
     def controller_changed(self) -> None:
         """It is another flight controller, or none, or it speaks otherwise."""
-        self._mavlink = MavlinkGroups(self._fresh)
+        controller = self._session.controller
+        is_harakiri = controller is not None and controller.kind is Kind.HARAKIRI_MAVLINK
+        self._mavlink = MavlinkGroups(self._fresh, is_harakiri=is_harakiri)
         self._mavlink.is_watched = bool(self._watched)
 
     # What others ask.
@@ -69,8 +73,14 @@ class VehicleReporter:
         """Return one group as it is now: an instance of its class in bridge.vehicle_groups."""
         if group is Group.LINK:
             return self._link()
-        source = self._mavlink if self._session.state is State.MAVLINK else MspGroups(self._session.vehicle)
-        return getattr(source, group.value)()
+        if self._session.state is not State.MAVLINK:
+            return getattr(MspGroups(self._session.vehicle), group.value)()
+        found = getattr(self._mavlink, group.value)()
+        home = self._session.vehicle.home
+        if group is Group.POSITION and found.home_lat_deg is None and home is not None:
+            # It was told of before the craft armed.
+            return replace(found, home_lat_deg=home.lat_e7 / 1e7, home_lon_deg=home.lon_e7 / 1e7)
+        return found
 
     def whole(self) -> VehicleReport:
         """Return everything."""

@@ -17,6 +17,7 @@ from service.zenoh_link.keys import VERSION, Key
 from service.zenoh_link.settings import PayloadEncoding
 
 _JSON = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
+_SCALARS = frozenset((float, int, str, bool, type(None)))
 ENCODINGS = {
     PayloadEncoding.JSON: zenoh.Encoding.APPLICATION_JSON,
     PayloadEncoding.CBOR: zenoh.Encoding.APPLICATION_CBOR,
@@ -61,7 +62,7 @@ def strict(value: Any) -> Any:
 
 
 def _plain_value(value: Any) -> Any:
-    if value is None or isinstance(value, float | int | str):
+    if type(value) in _SCALARS:
         return value
     if isinstance(value, tuple):
         return list(value)

@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 import trustme
@@ -18,7 +19,7 @@ from protocols.mission_file import write_qgc_wpl
 from service.zenoh_link.keys import COMMANDS
 
 UPLOAD = f"{COMMANDS}/mission/upload"
-EXPIRED = {"not_before": datetime.datetime(2020, 1, 1), "not_after": datetime.datetime(2021, 1, 1)}
+EXPIRED: dict[str, Any] = {"not_before": datetime.datetime(2020, 1, 1), "not_after": datetime.datetime(2021, 1, 1)}
 MISSION = write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(12))]).encode()
 
 
@@ -75,7 +76,7 @@ def test_a_vehicle_whose_certificate_does_not_hold_says_so(start: Starter, tmp_p
             said = f"there is no file {folder / 'naze-1.pem'}"
         else:
             authority = trustme.CA() if fault == "of another name" else own_authority(folder)
-            past = {} if fault == "of another name" else EXPIRED
+            past: dict[str, Any] = {} if fault == "of another name" else EXPIRED
             issued = authority.issue_cert("naze-1", common_name="naze-1", **past)
             issued.private_key_pem.write_to_path(str(folder / "naze-1.key"))
             issued.cert_chain_pems[0].write_to_path(str(folder / "naze-1.pem"))

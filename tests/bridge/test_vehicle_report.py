@@ -1,0 +1,165 @@
+"""What is known of the vehicle, in groups: the same whichever protocol the flight controller speaks."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as m
+from test_pass_through import Autopilot, passing
+from world import GroundStation, World
+
+from bridge.flight_controller import Kind
+from bridge.mavlink_groups import MavlinkGroups
+from bridge.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from service.simulator.options import SimOptions, TelemetryProtocol
+
+EMPTY = {
+    Group.ATTITUDE: Attitude(),
+    Group.POSITION: Position(),
+    Group.GPS: Gps(),
+    Group.BATTERY: Battery(),
+    Group.RC: Rc(),
+    Group.STATUS: Status(),
+}
+
+
+def heard(station: GroundStation, kind: str) -> Any:
+    return station.said(kind)[-1]
+
+
+def test_groups_say_what_ground_stations_are_told() -> None:
+    world = World()
+    station = GroundStation(world)
+    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.wait_ready()
+    world.run(5.0)
+    report = world.bridge.report.whole()
+    attitude, position = heard(station, "ATTITUDE"), heard(station, "GLOBAL_POSITION_INT")
+    assert report.attitude.pitch_deg == pytest.approx(math.degrees(attitude.pitch), abs=1e-4)
+    assert report.attitude.roll_deg == pytest.approx(math.degrees(attitude.roll), abs=1e-4)
+    assert report.attitude.heading_deg == pytest.approx(math.degrees(attitude.yaw) % 360, abs=1e-4)
+    assert report.position.lat_deg == position.lat / 1e7
+    assert report.position.lon_deg == position.lon / 1e7
+    assert report.position.altitude_m == position.alt / 1000
+    assert report.position.height_m == pytest.approx(position.relative_alt / 1000)
+    gps, battery, rc = heard(station, "GPS_RAW_INT"), heard(station, "SYS_STATUS"), heard(station, "RC_CHANNELS")
+    assert (report.gps.fix, report.gps.satellites, report.gps.hdop) == ("3D", gps.satellites_visible, None)
+    assert report.battery.voltage_v == battery.voltage_battery / 1000
+    assert report.battery.current_a is None
+    assert report.rc.channels_us is not None
+    assert report.rc.channels_us[:4] == (rc.chan1_raw, rc.chan2_raw, rc.chan3_raw, rc.chan4_raw)
+    assert report.rc.rssi_percent == pytest.approx(rc.rssi / 254 * 100, abs=0.5)
+    assert (report.status.armed, report.status.mode) == (False, "STABILIZE")
+    assert report.status.sensors == ("accelerometer", "barometer", "compass", "gps")
+    assert (report.link.state, report.link.ground_stations) == ("MSP", (str(station.peer),))
+    assert report.mission is not None
+    assert report.mission.count == 0
+
+
+def test_nothing_is_known_before_a_flight_controller_is_there() -> None:
+    report = World(plugged=False).bridge.report
+    assert {group: report.group(group) for group in EMPTY} == EMPTY
+    assert report.group(Group.LINK).state == "no port"
+    assert report.whole().mission is None
+
+
+def test_a_lost_link_takes_what_was_known_with_it() -> None:
+    world = World()
+    world.wait_ready()
+    world.run(3.0)
+    world.unplug()
+    report = world.bridge.report
+    known_for_ever = {Group.POSITION: report.group(Group.POSITION)}
+    assert known_for_ever[Group.POSITION].lat_deg is None
+    assert {group: report.group(group) for group in EMPTY} == EMPTY | known_for_ever
+
+
+def test_watched_groups_are_polled_for_and_told_of_as_answers_come() -> None:
+    world = World()
+    world.wait_ready()
+    report = world.bridge.report
+    assert report.take_fresh() == frozenset()
+    report.watch({Group.ATTITUDE})
+    found = 0
+    for _ in range(100):
+        world.run(0.02)
+        fresh = report.take_fresh()
+        assert fresh <= {Group.ATTITUDE}
+        found += len(fresh)
+    assert 15 <= found <= 25
+    report.watch(())
+    world.run(2.0)
+    assert report.take_fresh() == frozenset()
+
+
+def test_an_autopilot_of_its_own_is_read_too() -> None:
+    world, autopilot, _ = passing()
+    world.bridge.report.watch(Group)
+    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3))
+    autopilot.say(m.MAVLink_attitude_message(1, 0.1, -0.2, -0.3, 0, 0, 0))
+    autopilot.say(m.MAVLink_global_position_int_message(1, 453838000, 84733000, 131000, 20000, 100, -200, -50, 9000))
+    autopilot.say(m.MAVLink_gps_raw_int_message(1, 2, 0, 0, 0, 120, 65535, 65535, 65535, 255))
+    autopilot.say(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, -1, -1, 0, 0, 0, 0, 0, 0))
+    autopilot.say(m.MAVLink_rc_channels_raw_message(1, 0, 1500, 1501, 1000, 1502, *[65535] * 4, 127))
+    # A gimbal is aboard, too, and is no autopilot.
+    gimbal = m.MAVLink(None, srcSystem=1, srcComponent=154)
+    autopilot.outgoing += m.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3).pack(gimbal)
+    autopilot.outgoing += m.MAVLink_attitude_message(1, 1.0, 1.0, 1.0, 0, 0, 0).pack(gimbal)
+    world.run(0.05)
+    report = world.bridge.report
+    assert report.take_fresh() == {
+        Group.ATTITUDE, Group.POSITION, Group.GPS, Group.BATTERY, Group.RC, Group.STATUS
+    }  # fmt: skip
+    assert report.group(Group.ATTITUDE) == Attitude(5.73, -11.46, round(math.degrees(-0.3), 2) % 360)
+    assert report.group(Group.POSITION) == Position(45.3838, 8.4733, 131.0, 20.0, 0.5, 1.0, -2.0)
+    assert report.group(Group.GPS) == Gps("2D", None, 1.2, None, None)
+    assert report.group(Group.BATTERY) == Battery(12.6, None, None)
+    assert report.group(Group.RC) == Rc((1500, 1501, 1000, 1502), 50.0)
+    assert report.group(Group.STATUS) == Status(True, "4", ("accelerometer", "compass"))
+    assert report.group(Group.LINK).state == "MAVLink"
+
+
+def test_an_armed_harakiri_goes_on_in_mavlink() -> None:
+    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
+    world.wait_ready()
+    world.run(2.0)
+    before = world.bridge.report.whole()
+    world.faults.armed = True
+    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 10)
+    world.run(3.0)
+    now = world.bridge.report.whole()
+    assert now.status.armed
+    assert now.position.lat_deg == pytest.approx(before.position.lat_deg, abs=0.01)
+    assert now.battery.voltage_v == pytest.approx(before.battery.voltage_v, abs=1.0)
+    assert now.position.height_m is not None
+    assert now.position.home_lat_deg is not None
+    assert None not in (now.attitude.roll_deg, now.gps.satellites, now.rc.channels_us)
+
+
+@given(st.data())
+def test_no_content_of_a_frame_is_too_odd(data: st.DataObject) -> None:
+    """Whatever a damaged autopilot sends within a frame that is whole."""
+    sender = m.MAVLink(None, srcSystem=1, srcComponent=1)
+    fresh: set[Group] = set()
+    groups = MavlinkGroups(fresh, is_harakiri=data.draw(st.booleans()))
+    groups.take(MavlinkSplitter().feed(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3).pack(sender)))
+    for msgid in (0, 1, 24, 30, 33, 35, 65, 74, 147, 242):
+        known = m.mavlink_map[msgid]
+        size = known.unpacker.size
+        payload = data.draw(st.binary(min_size=size, max_size=size))
+        checked = bytes((size, 0, 0, 0, 1, 1)) + msgid.to_bytes(3, "little") + payload
+        crc = m.x25crc(checked + bytes((known.crc_extra,))).crc
+        groups.take([MavlinkFrame(b"\xfd" + checked + crc.to_bytes(2, "little"))])
+    for group in EMPTY:
+        assert isinstance(getattr(groups, group.value)(), type(EMPTY[group]))
+
+
+def test_autopilots_are_told_apart_by_version_2_and_1() -> None:
+    world, autopilot, _ = passing(Autopilot(version=1))
+    autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    autopilot.say(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
+    world.run(0.05)
+    assert world.bridge.report.group(Group.ATTITUDE).roll_deg == 28.65
