@@ -8,6 +8,9 @@ from bridge.procedure import LinkLost, Procedure, ask
 from protocols.msp.frame import Direction, request
 from protocols.msp.nav import INFO_SIZE, LOAD_REQUEST, SAVE_REQUEST, Nav, NavInfo, NavRecord, decode_info
 
+_MAX_SAVES = 2
+_SAVE_PATIENCE = 4
+
 
 class InavMissions(NavMissions):
     """The mission store of one INAV. Record 1 wipes what is there, and no list is valid before its last record."""
@@ -39,22 +42,43 @@ class InavMissions(NavMissions):
     def _keep(self) -> Procedure[None]:
         """SAVE, and look again: the flight controller stands still meanwhile, and may have restarted."""
         before = yield from self._info()
-        reply = yield from ask(SAVE_REQUEST, Nav.SAVE, 0, tries=2, exclusive=True)
-        after = yield from self._info()
-        if after is None or after != before:
+        if before is None:
             raise Failed(PushFailure.UNCERTAIN)
-        last = yield from self.read(after.count)
+        for _ in range(_MAX_SAVES):
+            reply = yield from ask(SAVE_REQUEST, Nav.SAVE, 0, tries=1, exclusive=True)
+            after = yield from self._info_after_save()
+            if after != before:
+                raise Failed(PushFailure.UNCERTAIN)
+            if reply is not None:
+                break
+        last = yield from self.read(before.count)
         if reply is None or reply.direction is Direction.ERROR or last is None:
             raise Failed(PushFailure.NOT_SAVED)
+
+    def _still_holds(self, records: tuple[NavRecord, ...]) -> Procedure[bool]:
+        info = yield from self._info()
+        return _has(info, records)
 
     def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
         """Have it LOAD what was saved last: the old list, unless somebody else wrote one and did not save it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
             info = yield from self._info()
-            return bool(before) and info is not None and info.is_valid and info.count == len(before or ())
+            return bool(before) and _has(info, before or ())
         return False
+
+    def _info_after_save(self) -> Procedure[NavInfo | None]:
+        """Ask for longer than its flash takes to be written."""
+        for _ in range(_SAVE_PATIENCE):
+            info = yield from self._info()
+            if info is not None:
+                return info
+        return None
 
     def _info(self) -> Procedure[NavInfo | None]:
         reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE)
         return None if reply is None else decode_info(reply.payload)
+
+
+def _has(info: NavInfo | None, records: tuple[NavRecord, ...]) -> bool:
+    return info is not None and info.is_valid and info.count == len(records)

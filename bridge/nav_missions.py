@@ -17,7 +17,17 @@ from bridge.procedure import LinkLost, Procedure, Stopped, ask, pause, receive, 
 from protocols.mission_item import MissionItem
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
-from protocols.msp.nav import LAST, WP_SIZE, Nav, NavAction, NavRecord, decode_wp, encode_read_wp, encode_set_wp
+from protocols.msp.nav import (
+    LAST,
+    WP_SIZE,
+    Nav,
+    NavAction,
+    NavRecord,
+    UnsafeRecord,
+    decode_wp,
+    encode_read_wp,
+    encode_set_wp,
+)
 from protocols.msp.telemetry import decode_status
 
 #: There is no empty list to write: this is what is there instead.
@@ -102,6 +112,8 @@ class NavMissions(ABC):
         failure = PushFailure.NO_ANSWER  # if the link is lost now
         try:
             yield from self._make_sure_disarmed()
+            if before and not (yield from self._still_holds(before)):
+                before = None
             failure = PushFailure.INCOMPLETE
             yield from self._write_surely(records or NOTHING, progress)
             failure = PushFailure.UNCERTAIN
@@ -134,6 +146,11 @@ class NavMissions(ABC):
     def _keep(self) -> Procedure[None]:
         """Do what has to be done after the last record; raises Failed."""
 
+    def _still_holds(self, records: tuple[NavRecord, ...]) -> Procedure[bool]:
+        """Tell, as far as that takes no time, whether nobody else has written another list since this one was read."""
+        yield from ()
+        return True
+
     def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
         """Put the old list back if that takes no time; tell whether it is there."""
         yield from ()
@@ -155,7 +172,7 @@ class NavMissions(ABC):
                 yield from self._make_sure_disarmed()
             elif self._craft.is_armed():
                 raise Failed(PushFailure.ARMED)
-            frame = encode_set_wp(number, record)
+            frame = _frame(number, record)
             reply = yield from ask(frame, Nav.SET_WP, 0, tries=_TRIES, exclusive=self._stores_slowly)
             if reply is None:
                 raise Failed(PushFailure.NO_ANSWER)
@@ -215,6 +232,14 @@ class NavMissions(ABC):
         reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
         status = None if reply is None else decode_status(reply.payload)
         return None if status is None else bool(status.box_flags & self._craft.arm_mask)
+
+
+def _frame(number: int, record: NavRecord) -> bytes:
+    """Encode; what crashes the flight controller may have been put there by others, and is not written back."""
+    try:
+        return encode_set_wp(number, record)
+    except UnsafeRecord as unsafe:
+        raise Failed(PushFailure.UNSAFE) from unsafe
 
 
 #: What is told instead, if the old list is not there any more.

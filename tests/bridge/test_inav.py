@@ -305,3 +305,36 @@ def test_the_boxes_of_a_betaflight_whose_names_outgrow_a_frame() -> None:
     beat = station.said("HEARTBEAT")[-1]
     assert beat.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED
     assert beat.custom_mode == 6
+
+
+def test_what_would_crash_is_not_even_written_back() -> None:
+    """Somebody else left a JUMP to 0 there; the push after it fails, and the old list cannot be restored."""
+    inav = FakeInav()
+    waypoint, *_ = packed(plan(3))
+    jump = bytes((NavAction.JUMP, *bytes(18), 0))
+    inav.records, inav.is_valid = [waypoint, jump, waypoint[:-1] + bytes((LAST,))], True
+    world, station = found(inav)
+    inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 5 else ""
+    assert Upload(station, plan(10)).run() is DENIED
+    assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    inav.drop = lambda _frame: ""
+    assert Upload(station, plan(10)).run() is ACCEPTED
+
+
+def test_what_somebody_else_replaced_is_not_put_back() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    assert Upload(station, plan(12)).run() is ACCEPTED
+    inav.records = [*packed(plan(5))]
+    inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 3 else ""
+    assert Upload(station, plan(10, 1)).run() is DENIED
+    assert not inav.is_valid
+    assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+
+
+def test_a_save_whose_answer_is_lost_is_done_again() -> None:
+    lost = iter(("reply",))
+    inav = FakeInav(drop=lambda frame: next(lost, "") if frame.command == Nav.SAVE else "")
+    _, station = found(inav)
+    assert Upload(station, plan(10)).run() is ACCEPTED
+    assert inav.saves == 2
