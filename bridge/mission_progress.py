@@ -2,7 +2,11 @@
 
 from enum import Enum
 
-from protocols.msp.nav import FINISHED, LEGS, NavMode, NavState, NavStatus
+from protocols.msp.nav import FINISHED, LEGS, NavAction, NavMode, NavState, NavStatus
+
+#: In these states the craft is where its record leads.
+_THERE = frozenset((NavState.HOLD_TIMED, NavState.LAND_IN_PROGRESS, NavState.LANDED, NavState.HOVER_ABOVE_HOME))
+_REACHED = LEGS | {NavAction.RTH}
 
 
 class Progress(Enum):
@@ -25,18 +29,22 @@ class MissionProgress:
     def take(self, status: NavStatus) -> int | None:
         """Learn from one answer; return the record that was reached meanwhile. Of several only the last is known."""
         before, action = self.number, self._action
-        if status.mode != NavMode.MISSION:
+        # The way home with which a mission ends is flown in the mode RTH.
+        goes_home = status.mode == NavMode.RTH and status.action == NavAction.RTH and before > 0
+        if status.mode != NavMode.MISSION and not goes_home:
             self.number = self._action = self._reached = 0
             self.progress = Progress.NOT_STARTED
             return None
         self.number, self._action = status.number, status.action
         self.progress = Progress.COMPLETE if status.error == FINISHED else Progress.ACTIVE
-        is_there = status.state in (NavState.HOLD_TIMED, NavState.LAND_IN_PROGRESS, NavState.LANDED)
+        is_there = status.state in _THERE
+        if goes_home and is_there:
+            self.progress = Progress.COMPLETE
         if is_there or self.progress is Progress.COMPLETE:
             before, action = status.number, status.action
         elif before == status.number:
             return None
-        if action not in LEGS or before == self._reached:
+        if action not in _REACHED or before == self._reached:
             return None
         self._reached = before
         return before

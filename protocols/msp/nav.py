@@ -103,6 +103,7 @@ class NavState(IntEnum):
     HOLD_TIMED = 4
     LAND_IN_PROGRESS = 9
     LANDED = 10
+    HOVER_ABOVE_HOME = 13
 
 
 #: MSP_NAV_STATUS, error: "end flag detected, navigation finished".

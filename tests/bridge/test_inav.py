@@ -229,17 +229,25 @@ def test_the_item_that_is_flown_to_and_those_reached_are_told() -> None:
     world, station = found(inav)
     speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
     legs = plan(4)
-    assert Upload(station, [*legs[:2], speed, *legs[2:]]).run() is ACCEPTED
+    home = MissionItem(0, 20, 3, 1, 0, 0, 0, 0, 0, 0)
+    assert Upload(station, [*legs[:2], speed, *legs[2:], home]).run() is ACCEPTED
     inav.armed = True
-    for nav in [(3, 5, 1, 1, 0, 0), (3, 5, 1, 2, 0, 0), (3, 4, 3, 2, 0, 0), (3, 5, 1, 3, 0, 0), (3, 5, 1, 3, 4, 0)]:
+    for nav in [
+        (3, 5, 1, 1, 0, 0),
+        (3, 5, 1, 2, 0, 0),
+        (3, 4, 3, 2, 0, 0),
+        (3, 5, 1, 3, 0, 0),
+        (2, 2, 4, 4, 0, 0),
+        (2, 9, 4, 4, 11, 0),
+    ]:
         inav.nav = nav
         world.run(3)
     heard = [message for _, message in station.heard]
-    assert [m.seq for m in heard if m.get_type() == "MISSION_ITEM_REACHED"] == [1, 3, 4]
+    assert [m.seq for m in heard if m.get_type() == "MISSION_ITEM_REACHED"] == [1, 3, 4, 5]
     current = [(m.seq, m.mission_state) for m in heard if m.get_type() == "MISSION_CURRENT"]
-    wanted = [(1, 3), (3, 3), (4, 3), (4, 5)]
+    wanted = [(1, 3), (3, 3), (4, 3), (5, 3), (5, 5)]
     assert [now for n, now in enumerate(current) if now in wanted and (n == 0 or now != current[n - 1])] == wanted
-    assert all(m.total == 4 for m in heard if m.get_type() == "MISSION_CURRENT" and m.seq)
+    assert all(m.total == 5 for m in heard if m.get_type() == "MISSION_CURRENT" and m.seq)
 
 
 def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -> None:
