@@ -15,31 +15,27 @@ COMMANDS = f"@cmd/v{VERSION}"
 
 
 class Delivery(Enum):
-    """What becomes of a sample that cannot go at once."""
+    """What becomes of a sample that cannot go at once: it is dropped, or waits on the session's thread."""
 
     DROP = "dropped rather than waited for"
-    RELIABLE = "waited for, on a thread of its own"
+    RELIABLE = "reliable"
     REPLY = "a reply to a query"
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One key. `schema`: file name below schemas/, without its ending; None: the payload is raw MAVLink.
-
-    `is_queryable`: it answers a query with what is the case now.
-    """
+    """One key. `schema`: file name below schemas/, without its ending; None: the payload is raw MAVLink."""
 
     suffix: str
     schema: str | None
     delivery: Delivery
-    is_queryable: bool = False
 
 
 TELEMETRY = {group: Key(f"telemetry/{group.value}", group.value, Delivery.DROP) for group in Group}
-STATE = Key("state", "state", Delivery.DROP, is_queryable=True)
+STATE = Key("state", "state", Delivery.DROP)
 EVENT = Key("event", "event", Delivery.RELIABLE)
-MISSION_CURRENT = Key("mission/current", "mission_current", Delivery.RELIABLE, is_queryable=True)
-MISSION_LIST = Key("mission/list", "mission_list", Delivery.REPLY, is_queryable=True)
+MISSION_CURRENT = Key("mission/current", "mission_current", Delivery.RELIABLE)
+MISSION_LIST = Key("mission/list", "mission_list", Delivery.REPLY)
 MISSION_REPORT = Key("mission/report", "mission_report", Delivery.RELIABLE)
 MAVLINK_OUT = Key("mavlink/out", None, Delivery.DROP)
 MAVLINK_IN = Key("mavlink/in", None, Delivery.RELIABLE)

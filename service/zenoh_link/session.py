@@ -18,7 +18,7 @@ Job = Callable[[], None]
 _MAX_WAITING = 256
 _RETRY_S = 2.0
 #: A receiver that is stalled must not hold the daemon's end up; the process may end without a farewell.
-_FAREWELL_S = 0.8
+_FAREWELL_S = 0.6
 
 _log = structlog.get_logger()
 

@@ -92,9 +92,6 @@ def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
     planner.go_on(plan, 0)
     assert bench.board.records() == records_of(judge(plan))
     bench.board.assert_was_treated_well()
-    status = bench.daemon.status()
-    assert status is not None
-    assert (status["requests_lost"], status["bad_checksums"]) == (0, 0)
 
 
 def test_a_router_that_dies_in_the_middle_of_an_upload(start: Starter, tmp_path: Path) -> None:
