@@ -79,6 +79,9 @@ class HarakiriMavlinkMissions:
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult[WpRecord]]:
         """Write the list and read it back."""
+        if self._is_armed() is not False:
+            # The firmware itself does not look: it would take a list, or lose its own, in flight.
+            return PushResult(PushFailure.ARMED)
         wanted = tuple(as_stored(record) for record in records)
         items = [_message(seq, item) for seq, item in enumerate(items_from_records(wanted))] or _NOTHING
         failure = PushFailure.NO_ANSWER

@@ -1,0 +1,238 @@
+"""What every way of storing missions must keep to, whatever the flight controller: one contract, all dialects.
+
+Each runs through the whole bridge against the simulated flight controller that it is for. What is asked of it is what
+ground stations and the store rely on; how it is done is each dialect's own tests' business.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+from conversations import Download, Upload, clear_message, waypoints
+from world import GroundStation, World
+
+from bridge.autosense import SPEEDS
+from bridge.dialects import _DIALECTS
+from bridge.flight_controller import Kind
+from bridge.mission_check import check_list
+from bridge.mission_desk import Delivery, HeldMission
+from bridge.mission_dialect import LIST_IS_GONE, PushFailure
+from bridge.mission_log import Outcome
+from bridge.verdict import Result
+from protocols.mission_item import Command, MissionItem, MissionResult
+from service.simulator.fc_kinds import make_board
+from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+
+ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
+#: A push on MultiWii takes 70 ms a record, on a Harakiri in MAVLink mode seconds for its flash.
+PATIENCE_S, TRIES = 60.0, 100
+
+
+@dataclass(frozen=True)
+class Craft:
+    """A flight controller and the world around it. radius_m: a hit radius that it keeps."""
+
+    world: World
+    station: GroundStation
+    faults: Faults
+    radius_m: float
+
+    def plan(self, count: int, seed: int = 0) -> list[MissionItem]:
+        """A list that it stores without a finding (but for places in single precision)."""
+        return [replace(item, p2=self.radius_m) for item in waypoints(count, seed)]
+
+    def upload(self, items: Sequence[MissionItem]) -> MissionResult | None:
+        return Upload(self.station, items, tries=TRIES).run(PATIENCE_S)
+
+    def download(self) -> list[MissionItem]:
+        return Download(self.station).run(PATIENCE_S)
+
+    def pull(self) -> HeldMission:
+        held: list[Any] = []
+        self.world.bridge.pull_locally(held.append, self.world.now)
+        self.world.wait_until(lambda _: bool(held), PATIENCE_S)
+        assert isinstance(held[0], HeldMission), held[0]
+        return held[0]
+
+    def holds(self, items: Sequence[MissionItem]) -> bool:
+        """Whether it reads as that list; home may be its own, and a place 0.4 m off."""
+        read = self.download()
+        return len(read) == len(items) and all(map(is_alike, read[1:], items[1:]))
+
+    def arm(self) -> None:
+        self.faults.armed = True
+        self.world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 30)
+
+
+def is_alike(one: MissionItem, other: MissionItem) -> bool:
+    near = abs((one.lat_e7 or 0) - (other.lat_e7 or 0)) <= 40 and abs((one.lon_e7 or 0) - (other.lon_e7 or 0)) <= 40
+    return near and replace(one, lat_e7=other.lat_e7, lon_e7=other.lon_e7) == other
+
+
+def harakiri() -> Craft:
+    faults = Faults()
+    world = World(faults=faults, speeds=(115200,))
+    return Craft(world, GroundStation(world), faults, 2.0)
+
+
+def harakiri_mavlink() -> Craft:
+    faults = Faults(extension=False, msp=False)
+    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=SPEEDS)
+    return Craft(world, GroundStation(world), faults, 2.0)
+
+
+def board(kind: str) -> Craft:
+    faults = Faults(boxes=0)
+    world = World(peer=make_board(kind, faults=faults), speeds=(115200,))
+    return Craft(world, GroundStation(world), faults, 0.0)
+
+
+MAKERS: dict[Kind, Callable[[], Craft]] = {
+    Kind.HARAKIRI_MISSIONS: harakiri,
+    Kind.HARAKIRI_MAVLINK: harakiri_mavlink,
+    Kind.INAV: lambda: board("inav"),
+    Kind.MULTIWII_NAV: lambda: board("multiwii"),
+}
+
+
+def test_every_dialect_is_here() -> None:
+    assert MAKERS.keys() == _DIALECTS.keys()
+
+
+def assert_is_true(craft: Craft, delivery: Delivery, old: Sequence[MissionItem], new: Sequence[MissionItem]) -> None:
+    """What was said of a push that was cut off is what the flight controller holds. UNCERTAIN promises nothing."""
+    if delivery.ack is ACCEPTED:
+        assert craft.holds(new)
+    elif delivery.text not in {failure.value for failure in LIST_IS_GONE}:
+        assert craft.holds(old)
+    elif delivery.text != PushFailure.UNCERTAIN.value:
+        assert craft.download() == []
+
+
+@pytest.fixture(params=MAKERS, ids=lambda kind: kind.name)
+def craft(request: pytest.FixtureRequest) -> Craft:
+    made = MAKERS[request.param]()
+    made.world.wait_until(lambda w: w.kind is request.param, 20)
+    made.world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 20)
+    made.world.run(1)
+    return made
+
+
+def test_what_is_accepted_is_there_and_is_read_by_everybody(craft: Craft) -> None:
+    sent = craft.plan(25)
+    assert craft.upload(sent) is ACCEPTED
+    assert craft.world.store.outcomes() == [Outcome.VERIFIED]
+    assert craft.holds(sent)
+    held = craft.pull()
+    assert held.identity.count == len(held.records)
+    assert all(isinstance(record.pack(), bytes) for record in held.records)
+    assert [item.seq for item in held.items] == list(range(25))
+    another = GroundStation(craft.world, "other", sysid=254)
+    assert Download(another).run(PATIENCE_S) == craft.download()
+
+
+def test_what_is_read_can_be_written_again_and_changes_nothing(craft: Craft) -> None:
+    assert craft.upload(craft.plan(12)) is ACCEPTED
+    before = craft.pull()
+    assert craft.upload(craft.download()) is ACCEPTED
+    assert craft.world.store.missions[-1][0].verdict.findings == ()
+    after = craft.pull()
+    assert (after.records, after.items[1:]) == (before.records, before.items[1:])
+
+
+def test_the_next_list_takes_the_place_of_the_one_before(craft: Craft) -> None:
+    for count, seed in ((20, 1), (5, 2), (9, 3)):
+        assert craft.upload(craft.plan(count, seed)) is ACCEPTED
+        assert craft.holds(craft.plan(count, seed))
+
+
+def test_a_cleared_one_reads_as_none_and_takes_a_list_again(craft: Craft) -> None:
+    assert craft.upload(craft.plan(6)) is ACCEPTED
+    craft.station.send(clear_message())
+    craft.world.run(6)
+    assert craft.world.store.outcomes()[-1] is Outcome.VERIFIED
+    assert craft.download() == []
+    assert (craft.pull().records, craft.pull().items) == ((), ())
+    assert craft.upload(craft.plan(7)) is ACCEPTED
+    assert craft.holds(craft.plan(7))
+
+
+def test_rejected_lists_change_nothing_and_say_why(craft: Craft) -> None:
+    assert craft.upload(craft.plan(6)) is ACCEPTED
+    good = craft.plan(6, 1)
+    for bad in (
+        good[:1],
+        [replace(good[0], command=Command.NAV_LAND), *good[1:]],
+        [*good[:3], replace(good[3], frame=7)],
+        [*good[:3], replace(good[3], lat_e7=900_000_001)],
+        craft.plan(250, 1),
+        [good[0], replace(good[1], command=Command.NAV_RETURN_TO_LAUNCH, lat_e7=0, lon_e7=0)],
+    ):
+        craft.station.take()
+        assert craft.upload(bad) not in (None, ACCEPTED)
+        assert craft.station.texts()
+        craft.world.run(11)
+    assert craft.holds(craft.plan(6))
+
+
+def test_the_rules_judge_item_by_item_as_they_judge_the_whole(craft: Craft) -> None:
+    found: list[Any] = []
+    craft.world.bridge.runner.start(
+        craft.world.bridge.desk.rules(), lambda rules, _: found.append(rules), craft.world.now
+    )
+    craft.world.wait_until(lambda _: bool(found), 10)
+    (rules,) = found
+    good = craft.plan(4)
+    odd = [replace(good[1], command=command) for command in (*Command, 206)]
+    for middle in itertools.chain.from_iterable(([one], [one, other]) for one in odd for other in odd[:3]):
+        items = [good[0], good[1], *middle, good[2]]
+        whole = check_list(items, rules)
+        check = rules.begin(len(items), None)
+        rejections = [check.take(item) for item in items]
+        assert check.finish() == whole
+        if any(rejections):
+            assert whole.result is Result.REJECTED
+        if whole.result is Result.ACCEPTED:
+            assert whole.items[0].seq == 0
+            assert [item.seq for item in whole.items] == list(range(len(whole.items)))
+
+
+def test_an_armed_craft_is_left_alone(craft: Craft) -> None:
+    assert craft.upload(craft.plan(6)) is ACCEPTED
+    craft.arm()
+    assert craft.upload(craft.plan(8, 1)) is DENIED
+    craft.station.send(clear_message())
+    craft.world.run(3)
+    assert any("isarm" in text for text in craft.station.texts())
+    craft.faults.armed = False
+    craft.world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 30)
+    craft.world.run(3)
+    assert craft.holds(craft.plan(6))
+
+
+@pytest.mark.parametrize("moment", [0.05, 0.3, 0.6])
+def test_a_push_that_loses_its_line_ends_and_says_what_is_left(craft: Craft, moment: float) -> None:
+    assert craft.upload(craft.plan(6)) is ACCEPTED
+    outcome = craft.world.push(craft.plan(60, 1))
+    craft.world.run(moment)
+    craft.world.unplug()
+    craft.world.wait_until(lambda _: bool(outcome), 10)
+    delivery, _ = outcome[0]
+    craft.world.plug()
+    craft.world.wait_until(lambda w: w.is_found and w.bridge.session.vehicle.armed is False, 20)
+    craft.world.run(8)
+    assert_is_true(craft, delivery, craft.plan(6), craft.plan(60, 1))
+
+
+@pytest.mark.parametrize("moment", [0.05, 0.3, 0.6])
+def test_a_stop_ends_a_push_and_says_what_is_left(craft: Craft, moment: float) -> None:
+    assert craft.upload(craft.plan(6)) is ACCEPTED
+    outcome = craft.world.push(craft.plan(100, 1))
+    craft.world.run(moment)
+    craft.world.bridge.abort_missions(craft.world.now)
+    craft.world.wait_until(lambda _: bool(outcome), 10)
+    delivery, _ = outcome[0]
+    craft.world.run(4)
+    assert_is_true(craft, delivery, craft.plan(6), craft.plan(100, 1))
