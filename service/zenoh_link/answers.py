@@ -1,13 +1,13 @@
 """Queries for what is the case now: state, mission/current and mission/list."""
 
-from service.control import MOST, MissionJobs
+from service.control import MissionJobs
 from service.mission_data import Json
 from service.zenoh_link import keys
 from service.zenoh_link.payload import Payloads, strict
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.vehicle_data import VehicleData
 
-_USUAL_LIMIT = 20
+_USUAL_LIMIT, _MAX_LIMIT = 20, 200
 _TIMES = ("received_at", "concluded_at")
 
 
@@ -32,8 +32,8 @@ class Answers:
 
     async def _mission_list(self, question: Question) -> None:
         limit = question.parameter("limit") or str(_USUAL_LIMIT)
-        if not (limit.isascii() and limit.isdigit() and 0 < int(limit) <= MOST):
-            raise QueryRefused("limit must be a whole number, as in mission/list?limit=5")
+        if not (limit.isascii() and limit.isdigit() and 0 < int(limit) <= _MAX_LIMIT):
+            raise QueryRefused(f"limit must be a whole number up to {_MAX_LIMIT}, as in mission/list?limit=5")
         found = (await self._jobs.list_missions(int(limit)))["missions"]
         self._tell(question, keys.MISSION_LIST, {"missions": [_with_units(mission) for mission in found]})
 

@@ -9,12 +9,14 @@ from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.control import MOST, MissionJobs
 from service.mission_data import Json, to_json
-from service.mission_source import MAX_BYTES
 from service.zenoh_link import keys
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _PAYLOAD = "the query's payload"
+#: Files on disk may be larger, but they are not read beside a running link: a mission that fits has some 20 KB.
+_MAX_BYTES = 1 << 20
+_MAX_ITEMS = 1000
 
 
 class Commands:
@@ -54,15 +56,16 @@ class Commands:
 
 async def _items(question: Question) -> list[MissionItem]:
     """Return the mission in the payload: the formats, the reader and its words are those of `naze-bridge check`."""
-    if question.size > MAX_BYTES:
-        raise QueryRefused(f"{_PAYLOAD} is larger than {MAX_BYTES >> 20} MB: send a mission file")
+    if question.size > _MAX_BYTES:
+        raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 20} MB: send a mission file")
     try:
-        # A file of 65,535 items takes a second.
         items = await asyncio.to_thread(read_mission_file, question.payload(), _PAYLOAD)
     except MissionFileError as error:
         raise QueryRefused(str(error)) from None
     if not items:
         raise QueryRefused(f"{_PAYLOAD} holds no mission; mission/clear clears the one on the craft")
+    if len(items) > _MAX_ITEMS:
+        raise QueryRefused(f"{_PAYLOAD} holds {len(items)} items, more than any flight controller takes: shorten it")
     return items
 
 

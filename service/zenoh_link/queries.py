@@ -1,7 +1,9 @@
 """Queries: they come in on zenoh's threads, are dealt with on the event loop, and answered on the session's thread."""
 
 import asyncio
+import threading
 from collections.abc import Awaitable, Callable
+from functools import partial
 
 import structlog
 import zenoh
@@ -12,7 +14,7 @@ from service.zenoh_link.session import SessionThread
 from service.zenoh_link.threads import post
 from storage.store_error import StoreError
 
-#: More at once are refused: each may hold a file of 8 MB.
+#: More at once are refused: each may hold a mission file.
 _MAX_AT_ONCE = 16
 _STOPPED = (
     "the daemon was stopped meanwhile; mission/current tells what the flight controller holds, once it runs again"
@@ -55,17 +57,18 @@ class Question:
 
     def tell(self, data: bytes, encoding: zenoh.Encoding) -> None:
         """Send one reply; more may follow."""
-        self._thread.submit(lambda: self._query.reply(self.name, data, encoding=encoding))
+        self._thread.submit(lambda: self._query.reply(self.name, data, encoding=encoding), is_reply=True)
 
     def refuse(self, error: QueryRefused) -> None:
         """Send the error."""
         body = {"error": str(error)} | ({} if error.result is None else {"result": error.result})
         data = to_json(body).encode()
-        self._thread.submit(lambda: self._query.reply_err(data, encoding=zenoh.Encoding.APPLICATION_JSON))
+        answer = partial(self._query.reply_err, data, encoding=zenoh.Encoding.APPLICATION_JSON)
+        self._thread.submit(answer, is_reply=True)
 
     def end(self) -> None:
         """Say that nothing more follows."""
-        self._thread.submit(self._query.drop)
+        self._thread.submit(self._query.drop, is_reply=True)
 
 
 #: Deals with a question; QueryRefused, ControlError, StoreError and ValueError become the error that is sent.
@@ -79,12 +82,18 @@ class Queries:
         self._thread = thread
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._room = threading.Semaphore(_MAX_AT_ONCE)
 
     def declare(self, session: zenoh.Session, name: str, answerer: Answerer) -> None:
         """Declare the queryable of one key; called on the session's thread."""
 
         def asked(query: zenoh.Query) -> None:
-            post(self._loop, self._begin, Question(query, name, self._thread), answerer)
+            question = Question(query, name, self._thread)
+            if self._room.acquire(blocking=False):
+                post(self._loop, self._begin, question, answerer)
+            else:
+                question.refuse(QueryRefused(f"{_MAX_AT_ONCE} other queries are not answered yet: try again"))
+                question.end()
 
         session.declare_queryable(name, zenoh.handlers.Callback(asked, indirect=False))
 
@@ -95,13 +104,13 @@ class Queries:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _begin(self, question: Question, answerer: Answerer) -> None:
-        if len(self._tasks) >= _MAX_AT_ONCE:
-            question.refuse(QueryRefused(f"{_MAX_AT_ONCE} other queries are not answered yet: try again"))
-            question.end()
-            return
         task = self._loop.create_task(self._answer(question, answerer))
         self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(self._ended)
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        self._room.release()
 
     async def _answer(self, question: Question, answerer: Answerer) -> None:
         try:

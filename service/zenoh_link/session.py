@@ -42,9 +42,15 @@ class SessionThread:
         """Begin."""
         self._thread.start()
 
-    def submit(self, job: Job) -> None:
-        """Have something done on the thread; if too much waits already, the oldest is left undone."""
+    def submit(self, job: Job, *, is_reply: bool = False) -> None:
+        """Have something done on the thread; if too much waits already, the oldest is left undone.
+
+        Whoever asks a thousand questions must not displace reports: replies give way themselves.
+        """
         with self._wake:
+            if is_reply and len(self._jobs) >= _MAX_WAITING // 2:
+                self.dropped += 1
+                return
             if len(self._jobs) >= _MAX_WAITING:
                 self._jobs.popleft()
                 self.dropped += 1
