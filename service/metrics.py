@@ -94,6 +94,9 @@ class _State(Collector):
         yield from self._links()
         yield from self._flight_controller()
         yield from self._vehicle()
+        for name, value in self._daemon.followers_status().items():
+            if isinstance(value, int):
+                yield _gauge(name, f"As `naze-bridge status` tells it: {name}.", {}, value)
 
     def _links(self) -> Iterator[Metric]:
         for way in ("received", "sent"):

@@ -110,7 +110,7 @@ class Node:
 
     def status(self) -> Json:
         """Tell how things stand."""
-        return self._presence.status()
+        return self._presence.status() | {"zenoh_dropped": self._thread.dropped + self._publisher.failed}
 
     # On the session's thread.
 

@@ -59,7 +59,8 @@ class Presence:
     def status(self) -> Json:
         """Tell how things stand, for `naze-bridge status`."""
         return {
-            "zenoh": "not open" if not self._own else f"joined to {len(self._neighbours)}",
+            "zenoh": "open" if self._own else "not open",
+            "zenoh_neighbours": len(self._neighbours),
             "zenoh_others_of_this_name": len(self.others),
         }
 
