@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import structlog
 
-from benchmarks import forward, idle, inav, push, resync, search, telemetry, upload
+from benchmarks import fleet, forward, idle, inav, push, resync, search, telemetry, upload, zenoh_link
 from benchmarks.figure import Figure
 from benchmarks.report import keep_json, print_table
 
@@ -20,6 +20,8 @@ _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "search": search.measure,
     "forward": forward.measure,
     "resync": resync.measure,
+    "zenoh": zenoh_link.measure,
+    "fleet": fleet.measure,
 }
 
 

@@ -7,7 +7,6 @@ session and leaves.
 """
 
 import json
-import socket
 import statistics
 import subprocess
 import sys
@@ -18,11 +17,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import zenoh
-
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
-from benchmarks.processes import ENVIRONMENT, NAZE_BRIDGE, ROOT, daemon, free_udp_port, running, wait_for
+from benchmarks.processes import ENVIRONMENT, NAZE_BRIDGE, ROOT, daemon, free_udp_port, wait_for
+from benchmarks.zenoh_programs import client, configuration, cpu_s, router_program
 from protocols.mission_file import write_qgc_wpl
 
 _FEW, _MANY = 5, 50
@@ -52,7 +50,7 @@ def measure() -> list[Figure]:
         pids: list[int] = []
         costs = {}
         for count in (_FEW, _MANY):
-            pids += [stack.enter_context(vehicle(folder, number, endpoint)) for number in range(len(pids), count)]
+            pids += [stack.enter_context(_vehicle(folder, number, endpoint)) for number in range(len(pids), count)]
             _wait_for_vehicles(endpoint, count)
             costs[count] = _cost(folder, count, endpoint, router, pids)
     few, many = costs[_FEW], costs[_MANY]
@@ -85,7 +83,7 @@ def _cost(folder: Path, count: int, endpoint: str, router: int, vehicles: Sequen
     push_s = time.perf_counter() - began_at
     answers = json.loads(pushed.stdout)["vehicles"]
     failed = count - sum(answer["ok"] for answer in answers)
-    with _client(endpoint) as session, session.declare_subscriber("fleet/*/telemetry/*", lambda _: None):
+    with client(endpoint) as session, session.declare_subscriber("fleet/*/telemetry/*", lambda _: None):
         time.sleep(1.0)
         before = cpu_s(router), sum(map(cpu_s, vehicles))
         time.sleep(_WATCHED_S)
@@ -110,46 +108,16 @@ def _wait_for_vehicles(endpoint: str, count: int) -> None:
         states = [json.loads(reply.ok.payload.to_bytes()) for reply in session.get("fleet/*/state") if reply.ok]
         return sum(state["mission"] is not None for state in states) == count
 
-    with _client(endpoint) as session:
+    with client(endpoint) as session:
         wait_for(are_there, f"{count} vehicles know what their flight controllers hold")
 
 
-def _client(endpoint: str) -> zenoh.Session:
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    return zenoh.open(config)
-
-
 @contextmanager
-def router_program(folder: Path) -> Iterator[tuple[str, int]]:
-    """Run a router; yield its endpoint and its process id."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    log = folder / "router.log"
-    with running([sys.executable, str(ROOT / "examples" / "zenoh_router.py"), endpoint], log) as process:
-        wait_for(lambda: b"is up" in log.read_bytes(), "the router is up")
-        yield endpoint, process.pid
-
-
-@contextmanager
-def vehicle(folder: Path, number: int, endpoint: str) -> Iterator[int]:
+def _vehicle(folder: Path, number: int, endpoint: str) -> Iterator[int]:
     """Run a daemon on a simulated Naze that takes commands; yield its process id."""
     own = folder / f"naze-{number}"
     own.mkdir()
-    config = own / "config.toml"
-    config.write_text(
-        f'[zenoh]\nvehicle = "naze-{number}"\nconnect = ["{endpoint}"]\n'
-        'commands = true\ncommands_without_authentication = "I know"\n'
-    )
+    config = configuration(own, f"naze-{number}", endpoint)
     gcs = f"udpin:127.0.0.1:{free_udp_port()}"
     with daemon(own, Path("sim:"), gcs, "--config", str(config)) as process:
         yield process.pid
-
-
-def cpu_s(pid: int) -> float:
-    """Return the seconds for which a process has had a core, by its own clock: far finer than the ticks in /proc.
-
-    The clock's number is made as clock_getcpuclockid(3) makes it on Linux.
-    """
-    return time.clock_gettime(~pid << 3 | 2)

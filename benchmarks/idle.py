@@ -22,7 +22,7 @@ _SETTLING_S = 3.0
 _WATCHED_S = 20.0
 _STARTS = 7
 _DIALECT = "from pymavlink.dialects.v20 import ardupilotmega"
-_LIBRARIES = f"import asyncio, sqlite3, serial, structlog, fastcrc; {_DIALECT}"
+LIBRARIES = f"import asyncio, sqlite3, serial, structlog, fastcrc; {_DIALECT}"
 
 
 def measure() -> list[Figure]:
@@ -38,7 +38,7 @@ def _idle(folder: Path, board: Board) -> list[Figure]:
     with listener() as ground, daemon(folder, board.link, udpout(ground)) as process:
         process.wait_for_event("fc.found")
         percent = cpu_percent(process.pid)
-        resident_mb = _resident_mb(process.pid)
+        memory_mb = resident_mb(process.pid)
     return [
         Figure(
             f"idle daemon, CPU of one core over {_WATCHED_S:.0f} s",
@@ -47,7 +47,7 @@ def _idle(folder: Path, board: Board) -> list[Figure]:
             Floor(bare_percent, "bare polls"),
             3.0,
         ),
-        Figure("idle daemon, resident", resident_mb, "MB", Floor(_libraries_mb(), "its libraries"), 45.0),
+        Figure("idle daemon, resident", memory_mb, "MB", Floor(libraries_mb(LIBRARIES), "its libraries"), 45.0),
     ]
 
 
@@ -85,10 +85,10 @@ def _start_s(program: str) -> float:
     return statistics.median(times)
 
 
-def _libraries_mb() -> float:
-    """Return the resident size of a Python that has loaded the daemon's libraries, and nothing of the daemon."""
+def libraries_mb(libraries: str) -> float:
+    """Return the resident size of a Python that has imported something, and nothing of the daemon."""
     show = "print(open('/proc/self/status').read())"
-    command = [sys.executable, "-c", f"{_LIBRARIES}; {show}"]
+    command = [sys.executable, "-c", f"{libraries}; {show}"]
     result = subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, text=True)
     return _rss_mb(result.stdout)
 
@@ -120,7 +120,8 @@ def _cpu_s(pid: int) -> float:
     return (user + system) / os.sysconf("SC_CLK_TCK")
 
 
-def _resident_mb(pid: int) -> float:
+def resident_mb(pid: int) -> float:
+    """Return how much memory a process has at this moment, megabytes."""
     return _rss_mb(Path(f"/proc/{pid}/status").read_text())
 
 

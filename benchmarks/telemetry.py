@@ -35,7 +35,7 @@ from protocols.msp.frame import MspParser
 from service.simulator.flight import Craft, fly
 from service.simulator.msp_port import MspAnswers, reply
 
-_POLLS_HZ = 100
+POLLS_HZ = 100
 #: With what is polled anyway (STATUS 4, RC 2, three others 2.5 times a second) these make 100 polls a second.
 _WISHES_HZ = {
     messages.MAVLINK_MSG_ID_ATTITUDE: 50,
@@ -44,7 +44,7 @@ _WISHES_HZ = {
 }
 _SETTLING_S = 2.0
 _ANSWERS = 2000
-_ATTITUDES = 1800
+ATTITUDES = 1800
 _NOISE_BYTES = 10_000_000
 _CHUNK_BYTES = 1000
 _SAMPLES = 100
@@ -64,25 +64,25 @@ def _cpu(folder: Path) -> Figure:
         daemon(folder, board.link, udpout(ground)) as process,
     ):
         process.wait_for_event("fc.found")
-        _wish(ground)
+        wish(ground)
         percent = cpu_percent(process.pid)
-    return Figure(f"daemon at {_POLLS_HZ} polls a second, CPU of one core", percent, "%", None, 5.0)
+    return Figure(f"daemon at {POLLS_HZ} polls a second, CPU of one core", percent, "%", None, 5.0)
 
 
 def _latency(folder: Path) -> list[Figure]:
     with (
-        _instant_controller(folder / "instant") as controller,
+        instant_controller(folder / "instant") as controller,
         listener() as ground,
         daemon(folder, folder / "instant", udpout(ground)) as process,
     ):
         process.wait_for_event("fc.found")
-        _wish(ground)
+        wish(ground)
         time.sleep(_SETTLING_S)
-        _drain(ground)
+        drain(ground)
         asked, began_at = controller.asked, time.perf_counter()
         milliseconds = sorted(_wait_for_attitude(ground, controller) * 1000 for _ in range(_ANSWERS))
         polls_hz = (controller.asked - asked) / (time.perf_counter() - began_at)
-    if polls_hz < 0.95 * _POLLS_HZ:
+    if polls_hz < 0.95 * POLLS_HZ:
         raise BenchmarkError(f"only {polls_hz:.0f} polls a second were asked")
     p99 = milliseconds[int(len(milliseconds) * 0.99)]
     return [
@@ -102,7 +102,7 @@ def _noise() -> list[Figure]:
     now = 0.0
     bridge = Bridge(BridgeConfig((115200,)), journal, now)
     bridge.fc_opened(now)
-    ground, controller = Peer("udp", "noise"), _Controller()
+    ground, controller = Peer("udp", "noise"), Controller()
     while "fc.found" not in events:
         now += 0.01
         bridge.tick(now)
@@ -135,7 +135,7 @@ def _noise() -> list[Figure]:
     ]
 
 
-def _wish(ground: socket.socket) -> None:
+def wish(ground: socket.socket) -> None:
     """Ask for the rates, as a ground station does."""
     _, sender = ground.recvfrom(2048)
     for msgid, rate_hz in _WISHES_HZ.items():
@@ -147,7 +147,8 @@ def _frame(message: messages.MAVLink_message) -> bytes:
     return FrameWriter(255, 190).frame(pack(message), 2)
 
 
-def _drain(ground: socket.socket) -> None:
+def drain(ground: socket.socket) -> None:
+    """Read what has come so far, and wait for what comes from now on."""
     ground.setblocking(False)
     try:
         while True:
@@ -156,7 +157,7 @@ def _drain(ground: socket.socket) -> None:
         ground.settimeout(10)
 
 
-def _wait_for_attitude(ground: socket.socket, controller: "_Controller") -> float:
+def _wait_for_attitude(ground: socket.socket, controller: "Controller") -> float:
     """Return how long the next attitude was on its way, seconds."""
     while True:
         data = ground.recv(2048)
@@ -164,15 +165,15 @@ def _wait_for_attitude(ground: socket.socket, controller: "_Controller") -> floa
         for frame in MavlinkSplitter().feed(data):
             if frame.msgid == messages.MAVLINK_MSG_ID_ATTITUDE:
                 (roll,) = struct.unpack_from("<f", frame.payload, 4)
-                return came_at - controller.attitudes_at[round(math.degrees(roll) * 10) % _ATTITUDES]
+                return came_at - controller.attitudes_at[round(math.degrees(roll) * 10) % ATTITUDES]
 
 
-class _Controller:
+class Controller:
     """A flight controller that answers at once. `attitudes_at`: when each attitude (its roll) was given."""
 
     def __init__(self) -> None:
         self.asked = 0
-        self.attitudes_at = [0.0] * _ATTITUDES
+        self.attitudes_at = [0.0] * ATTITUDES
         self._parser = MspParser()
         self._answers = MspAnswers(lambda: Craft(fly(1.0, 0.0, armed=False), False, 1, None))
         self._number = 0
@@ -183,7 +184,7 @@ class _Controller:
         for request in self._parser.feed(data):
             self.asked += 1
             if request.command == Msp.ATTITUDE:
-                self._number = (self._number + 1) % _ATTITUDES
+                self._number = (self._number + 1) % ATTITUDES
                 replies += reply(request.command, struct.pack("<4h", self._number, 0, 0, 0))
                 self.attitudes_at[self._number] = time.perf_counter()
             else:
@@ -192,12 +193,12 @@ class _Controller:
 
 
 @contextmanager
-def _instant_controller(link: Path) -> Iterator[_Controller]:
+def instant_controller(link: Path) -> Iterator[Controller]:
     """Put one behind a pseudo-terminal."""
     near, far = os.openpty()
     tty.setraw(far)
     link.symlink_to(os.ttyname(far))
-    controller = _Controller()
+    controller = Controller()
 
     def serve() -> None:
         while data := os.read(near, 4096):

@@ -1,0 +1,240 @@
+"""What zenoh costs the daemon: time on the way, CPU for each sample, CPU while nobody reads, memory.
+
+Time: from a flight controller's reply at the other end of the terminal to the callback of a subscriber, both in this
+process, with the daemon and the router in two others; beside it a bare put through the same router. CPU: the daemon's
+own parts in this process, fed by hand, with a subscriber in another; turns of our samples, of bare puts of the same
+bytes, and of neither alternate, and what neither costs is taken off both.
+"""
+
+import asyncio
+import json
+import statistics
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import zenoh
+
+from benchmarks.figure import Figure, Floor
+from benchmarks.idle import LIBRARIES, libraries_mb, listener, resident_mb, udpout
+from benchmarks.processes import BenchmarkError, daemon, running, wait_for
+from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, wish
+from benchmarks.zenoh_programs import client, configuration, router_program
+from bridge.vehicle_groups import Group
+from service.connection import parse_fc
+from service.daemon import Daemon
+from service.settings import Settings
+from service.zenoh_link.configuration import make_config
+from service.zenoh_link.keys import TELEMETRY, full
+from service.zenoh_link.node import Node
+from service.zenoh_link.settings import ZenohSettings
+
+_VEHICLE = "naze"
+_SETTLING_S = 2.0
+_WATCHED_S = 15.0
+_RATE_HZ = 100
+_TURN = 100
+_TURNS = 8
+_ANSWERS_A_TURN = 2000
+
+
+def measure() -> list[Figure]:
+    """Measure all four."""
+    with tempfile.TemporaryDirectory() as name, router_program(Path(name)) as (endpoint, _):
+        return [*_latency_and_memory(Path(name), endpoint), *asyncio.run(_cpu(Path(name), endpoint))]
+
+
+def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
+    bare_ms = sorted(_bare_latencies_ms(folder, endpoint))
+    milliseconds: list[float] = []
+    samples: list[float] = []
+    config = configuration(folder, _VEHICLE, endpoint)
+    with (
+        instant_controller(folder / "instant") as controller,
+        listener() as ground,
+        daemon(folder, folder / "instant", udpout(ground), "--config", str(config)) as process,
+        client(endpoint) as session,
+    ):
+        process.wait_for_event("fc.found")
+        wish(ground)
+
+        def heard(sample: zenoh.Sample) -> None:
+            came_at = time.perf_counter()
+            samples.append(came_at)
+            if str(sample.key_expr).endswith("/attitude"):
+                number = round(json.loads(sample.payload.to_bytes())["roll_deg"] * 10) % ATTITUDES
+                milliseconds.append((came_at - controller.attitudes_at[number]) * 1000)
+
+        with session.declare_subscriber(full("fleet", _VEHICLE, "telemetry/*"), heard):
+            time.sleep(_SETTLING_S)
+            drain(ground)
+            samples.clear()
+            milliseconds.clear()
+            time.sleep(_WATCHED_S)
+            rate_hz = len(samples) / _WATCHED_S
+            found = sorted(milliseconds)
+        memory_mb = resident_mb(process.pid)
+    # Some answers, as to IDENT, are of no group.
+    if rate_hz < 0.5 * POLLS_HZ:
+        raise BenchmarkError(f"only {rate_hz:.0f} samples a second came")
+    floor = "a bare put through the router"
+    libraries = f"{LIBRARIES}; import zenoh, cbor2"
+    return [
+        Figure("samples a second that it was measured at", rate_hz, ""),
+        Figure("reply to subscriber, median", statistics.median(found), "ms", Floor(statistics.median(bare_ms), floor)),
+        Figure("reply to subscriber, p99", _p99(found), "ms", Floor(_p99(bare_ms), floor), 5.0),
+        Figure("daemon with zenoh, resident", memory_mb, "MB", Floor(libraries_mb(libraries), "its libraries"), 70.0),
+    ]
+
+
+def _p99(ordered: list[float]) -> float:
+    return ordered[int(len(ordered) * 0.99)]
+
+
+_PUTTER = """
+import json, struct, sys, time, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
+session = zenoh.open(config)
+publisher = session.declare_publisher("floor", congestion_control=zenoh.CongestionControl.DROP)
+while True:
+    publisher.put(struct.pack("<d", time.perf_counter()) + bytes(100))
+    time.sleep(0.01)
+"""
+
+
+def _bare_latencies_ms(folder: Path, endpoint: str) -> list[float]:
+    """Return the times of bare puts; perf_counter() is one clock for all processes of a Linux."""
+    found: list[float] = []
+
+    def heard(sample: zenoh.Sample) -> None:
+        came_at = time.perf_counter()
+        (put_at,) = struct.unpack_from("<d", sample.payload.to_bytes())
+        found.append((came_at - put_at) * 1000)
+
+    with (
+        client(endpoint) as session,
+        session.declare_subscriber("floor", heard),
+        running([sys.executable, "-c", _PUTTER, endpoint], folder / "putter.log"),
+    ):
+        wait_for(lambda: bool(found), "somebody puts")
+        found.clear()
+        time.sleep(_WATCHED_S / 3)
+        return list(found)
+
+
+async def _cpu(folder: Path, endpoint: str) -> list[Figure]:
+    ours, without = (Daemon(Settings(parse_fc("sim:"))) for _ in range(2))
+    fed = _Fed(ours)
+    settings = ZenohSettings(vehicle=_VEHICLE, connect=(endpoint,))
+    key = full(settings.prefix, _VEHICLE, TELEMETRY[Group.ATTITUDE].suffix)
+    node = Node(settings, ours)
+    node.start()
+    try:
+        unread = await _unread_us(fed, _Fed(without))
+        with (
+            zenoh.open(make_config(ZenohSettings(connect=(endpoint,)))) as session,
+            session.declare_publisher("floor", congestion_control=zenoh.CongestionControl.DROP) as bare,
+            running([sys.executable, "-c", _READER, endpoint, key, "floor"], folder / "reader.log"),
+        ):
+            payload = await _first_payload(node, endpoint, key)
+            return [*await _sample_us(node, bare, payload), *unread]
+    finally:
+        await node.close()
+
+
+async def _first_payload(node: Node, endpoint: str, key: str) -> bytes:
+    """Publish until a subscriber has heard it, and return what it has heard."""
+    payloads: list[bytes] = []
+    with (
+        client(endpoint) as session,
+        session.declare_subscriber(key, lambda sample: payloads.append(sample.payload.to_bytes())),
+    ):
+        while not payloads:
+            node.telemetry(frozenset({Group.ATTITUDE}))
+            await asyncio.sleep(0.05)
+    await asyncio.sleep(_SETTLING_S)
+    return payloads[0]
+
+
+class _Fed:
+    """A daemon whose flight controller is played by hand, in a time of its own."""
+
+    def __init__(self, daemon: Daemon) -> None:
+        self._daemon = daemon
+        self._controller = Controller()
+        # An hour ahead: no timer of the loop runs before its time has been played.
+        self._now = asyncio.get_running_loop().time() + 3600
+        daemon.bridge.fc_opened(self._now)
+        while daemon.bridge.session.vehicle.attitude is None:
+            self.step()
+
+    def step(self) -> int:
+        """Let a hundredth of a second pass; return how many answers came in it."""
+        bridge, before = self._daemon.bridge, self._controller.asked
+        self._now += 0.01
+        bridge.tick(self._now)
+        # An answer may bring the next question; flush() would write it to a port that is not open.
+        while output := bridge.take_fc_output():
+            bridge.fc_received(self._controller.answer(b"".join(output)), self._now)
+        self._daemon.flush()
+        return self._controller.asked - before
+
+
+async def _unread_us(with_zenoh: _Fed, without: _Fed) -> list[Figure]:
+    await asyncio.sleep(_SETTLING_S)
+    costs: tuple[list[float], list[float]] = ([], [])
+    for _ in range(_TURNS):
+        for fed, found in zip((with_zenoh, without), costs, strict=True):
+            answers, began_at = 0, time.process_time()
+            while answers < _ANSWERS_A_TURN:
+                answers += fed.step()
+            found.append((time.process_time() - began_at) / answers * 1e6)
+            await asyncio.sleep(0)
+    on, off = map(statistics.median, costs)
+    return [
+        Figure("an answer dealt with, zenoh on and nobody reads, CPU", on, "us", Floor(off, "the same without zenoh")),
+        Figure("what zenoh costs there", max(on - off, 0.0), "us", None, 10.0),
+    ]
+
+
+_READER = """
+import json, sys, time, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
+session = zenoh.open(config)
+readers = [session.declare_subscriber(key, lambda sample: None) for key in sys.argv[2:]]
+time.sleep(1e6)
+"""
+
+
+async def _sample_us(node: Node, bare: zenoh.Publisher, payload: bytes) -> list[Figure]:
+    async def turn(act: Callable[[], object]) -> float:
+        began_at = time.process_time()
+        for _ in range(_TURN):
+            act()
+            await asyncio.sleep(1 / _RATE_HZ)
+        return (time.process_time() - began_at) / _TURN * 1e6
+
+    attitude = frozenset({Group.ATTITUDE})
+    acts: list[Callable[[], object]] = [lambda: node.telemetry(attitude), lambda: bare.put(payload), lambda: None]
+    costs: list[list[float]] = [[], [], []]
+    for _ in range(_TURNS):
+        for act, found in zip(acts, costs, strict=True):
+            found.append(await turn(act))
+    ours, floor, neither = map(statistics.median, costs)
+    return [
+        Figure(
+            f"a sample published, {_RATE_HZ} a second, CPU",
+            ours - neither,
+            "us",
+            Floor(floor - neither, "a bare put of its bytes"),
+            1.5,
+            times_floor=True,
+        )
+    ]
