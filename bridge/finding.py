@@ -1,8 +1,9 @@
 """A finding: one thing about a mission that its pilot must hear of."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from protocols.mission_item import MissionResult
+from protocols.mission_item import MissionItem, MissionResult
 
 DROPPED = "dropped"
 REJECTED = "rejected"
@@ -10,6 +11,9 @@ CLEARED = "cleared"
 
 _STATUSTEXT_LENGTH = 50
 _LABELS = {"lat_e7": "lat", "lon_e7": "lon", "alt_m": "height"}
+
+#: Makes a finding of an item: field, value as sent, what it becomes, why.
+Note = Callable[[MissionItem, str, float | None, float | str | None, str], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,12 +14,12 @@ from bridge.mission_check import (
     refuse_frame,
     refuse_position,
 )
-from bridge.nav_items import AS_SET, GROUND_SPEED, home_item, items_from_records
+from bridge.nav_items import home_item, items_from_records
 from bridge.nav_jumps import Jumps
+from bridge.nav_landing import placed_landing
 from bridge.nav_rules import (
     HEADING,
     LANDS,
-    LEAST_SPEED_CMS,
     NAV_RULES,
     REPEATS,
     ROI_COMMANDS,
@@ -29,6 +29,7 @@ from bridge.nav_rules import (
     NavRule,
     Whole,
 )
+from bridge.nav_speed import LegSpeed
 from bridge.verdict import Result, Verdict
 from protocols.float32 import is_single
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
@@ -36,7 +37,6 @@ from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord
 
 #: So high a single-precision number still holds a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
-_MAX_SPEED_CMS = 32767
 #: DO_CHANGE_SPEED, param3: none, no change, as set.
 _NO_THROTTLE = (0, -1, -2)
 
@@ -71,8 +71,7 @@ class NavCheck(ListCheck):
         self._records: list[NavRecord] = []
         self._jumps = Jumps(back_only=profile.jumps_back_only)
         self._sent_as: dict[int, int] = {}
-        self._speed_cms = 0
-        self._speed_unused: MissionItem | None = None  # the last change of speed, until a leg is flown with it
+        self._speed = LegSpeed()
         self._special: dict[int, Callable[[MissionItem], Rejection | None]] = {
             Command.CONDITION_YAW: self._take_heading,
             Command.DO_SET_ROI_NONE: self._take_roi_none,
@@ -112,17 +111,15 @@ class NavCheck(ListCheck):
         """Keep one item as a record; every value that does not survive becomes a finding."""
         if rule.position and (rejection := refuse_position(item)):
             return rejection
-        if rule.height is not Height.UNUSED and not math.isfinite(item.alt_m):
+        if not math.isfinite(item.alt_m):
             return self._drop(item, "alt_m", given(item.alt_m), "height is not a number")
-        if item.command == Command.NAV_LAND and missing_coordinate(item):
-            if self._records and self._records[-1].action == NavAction.RTH:
+        if item.command == Command.NAV_LAND:
+            if missing_coordinate(item) and self._records and self._records[-1].action == NavAction.RTH:
                 self._records[-1] = replace(self._records[-1], p1=LANDS.high)
                 return self._drop(item, "command", item.command, "the RTL before it lands now")
-            item = self._landing_where_it_is(item)
+            item = placed_landing(item, self._records, self._note)
         if rule.position and (missing := missing_coordinate(item)):
             return self._drop(item, *missing, "it has no coordinates")
-        if item.command == Command.NAV_LAND and _centimetres(item.alt_m) <= 0:
-            item = self._landing_from_where_it_is(item)
         p1 = self._fit(item, "p1", item.p1, rule.p1)
         for name in ("p2", "p3", "p4"):
             self._fit(item, name, getattr(item, name), UNUSED)
@@ -134,7 +131,7 @@ class NavCheck(ListCheck):
     def _record(self, item: MissionItem, rule: NavRule, p1: int) -> NavRecord:
         place = (item.lat_e7 or 0, item.lon_e7 or 0)
         alt_cm, datum = self._height(item, rule)
-        speed = self._speed_cms
+        speed = self._speed.cms
         match item.command:
             case Command.NAV_RETURN_TO_LAUNCH:
                 return NavRecord(NavAction.RTH, 0, 0, alt_cm, p1)
@@ -154,27 +151,6 @@ class NavCheck(ListCheck):
         if item.command == Command.NAV_LOITER_TURNS:
             self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "it flies no circles")
         return NavRecord(NavAction.WAYPOINT, *place, alt_cm, speed, 0, datum)
-
-    def _landing_where_it_is(self, item: MissionItem) -> MissionItem:
-        """Give a LAND without coordinates those of the leg before."""
-        before = self._leg_before()
-        if before is None:
-            return item
-        self._note(item, "lat_e7", item.lat_e7, before.lat_e7, "not given, where it is")
-        self._note(item, "lon_e7", item.lon_e7, before.lon_e7, "not given, where it is")
-        return replace(item, lat_e7=before.lat_e7, lon_e7=before.lon_e7)
-
-    def _landing_from_where_it_is(self, item: MissionItem) -> MissionItem:
-        """Have it fly to the landing place as high as before: INAV goes there at the height that LAND has."""
-        before = self._leg_before()
-        if before is None or before.alt_cm <= 0:
-            return item
-        self._note(item, "alt_m", item.alt_m, before.alt_cm / 100, "flown there, then landed")
-        frame = Frame.GLOBAL if before.p3 & 1 else Frame.GLOBAL_RELATIVE_ALT
-        return replace(item, alt_m=before.alt_cm / 100, frame=int(frame))
-
-    def _leg_before(self) -> NavRecord | None:
-        return next((record for record in reversed(self._records) if record.action in LEGS), None)
 
     def _take_heading(self, item: MissionItem) -> Rejection | None:
         """CONDITION_YAW becomes SET_HEAD: an absolute heading, turned to at the flight controller's own rate."""
@@ -208,19 +184,10 @@ class NavCheck(ListCheck):
         """DO_CHANGE_SPEED is the speed of the legs that follow."""
         if not self._profile.leg_speed:
             return self._drop(item, "command", item.command, "its legs have no speeds")
-        if math.isfinite(item.p1) and item.p1 not in (0, GROUND_SPEED):
-            return self._drop(item, "p1", item.p1, "speed over ground only")
-        if not math.isfinite(item.p2) or (item.p2 < 0 and item.p2 != AS_SET):
-            return self._drop(item, "p2", given(item.p2), "it changes nothing")
-        if item.p1 != GROUND_SPEED:
-            self._note(item, "p1", given(item.p1), GROUND_SPEED, "speed over ground")
-        self._speed_cms = 0
-        if item.p2 != AS_SET:
-            self._speed_cms = min(max(round(min(item.p2, _MAX_SPEED_CMS) * 100), LEAST_SPEED_CMS), _MAX_SPEED_CMS)
-            if not is_single(item.p2, self._speed_cms / 100):
-                self._note(item, "p2", item.p2, self._speed_cms / 100, "0.5..327.67 m/s in cm/s")
+        if fault := self._speed.fault(item):
+            return self._drop(item, *fault)
+        self._speed.change(item, self._note)
         self._unused(item, "CHANGE_SPEED", *(() if item.p3 in _NO_THROTTLE else ("p3",)), "p4")
-        self._speed_unused = item
         return None
 
     def _refuse_kept_list(self) -> Rejection | None:
@@ -228,8 +195,8 @@ class NavCheck(ListCheck):
             return reject(MissionResult.INVALID, None, "count", self._count, "no waypoint is left to fly to")
         if rejection := self._jumps.aim(self._records, self._note):
             return rejection
-        if self._speed_unused is not None:
-            self._drop(self._speed_unused, "command", self._speed_unused.command, "no leg follows")
+        if lost := self._speed.waiting:
+            self._drop(lost, "command", lost.command, "no leg follows")
         return None
 
     def _conclude(self) -> Verdict[NavRecord]:
@@ -240,7 +207,7 @@ class NavCheck(ListCheck):
 
     def _keep(self, item: MissionItem, record: NavRecord) -> None:
         if record.action in LEGS:
-            self._speed_unused = None
+            self._speed.waiting = None
         self._records.append(record)
 
     def _drop(self, item: MissionItem, name: str, was: float | None, why: str) -> Rejection | None:

@@ -1,16 +1,13 @@
 """Where the JUMPs of a list go, as the flight controller counts: records from 1, without what was dropped or folded."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from bridge.finding import Rejection, reject
+from bridge.finding import Note, Rejection, reject
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import LEGS, NavRecord
 
 #: INAV does not arm with a JUMP to a nearer record (navigation.c, navigationIsBlockingArming).
 _NEAREST = 2
-
-Note = Callable[[MissionItem, str, float | None, float | str | None, str], None]
 
 
 @dataclass(slots=True)

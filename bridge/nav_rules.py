@@ -70,7 +70,6 @@ def multiwii_profile(capacity: int = NAV_CAPACITY) -> NavProfile:
 class Height(Enum):
     """What a command's height is."""
 
-    UNUSED = auto()
     FLOWN = auto()
     #: The way home's, where it may have one.
     RTH = auto()

@@ -88,17 +88,14 @@ class NavInfo:
 
 
 class NavMode(IntEnum):
-    """What the navigation does, as MSP_NAV_STATUS tells."""
+    """The modes in MSP_NAV_STATUS in which a mission is flown."""
 
-    NONE = 0
-    HOLD = 1
     RTH = 2
     MISSION = 3
-    EMERGENCY = 15
 
 
 class NavState(IntEnum):
-    """The states in MSP_NAV_STATUS that mean "it is there"."""
+    """The states in MSP_NAV_STATUS that mean "it is there"; the others are on the way."""
 
     HOLD_TIMED = 4
     LAND_IN_PROGRESS = 9
@@ -154,11 +151,6 @@ def decode_wp(payload: bytes) -> tuple[int, NavRecord] | None:
     number, *fields = _WP.unpack_from(payload)
     record = NavRecord(*fields)
     return number, replace(record, p3=0) if record.action == NavAction.JUMP else record
-
-
-def unpack_nav_record(data: bytes) -> NavRecord:
-    """Read one record from exactly the 20 bytes that `pack` makes."""
-    return NavRecord(*_BODY.unpack(data))
 
 
 def decode_info(payload: bytes) -> NavInfo | None:

@@ -1,0 +1,29 @@
+"""Where a LAND lands that does not say so: ground stations send it without a place, or with height 0."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from bridge.finding import Note
+from bridge.mission_check import missing_coordinate
+from protocols.mission_item import Frame, MissionItem
+from protocols.msp.nav import LEGS, NavRecord
+
+
+def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) -> MissionItem:
+    """Give a LAND the place and the height of the leg before, as far as it has none of its own.
+
+    INAV flies to the place at the height that LAND has: at height 0 it would do so through whatever stands there.
+    """
+    before = next((record for record in reversed(records) if record.action in LEGS), None)
+    if before is None:
+        return item
+    if missing_coordinate(item):
+        note(item, "lat_e7", item.lat_e7, before.lat_e7, "not given, where it is")
+        note(item, "lon_e7", item.lon_e7, before.lon_e7, "not given, where it is")
+        item = replace(item, lat_e7=before.lat_e7, lon_e7=before.lon_e7)
+    if round(item.alt_m * 100) <= 0 < before.alt_cm:
+        height_m = before.alt_cm / 100
+        note(item, "alt_m", item.alt_m, height_m, "flown there, then landed")
+        frame = Frame.GLOBAL if before.p3 & 1 else Frame.GLOBAL_RELATIVE_ALT
+        item = replace(item, alt_m=height_m, frame=int(frame))
+    return item
