@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import structlog
 
-from benchmarks import fleet, forward, idle, inav, push, resync, search, telemetry, upload, zenoh_link
+from benchmarks import fleet, forward, idle, inav, push, resync, search, status_page, telemetry, upload, zenoh_link
 from benchmarks.figure import Figure
 from benchmarks.report import keep_json, print_table
 
@@ -22,6 +22,7 @@ _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "resync": resync.measure,
     "zenoh": zenoh_link.measure,
     "fleet": fleet.measure,
+    "status-page": status_page.measure,
 }
 
 
