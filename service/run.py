@@ -83,7 +83,7 @@ async def _main(settings: Settings, load: Callable[[], Settings], socket_path: P
     if zenoh_node is not None:
         zenoh_node.start()
     if page is not None:
-        await page.start()
+        page.start()
     try:
         await run_until_signal(daemon, Notifier(), load)
     finally:

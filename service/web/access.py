@@ -7,30 +7,36 @@ needs the token in a header, which no other site can make a browser send.
 
 import ipaddress
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from http import HTTPStatus
 
 import structlog
-from aiohttp import web
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.mission_data import to_json
 from service.web.token import Token
 
-Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+Handler = Callable[[Request], Awaitable[Response]]
 
+#: The connection carries no second request (service.web.door).
 _HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self';"
-    " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cache-Control": "no-store",
+    b"content-security-policy": b"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self';"
+    b" connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    b"x-content-type-options": b"nosniff",
+    b"referrer-policy": b"no-referrer",
+    b"cross-origin-resource-policy": b"same-origin",
+    b"cross-origin-opener-policy": b"same-origin",
+    b"cache-control": b"no-store",
+    b"connection": b"close",
 }
 #: Names below these are given in a local network; nobody can buy one.
 _LOCAL = (".local", ".lan", ".home.arpa", ".internal", ".localhost")
 _HOST = re.compile(r"(?P<name>\[[^\]]*\]|[^:\[\]]+)(:[0-9]*)?")
 _WRONG_NAME = "Open this page by the Pi's address in numbers, or by its local name."
-_NO_BODY = "This takes no body."
+_FAILED = "The daemon has failed to answer; its log says more."
 _log = structlog.get_logger()
 
 
@@ -55,41 +61,59 @@ def is_local_name(host: str) -> bool:
     return True
 
 
-def check_token(request: web.Request, token: Token | None) -> None:
+def check_token(request: Request, token: Token | None) -> None:
     """Refuse who does not show the token."""
     if token is None:
         raise Refused(HTTPStatus.FORBIDDEN, "There is no token, so nothing can be changed from here; the log says why.")
-    if not token.is_shown_by(request.headers.get("Authorization")):
-        _log.warning("web.wrong_token", peer=request.remote, path=request.path)
+    if not token.is_shown_by(request.headers.get("authorization")):
+        peer = None if request.client is None else request.client.host
+        _log.warning("web.wrong_token", peer=peer, path=request.url.path)
         raise Refused(HTTPStatus.FORBIDDEN, f"This needs the token that stands in {token.path} on the Pi.")
 
 
-@web.middleware
-async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
+def guarded(handler: Handler) -> Handler:
     """Let a request through to its handler, and make an answer of whatever comes of it."""
-    try:
-        if not is_local_name(request.host):
-            raise Refused(HTTPStatus.MISDIRECTED_REQUEST, _WRONG_NAME)
-        if request.can_read_body:
-            raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _NO_BODY)
-        return await handler(request)
-    except Refused as refusal:
-        return web.json_response({"error": str(refusal)}, status=refusal.status)
-    except web.HTTPException as answer:
-        return web.json_response({"error": answer.reason}, status=answer.status, headers=_allowed(answer))
-    except Exception as error:
-        _log.error("web.failed", path=request.path, why=repr(error), exc_info=error)
-        text = "The daemon has failed to answer; its log says more."
-        return web.json_response({"error": text}, status=HTTPStatus.INTERNAL_SERVER_ERROR)
+
+    async def answer(request: Request) -> Response:
+        try:
+            if not is_local_name(request.headers.get("host", "")):
+                raise Refused(HTTPStatus.MISDIRECTED_REQUEST, _WRONG_NAME)
+            if request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers:
+                raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "This takes no body.")
+            return await handler(request)
+        except Refused as refusal:
+            return error_answer(refusal.status, str(refusal))
+        except Exception as error:
+            _log.error("web.failed", path=request.url.path, why=repr(error), exc_info=error)
+            return error_answer(HTTPStatus.INTERNAL_SERVER_ERROR, _FAILED)
+
+    return answer
 
 
-async def finish_headers(_request: web.Request, response: web.StreamResponse) -> None:
-    """Tell the browser what it must not do; the connection carries no second request (service.web.door)."""
-    for name, value in _HEADERS.items():
-        response.headers.setdefault(name, value)
-    response.headers.popall("Server", None)
-    response.force_close()
+async def not_found(_request: Request, error: Exception) -> Response:
+    """Answer what no handler is there for."""
+    assert isinstance(error, HTTPException)
+    return error_answer(HTTPStatus(error.status_code), error.detail, error.headers)
 
 
-def _allowed(answer: web.HTTPException) -> dict[str, str]:
-    return {"Allow": answer.headers["Allow"]} if "Allow" in answer.headers else {}
+def error_answer(status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None) -> Response:
+    """Say in one sentence why something is not done."""
+    return Response(to_json({"error": text}), status, headers, "application/json")
+
+
+class SafeHeaders:
+    """Tells the browser with every answer what it must not do."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request (ASGI)."""
+
+        async def send_safely(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                given = {name for name, _ in message["headers"]}
+                message["headers"] += [each for each in _HEADERS.items() if each[0] not in given]
+            await send(message)
+
+        await self._app(scope, receive, send_safely)

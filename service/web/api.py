@@ -14,7 +14,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import asdict
 from http import HTTPStatus
 
-from aiohttp import web
+from starlette.requests import Request
+from starlette.responses import Response
 
 from protocols.mission_item import MissionItem
 from service.control import MOST, ControlError, MissionJobs
@@ -22,7 +23,7 @@ from service.daemon import Daemon
 from service.metrics import CONTENT_TYPE, Metrics
 from service.mission_data import Json, mission_items, to_json
 from service.version import version
-from service.web.access import Refused, check_token
+from service.web.access import Handler, Refused, check_token
 from service.web.comparison import difference, shown, stored_mission
 from service.web.restoring import Restoring
 from service.web.token import Token
@@ -41,19 +42,19 @@ class Api:
         self._metrics = Metrics(daemon)
         self.restoring = Restoring(self._jobs)
 
-    def routes(self) -> list[web.RouteDef]:
-        """Return the table above."""
-        return [
-            web.get("/api/state", self._state),
-            web.get("/api/held", self._held),
-            web.get("/api/missions", self._missions),
-            web.get("/api/missions/{number}", self._mission),
-            web.get("/api/missions/{number}/difference/{other}", self._difference),
-            web.post("/api/missions/{number}/restore", self._restore),
-            web.get("/metrics", self._render_metrics),
-        ]
+    def handlers(self) -> dict[tuple[str, str], Handler]:
+        """Return the table above: method, path, and who answers."""
+        return {
+            ("GET", "/api/state"): self._state,
+            ("GET", "/api/held"): self._held,
+            ("GET", "/api/missions"): self._missions,
+            ("GET", "/api/missions/{number}"): self._mission,
+            ("GET", "/api/missions/{number}/difference/{other}"): self._difference,
+            ("POST", "/api/missions/{number}/restore"): self._restore,
+            ("GET", "/metrics"): self._render_metrics,
+        }
 
-    async def _state(self, _request: web.Request) -> web.Response:
+    async def _state(self, _request: Request) -> Response:
         daemon = self._daemon
         try:
             listed = (await self._jobs.list_missions(1))["missions"]
@@ -74,7 +75,7 @@ class Api:
             }
         )
 
-    async def _held(self, _request: web.Request) -> web.Response:
+    async def _held(self, _request: Request) -> Response:
         """Tell what was last read: a stranger who asks keeps the flight controller's line free."""
         held = self._daemon.bridge.desk.held
         if held is None:
@@ -87,32 +88,32 @@ class Api:
             }
         )
 
-    async def _missions(self, _request: web.Request) -> web.Response:
+    async def _missions(self, _request: Request) -> Response:
         return _json(await _told(self._jobs.list_missions(_LISTED)))
 
-    async def _mission(self, request: web.Request) -> web.Response:
+    async def _mission(self, request: Request) -> Response:
         mission = await self._find(request, "number")
         return await _made(lambda: stored_mission(mission))
 
-    async def _difference(self, request: web.Request) -> web.Response:
+    async def _difference(self, request: Request) -> Response:
         first, second = await self._find(request, "number"), await self._find(request, "other")
         return await _made(lambda: {"rows": difference(_sent(first), _sent(second))})
 
-    async def _restore(self, request: web.Request) -> web.Response:
+    async def _restore(self, request: Request) -> Response:
         check_token(request, self._token)
         await self.restoring.begin(_number(request, "number"))
         return _json({"begun": True}, HTTPStatus.ACCEPTED)
 
-    async def _render_metrics(self, _request: web.Request) -> web.Response:
-        return web.Response(body=self._metrics.render(), headers={"Content-Type": CONTENT_TYPE})
+    async def _render_metrics(self, _request: Request) -> Response:
+        return Response(self._metrics.render(), media_type=CONTENT_TYPE)
 
-    async def _find(self, request: web.Request, name: str) -> Json:
+    async def _find(self, request: Request, name: str) -> Json:
         """Return the stored mission whose number the path has under this name."""
         return await _told(self._jobs.show_mission(_number(request, name)))
 
 
-def _number(request: web.Request, name: str) -> int:
-    text = request.match_info[name]
+def _number(request: Request, name: str) -> int:
+    text = request.path_params[name]
     if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
         raise Refused(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is no mission's number.")
     return int(text)
@@ -132,11 +133,11 @@ async def _told(asked: Awaitable[Json]) -> Json:
         raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
 
 
-async def _made(make: Callable[[], Json]) -> web.Response:
+async def _made(make: Callable[[], Json]) -> Response:
     """Make an answer of hundreds of items beside the loop that serves the links."""
     text = await asyncio.to_thread(lambda: to_json(make()))
-    return web.Response(text=text, content_type="application/json")
+    return Response(text, media_type="application/json")
 
 
-def _json(value: Json, status: HTTPStatus = HTTPStatus.OK) -> web.Response:
-    return web.Response(text=to_json(value), status=status, content_type="application/json")
+def _json(value: Json, status: HTTPStatus = HTTPStatus.OK) -> Response:
+    return Response(to_json(value), status, media_type="application/json")

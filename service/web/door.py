@@ -19,13 +19,14 @@ MAX_IN_A_SECOND_FROM_ONE = 100
 
 
 class Door:
-    """Counts connections. `lifetime_s`: after so long each is cut off. `turned_away`: how many found no room."""
+    """Counts connections. `lifetime_s`: after so long each is cut off."""
 
     def __init__(self, lifetime_s: float = LIFETIME_S) -> None:
         self.lifetime_s = lifetime_s
+        #: Connections that were let in.
+        self.transports: set[asyncio.Transport] = set()
         self._inside: Counter[str] = Counter()
         self._lately: deque[tuple[float, str]] = deque(maxlen=MAX_IN_A_SECOND)
-        self.turned_away = 0
 
     def admit(self, address: str, now: float) -> bool:
         """Let a connection in, or not; now: seconds. Who was let in leaves by `leave`."""
@@ -38,7 +39,6 @@ class Door:
             or len(self._lately) >= MAX_IN_A_SECOND
             or lately >= MAX_IN_A_SECOND_FROM_ONE
         ):
-            self.turned_away += 1
             return False
         self._inside[address] += 1
         self._lately.append((now, address))
@@ -50,6 +50,11 @@ class Door:
         if not self._inside[address]:
             del self._inside[address]
 
+    def close(self) -> None:
+        """Hang up on everybody who is inside."""
+        for transport in list(self.transports):
+            transport.abort()
+
 
 class BoundedConnection(asyncio.Protocol):
     """Stands between a connection and the HTTP protocol that `serve` makes for it."""
@@ -59,6 +64,7 @@ class BoundedConnection(asyncio.Protocol):
         self._serve = serve
         self._loop = asyncio.get_running_loop()
         self._address = ""
+        self._transport: asyncio.Transport | None = None
         self._inner: asyncio.Protocol | None = None
         self._end: asyncio.TimerHandle | None = None
 
@@ -70,14 +76,17 @@ class BoundedConnection(asyncio.Protocol):
             transport.abort()
             return
         self._address = peer[0]
+        self._transport = transport
+        self._door.transports.add(transport)
         self._end = self._loop.call_later(self._door.lifetime_s, transport.abort)
         self._inner = self._serve()
         self._inner.connection_made(transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Make room."""
-        if self._inner is not None and self._end is not None:
+        if self._inner is not None and self._transport is not None and self._end is not None:
             self._end.cancel()
+            self._door.transports.discard(self._transport)
             self._door.leave(self._address)
             self._inner.connection_lost(exc)
 

@@ -3,17 +3,21 @@
 import asyncio
 import logging
 from contextlib import suppress
-from functools import partial
 
 import structlog
-from aiohttp import web
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.routing import Route
+from uvicorn.config import Config
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.server import ServerState
 
 from service.daemon import Daemon
-from service.web.access import finish_headers, guarded
+from service.web.access import SafeHeaders, guarded, not_found
 from service.web.api import Api
 from service.web.door import BoundedConnection, Door
 from service.web.settings import WebSettings
-from service.web.static_files import static_routes
+from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
 
 #: An access point's address may come up after the daemon: it is waited for.
@@ -24,55 +28,77 @@ _log = structlog.get_logger()
 
 
 class WebServer:
-    """The page of one daemon. A page that cannot be served is said in the log and tried again; the bridge goes on."""
+    """The page of one daemon. A page that cannot be served is said in the log and tried again; the bridge goes on.
+
+    Of uvicorn it takes the protocol alone: its server would take signals and the loop into its own hands.
+    """
 
     def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
-        self._settings = settings
+        self._address = settings.listen
         self._api = Api(daemon, _token(daemon, settings))
-        self._task: asyncio.Task[None] | None = None
+        self._config = _config(self._api)
+        self._state = ServerState()
+        self._door = Door()
+        self._listening: asyncio.Task[None] | None = None
         self._server: asyncio.Server | None = None
-        app = web.Application(middlewares=[guarded])
-        app.on_response_prepare.append(finish_headers)
-        app.add_routes([*self._api.routes(), *static_routes()])
-        # What aiohttp itself would log are the mistakes of browsers; ours are logged by `guarded`.
-        silent = logging.Logger("aiohttp", logging.CRITICAL + 1)
-        self._runner = web.AppRunner(
-            app, handle_signals=False, access_log=None, logger=silent, lingering_time=0, shutdown_timeout=0
-        )
 
-    async def start(self) -> None:
+    def start(self) -> None:
         """Begin to listen."""
-        await self._runner.setup()
-        self._task = asyncio.get_running_loop().create_task(self._listen())
+        self._listening = asyncio.get_running_loop().create_task(self._listen())
 
     async def close(self) -> None:
         """Hang up on everybody."""
-        if self._task is not None:
-            self._task.cancel()
+        if self._listening is not None:
+            self._listening.cancel()
             with suppress(asyncio.CancelledError):
-                await self._task
+                await self._listening
         if self._server is not None:
             self._server.close()
         await self._api.restoring.close()
-        await self._runner.cleanup()
+        self._door.close()
+        answers = list(self._state.tasks)
+        for answer in answers:
+            answer.cancel()
+        await asyncio.gather(*answers, return_exceptions=True)
 
     async def _listen(self) -> None:
-        serve = self._runner.server
-        assert serve is not None
-        factory = partial(BoundedConnection, Door(), serve)
-        address = self._settings.listen
         loop = asyncio.get_running_loop()
         said = ""
         while self._server is None:
             try:
-                self._server = await loop.create_server(factory, address.host, address.port, backlog=_BACKLOG)
+                self._server = await loop.create_server(
+                    lambda: BoundedConnection(self._door, self._serve),
+                    self._address.host,
+                    self._address.port,
+                    backlog=_BACKLOG,
+                )
             except OSError as error:
                 why = error.strerror or str(error)
                 if why != said:
-                    _log.error("web.unavailable", address=str(address), why=why, what="it is tried again")
+                    _log.error("web.unavailable", address=str(self._address), why=why, what="it is tried again")
                 said = why
                 await asyncio.sleep(_RETRY_S)
-        _log.info("web.listening", address=str(address))
+        _log.info("web.listening", address=str(self._address))
+
+    def _serve(self) -> asyncio.Protocol:
+        return H11Protocol(self._config, self._state, {})
+
+
+def _config(api: Api) -> Config:
+    routes = [Route(path, guarded(handler), methods=[method]) for (method, path), handler in api.handlers().items()]
+    routes += [Route(path, guarded(handler)) for path, handler in static_files()]
+    app = SafeHeaders(Starlette(routes=routes, exception_handlers={HTTPException: not_found}))
+    # What uvicorn itself would log are the mistakes of browsers; ours are logged by `guarded`.
+    return Config(
+        app,
+        lifespan="off",
+        ws="none",
+        proxy_headers=False,
+        server_header=False,
+        access_log=False,
+        log_config=None,
+        log_level=logging.CRITICAL + 1,
+    )
 
 
 def _token(daemon: Daemon, settings: WebSettings) -> Token | None:

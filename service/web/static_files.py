@@ -1,9 +1,12 @@
 """The page's own files, held in memory: a browser makes nobody wait for the SD card."""
 
 import hashlib
+from collections.abc import Iterator
+from http import HTTPStatus
 from pathlib import Path
 
-from aiohttp import web
+from starlette.requests import Request
+from starlette.responses import Response
 
 from service.web.access import Handler
 
@@ -11,25 +14,22 @@ _FOLDER = Path(__file__).parent / "static"
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 
-def static_routes() -> list[web.RouteDef]:
-    """Return a route for each file; index.html is the page itself."""
-    files = sorted(path for path in _FOLDER.iterdir() if path.suffix in _TYPES)
-    return [web.get("/" if path.name == "index.html" else f"/{path.name}", _file(path)) for path in files]
+def static_files() -> Iterator[tuple[str, Handler]]:
+    """Yield the path and the handler of each file; index.html is the page itself."""
+    for file in sorted(_FOLDER.iterdir()):
+        if file.suffix in _TYPES:
+            yield "/" if file.name == "index.html" else f"/{file.name}", _handler(file)
 
 
-def _file(path: Path) -> Handler:
-    body, kind = path.read_bytes(), _TYPES[path.suffix]
-    etag = hashlib.sha256(body).hexdigest()[:16]
+def _handler(file: Path) -> Handler:
+    body, kind = file.read_bytes(), _TYPES[file.suffix]
+    etag = f'"{hashlib.sha256(body).hexdigest()[:16]}"'
+    # Asked for anew each time, so that a page never runs on the files of two versions.
+    headers = {"ETag": etag, "Cache-Control": "no-cache"}
 
-    async def serve(request: web.Request) -> web.Response:
-        # Asked for anew each time, so that a page never runs on the files of two versions.
-        known = request.if_none_match or ()
-        if any(tag.value == etag for tag in known):
-            response = web.Response(status=304)
-        else:
-            response = web.Response(body=body, content_type=kind, charset="utf-8")
-        response.etag = etag
-        response.headers["Cache-Control"] = "no-cache"
-        return response
+    async def serve(request: Request) -> Response:
+        if request.headers.get("if-none-match") == etag:
+            return Response(status_code=HTTPStatus.NOT_MODIFIED, headers=headers)
+        return Response(body, headers=headers, media_type=kind)
 
     return serve
