@@ -8,6 +8,7 @@
 #   make bench          measure speed and memory
 #   make pictures       take the docs' pictures of the status page
 #   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
+#   make deb            build the Debian packages for amd64 and arm64 in dist/ (ARCH=arm64: only that one)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
 #   make config-sample  write systemd/config.toml and the keys of docs/configuration.md anew
@@ -22,7 +23,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench pictures soak lock message-table config-sample zenoh-schemas clean
+.PHONY: demo test lint bench pictures soak deb lock message-table config-sample zenoh-schemas clean
 
 # Installed if they are missing and this is root, as the compilers of firmware/ are.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -56,6 +57,9 @@ pictures: $(VENV)/.test-ready
 
 soak: $(VENV)/.test-ready
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
+
+deb: $(VENV)/.demo-ready
+	$(BIN)/python -m deb.build $(ARCH)
 
 # The project itself is installed editable: what is edited is what runs. Its build backend comes from the lock, too;
 # --no-deps because pip would miss what the lock leaves out on purpose (pyproject.toml, tool.uv).

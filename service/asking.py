@@ -10,7 +10,7 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from service.connection import AddressError, parse_fc
+from service.connection import AddressError, FcAddress, parse_fc
 from service.control import ControlError, MissionJobs, ask_daemon
 from service.daemon import Daemon
 from service.log_setup import set_up_logging
@@ -56,7 +56,7 @@ def ask(
     try:
         if fc is None:
             return ask_daemon(state_dir, request, progress)
-        return asyncio.run(_ask_directly(fc, request, progress))
+        return asyncio.run(ask_directly(parse_fc(fc), request, progress))
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error
     except (ControlError, StoreError) as error:
@@ -71,9 +71,10 @@ def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, tot
         return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
 
 
-async def _ask_directly(fc: str, request: Json, progress: Callable[[int], None]) -> Json:
+async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
+    """Ask a bridge of our own on this port; ControlError or StoreError say why there is no answer."""
     set_up_logging("error")
-    daemon = Daemon(Settings(parse_fc(fc)))
+    daemon = Daemon(Settings(fc))
     jobs = MissionJobs(daemon)
     running = asyncio.create_task(daemon.run())
     try:

@@ -18,6 +18,7 @@ _COMMANDS = {
     "status": "service.mission_commands:status",
     "missions": "service.stored_missions:missions",
     "fleet": "service.fleet.command:fleet",
+    "doctor": "service.doctor.command:doctor",
     "sim": "service.simulator.command:sim",
     "demo": "service.demo:demo",
 }

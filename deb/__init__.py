@@ -1,0 +1,1 @@
+"""The Debian package: `build.py` makes it, `tree.py` says what is where; the rest goes into it as it is."""

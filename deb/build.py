@@ -1,0 +1,69 @@
+"""Builds the Debian package: `make deb`, or `python -m deb.build amd64 arm64` in the project's folder.
+
+The libraries are the wheels that requirements.lock pins, for Debian 12's Python and for Debian 13's side by side; pip
+fetches them for either architecture on any machine, and nothing is compiled. The target needs no network.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+from deb.tree import lay_out
+
+_PROJECT = Path(__file__).resolve().parent.parent
+_WORK = _PROJECT / "build" / "deb"
+_DIST = _PROJECT / "dist"
+_PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
+#: Debian 12 (and Raspberry Pi OS of 2023), Debian 13.
+_PYTHONS = ("3.11", "3.13")
+#: Debian's name of an architecture -> the wheels'.
+_MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+#: What wheels may ask of the C library; Debian 12 has 2.36.
+_GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
+
+
+def build(architecture: str) -> Path:
+    """Return the package's file."""
+    work = _WORK / architecture
+    shutil.rmtree(work, ignore_errors=True)
+    wheels = work / "wheels"
+    project = tomllib.loads((_PROJECT / "pyproject.toml").read_text())["project"]
+    _run(*_PIP, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", wheels, _PROJECT)
+    libraries = {}
+    for python in _PYTHONS:
+        target = ("--only-binary=:all:", "--python-version", python, *_platforms(architecture))
+        lock = _PROJECT / "requirements.lock"
+        _run(*_PIP, "download", "--require-hashes", "--no-deps", *target, "--dest", wheels, "--requirement", lock)
+        # From the wheels alone, whose hashes were just looked at; what only the build needs stays out.
+        libraries[python] = work / python
+        from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
+        _run(*_PIP, "install", *from_wheels, *target, f"{project['name']}=={project['version']}")
+    root = work / "root"
+    lay_out(root, libraries, _PROJECT, project["version"], architecture)
+    _DIST.mkdir(exist_ok=True)
+    package = _DIST / f"naze-bridge_{project['version']}_{architecture}.deb"
+    _run("dpkg-deb", "--root-owner-group", "-Zzstd", "-z9", "--build", root, package)
+    return package
+
+
+def _platforms(architecture: str) -> list[str]:
+    machine = _MACHINES[architecture]
+    return [word for libc in _GLIBC for word in ("--platform", f"{libc}_{machine}")]
+
+
+def _run(*command: str | Path) -> None:
+    # The wheel's files get the time of the commit, else every build would differ.
+    subprocess.run(command, check=True, env=os.environ | {"SOURCE_DATE_EPOCH": _commit_time()})
+
+
+def _commit_time() -> str:
+    command = ("git", "-C", str(_PROJECT), "log", "-1", "--format=%ct")
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:] or _MACHINES:
+        sys.stdout.write(f"{build(name).relative_to(_PROJECT)}\n")

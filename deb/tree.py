@@ -1,0 +1,90 @@
+"""What is where in the package."""
+
+import filecmp
+import gzip
+import hashlib
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+_HERE = Path(__file__).resolve().parent
+_LIB = Path("usr/lib/naze-bridge")
+_SCRIPTS = ("postinst", "prerm", "postrm")
+#: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.
+_DIALECTS = ("v20/__init__.py", "v20/ardupilotmega.py", "v20/all.py")
+_NEEDLESS = ("lxml", "lxml-*", "bin", "share", "pymavlink/tools", "pymavlink/dfindexer")
+
+
+def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: str, architecture: str) -> None:
+    """Make the package's folder of the installed `libraries` of each Python version."""
+    environment = root / _LIB
+    (environment / "bin").mkdir(parents=True)
+    (environment / "pyvenv.cfg").write_text("home = /usr/bin\ninclude-system-site-packages = false\n")
+    (environment / "bin" / "python3").symlink_to("/usr/bin/python3")
+    shutil.copy(_HERE / "naze-bridge", environment / "bin")
+    sites = []
+    for python, folder in libraries.items():
+        sites.append(environment / "lib" / f"python{python}" / "site-packages")
+        _leave_out(folder)
+        shutil.copytree(folder, sites[-1])
+    _share(*sites)
+    (root / "usr/bin").mkdir()
+    (root / "usr/bin/naze-bridge").symlink_to("../lib/naze-bridge/bin/naze-bridge")
+    _copy(project / "systemd/naze-bridge.service", root / "usr/lib/systemd/system")
+    _copy(project / "systemd/60-naze-bridge.rules", root / "usr/lib/udev/rules.d")
+    _copy(project / "systemd/naze-bridge.sysusers", root / "usr/lib/sysusers.d", "naze-bridge.conf")
+    _copy(project / "systemd/config.toml", root / "etc/naze-bridge")
+    (root / "etc/naze-bridge/conf.d").mkdir()
+    documents = root / "usr/share/doc/naze-bridge"
+    _copy(project / "LICENSE", documents, "copyright")
+    shutil.copytree(project / "docs", documents, dirs_exist_ok=True)
+    (documents / "changelog.gz").write_bytes(gzip.compress((project / "CHANGELOG.md").read_bytes(), mtime=0))
+    for path in root.rglob("*"):
+        if not path.is_symlink():
+            path.chmod(0o755 if path.is_dir() or path.parent == environment / "bin" else 0o644)
+    _describe(root, version, architecture)
+
+
+def _leave_out(site: Path) -> None:
+    for pattern in _NEEDLESS:
+        for path in site.glob(pattern):
+            shutil.rmtree(path)
+    dialects = site / "pymavlink" / "dialects"
+    for path in dialects.glob("*/*"):
+        if str(path.relative_to(dialects)) not in _DIALECTS:
+            path.unlink()
+
+
+def _share(first: Path, *others: Path) -> None:
+    """Make one file of those that are the same for every Python: most are."""
+    for other in others:
+        for path in other.rglob("*"):
+            twin = first / path.relative_to(other)
+            if path.is_file() and twin.is_file() and filecmp.cmp(path, twin, shallow=False):
+                path.unlink()
+                path.hardlink_to(twin)
+
+
+def _copy(source: Path, folder: Path, name: str = "") -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(source, folder / (name or source.name))
+
+
+def _describe(root: Path, version: str, architecture: str) -> None:
+    """Write what dpkg reads."""
+    folder = root / "DEBIAN"
+    folder.mkdir(mode=0o755)
+    files = sorted(path for path in root.rglob("*") if path.is_file() and not path.is_symlink())
+    sums = [f"{_md5(path)}  {path.relative_to(root)}\n" for path in files]
+    size = sum(size for _, size in {(path.stat().st_ino, path.stat().st_size) for path in files})
+    fields = (_HERE / "control").read_text().format(version=version, architecture=architecture, kilobytes=size // 1024)
+    (folder / "control").write_text(fields)
+    (folder / "md5sums").write_text("".join(sums))
+    (folder / "conffiles").write_text("/etc/naze-bridge/config.toml\n")
+    for script in _SCRIPTS:
+        shutil.copyfile(_HERE / script, folder / script)
+        (folder / script).chmod(0o755)
+
+
+def _md5(path: Path) -> str:
+    return hashlib.md5(path.read_bytes(), usedforsecurity=False).hexdigest()

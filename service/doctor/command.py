@@ -1,0 +1,81 @@
+"""`naze-bridge doctor`."""
+
+import asyncio
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from service.asking import STATUS, ask_directly
+from service.control import ControlError, ask_daemon
+from service.doctor.checked import Checked, Grade
+from service.doctor.examination import examine
+from service.doctor.host import Host
+from service.mission_data import Json
+from service.printing import print_json
+from service.settings import Settings, SettingsError, load_settings
+from service.settings.load import CONFIG_VARIABLE
+from storage.store_error import StoreError
+
+#: What the service is started with, and where it keeps its missions.
+_SERVICE_CONFIG = Path("/etc/naze-bridge/config.toml")
+_SERVICE_STATE = Path("/var/lib/naze-bridge")
+_COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
+
+
+@click.command()
+@click.option("--fc", metavar="FC", help="The flight controller's connection, as of `run`.")
+@click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    envvar=CONFIG_VARIABLE,
+    help=f"The daemon's configuration. Default: {_SERVICE_CONFIG}, if it is there.",
+)
+@click.option("--state-dir", type=click.Path(path_type=Path), help="The daemon's folder for missions.")
+@click.option("--root", type=click.Path(path_type=Path), default=Path("/"), hidden=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each check.")
+def doctor(fc: str | None, config: Path | None, state_dir: Path | None, root: Path, as_json: bool) -> None:
+    """Look for what stands in the way of the bridge, and say what to do.
+
+    Nothing is changed, and a daemon that runs is not disturbed. Exit code 0: no problem, 1: a problem was found.
+    """
+    if config is None and fc is None and _SERVICE_CONFIG.exists():
+        config = _SERVICE_CONFIG
+        state_dir = state_dir or (_SERVICE_STATE if _SERVICE_STATE.is_symlink() else None)
+    worst = Grade.OK
+    for checked in _examine(Host(root), fc, config, state_dir):
+        _tell(checked, as_json=as_json)
+        if checked.grade is Grade.PROBLEM:
+            worst = Grade.PROBLEM
+    if worst is Grade.PROBLEM:
+        raise SystemExit(1)
+
+
+def _examine(host: Host, fc: str | None, config: Path | None, state_dir: Path | None) -> Iterator[Checked]:
+    try:
+        settings = load_settings(config, fc, (), state_dir)
+    except SettingsError as error:
+        for wrong in error.problems:
+            yield Checked("configuration", Grade.PROBLEM, str(wrong), "correct that line")
+        return
+    if config is not None:
+        yield Checked("configuration", Grade.OK, f"{config} can be used")
+    yield from examine(host, settings, lambda: ask_daemon(state_dir, STATUS), lambda: _listen(settings))
+
+
+def _listen(settings: Settings) -> Json:
+    try:
+        return asyncio.run(ask_directly(settings.fc, STATUS))
+    except StoreError as error:
+        raise ControlError(str(error)) from error
+
+
+def _tell(checked: Checked, *, as_json: bool) -> None:
+    if as_json:
+        print_json(asdict(checked) | {"grade": checked.grade.value})
+        return
+    grade = click.style(f"{checked.grade.value:7}", fg=_COLOURS[checked.grade], bold=checked.grade is Grade.PROBLEM)
+    click.echo(f"{grade}  {checked.check}: {checked.found}")
+    if checked.remedy:
+        click.echo(f"{'':7}  -> {checked.remedy}")

@@ -1,0 +1,37 @@
+"""The check of the flight controller: a running daemon is asked, and else the port listened to."""
+
+from collections.abc import Callable
+
+from service.connection import FcAddress
+from service.control import ControlError
+from service.doctor.checked import Checked, note, ok, problem
+from service.mission_data import Json
+
+_WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"
+
+
+def check_flight_controller(
+    fc: FcAddress, ask_running: Callable[[], Json], ask_port: Callable[[], Json] | None
+) -> list[Checked]:
+    """Find out who is there. Both return a status or raise ControlError; without `ask_port` the port is left alone."""
+    try:
+        status = ask_running()
+    except ControlError:
+        pass
+    else:
+        return [ok("daemon", "runs, and was asked"), _who(fc, status)]
+    if ask_port is None:
+        return [note("flight controller", f"{fc} was not listened to", "mend its port first, and ask again with sudo")]
+    try:
+        return [_who(fc, ask_port())]
+    except ControlError as error:
+        return [problem("flight controller", str(error), _WIRING)]
+
+
+def _who(fc: FcAddress, status: Json) -> Checked:
+    name = status["flight_controller"]
+    if name is None:
+        return problem("flight controller", f"nobody answers on {fc}: {status['state']}", _WIRING)
+    speed = "" if status["speed_baud"] is None else f" at {status['speed_baud']} baud"
+    armed = {True: ", ARMED", False: ", disarmed", None: ""}[status["armed"]]
+    return ok("flight controller", f"{name}, {status['state']}{speed}{armed}")

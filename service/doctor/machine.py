@@ -1,0 +1,110 @@
+"""Checks of the machine: its clock, its disk, the missions on it, and what runs there."""
+
+import os
+import platform
+import shutil
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+
+from service.doctor.checked import Checked, note, ok, problem
+from service.doctor.host import Host
+from service.store_worker import DATABASE_NAME
+from service.version import version
+
+_SYNCED = "/run/systemd/timesync/synchronized"
+_TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
+#: A Pi without a clock begins in 1970, or when it was last switched off; no release is older than this.
+_EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
+_LEAST_FREE = 64 << 20
+_LIBRARIES = ("pymavlink", "pyserial", "eclipse-zenoh")
+
+
+def check_versions(host: Host) -> Checked:
+    """Tell what runs here, for a bug report."""
+    system = next((line for line in host.read("/etc/os-release").splitlines() if line.startswith("PRETTY_NAME=")), "")
+    libraries = [f"{name} {_version_of(name)}" for name in _LIBRARIES]
+    where = system.partition("=")[2].strip('"') or platform.system()
+    return ok(
+        "versions",
+        f"naze-bridge {version()}, Python {platform.python_version()}, SQLite {sqlite3.sqlite_version}, "
+        f"{', '.join(libraries)}, {where} on {platform.machine()}",
+    )
+
+
+def check_clock(host: Host, now: datetime) -> Checked:
+    """Look whether the time is right: logs and signatures go by it."""
+    told = f"{now:%Y-%m-%d %H:%M} UTC"
+    if now < _EPOCH:
+        return problem("clock", f"it is {told}, years ago", f"set it: sudo date --set '{_EPOCH:%Y-%m-%d} 12:00'")
+    if host.path(_SYNCED).exists():
+        return ok("clock", f"{told}, set by the network")
+    keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
+    if keeper is not None:
+        return ok("clock", f"{told}, kept by {keeper}")
+    remedy = "in the field nothing sets it: connect to the Internet once, or sudo date --set '...' before the flight"
+    return note("clock", f"{told}, not set by the network since the start", remedy)
+
+
+def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: shutil.disk_usage(path).free) -> Checked:
+    """Look whether missions and logs can be written."""
+    folder = state_dir
+    try:
+        while not folder.exists():
+            folder = folder.parent
+        free = free_of(folder)
+    except PermissionError:
+        return note("disk", f"{state_dir} is closed to you", "ask again with sudo")
+    if not os.access(folder, os.W_OK):
+        read_only = os.statvfs(folder).f_flag & os.ST_RDONLY
+        if read_only:
+            remedy = "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /"
+            return problem("disk", f"{folder} is on a disk that is read-only", remedy)
+        return note("disk", f"{folder} is not yours to write", "ask again with sudo")
+    told = f"{free >> 20} MB free for {state_dir}"
+    if free < _LEAST_FREE:
+        return problem("disk", told, f"remove what is not needed, say old logs: ls -l {state_dir}/logs")
+    return ok("disk", told)
+
+
+def check_database(state_dir: Path) -> list[Checked]:
+    """Look whether the stored missions are whole."""
+    path = state_dir / DATABASE_NAME
+    found = []
+    try:
+        exists = path.exists()
+        aside = sorted(state_dir.glob(f"{DATABASE_NAME}.corrupt-*[0-9]"))
+    except PermissionError:
+        return [note("missions", f"{path} is closed to you", "ask again with sudo")]
+    if not exists:
+        found.append(ok("missions", f"none stored yet in {state_dir}"))
+    else:
+        found.append(_look_into(path))
+    if aside:
+        remedy = f"what can be saved of it: sqlite3 {aside[-1]} .recover; then move it away"
+        found.append(note("missions", f"a damaged store was kept as {aside[-1]}", remedy))
+    return found
+
+
+def _look_into(path: Path) -> Checked:
+    try:
+        # Read-only: a daemon may be at work on it.
+        with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=2)) as database:
+            (finding,) = database.execute("PRAGMA quick_check(1)").fetchone()
+            (count,) = database.execute("SELECT count(*) FROM missions").fetchone()
+    except sqlite3.Error as error:
+        finding = str(error)
+    if finding == "ok":
+        return ok("missions", f"{count} stored in {path}, whole")
+    remedy = "restart the bridge: it keeps the file aside and begins a new one (sudo systemctl restart naze-bridge)"
+    return problem("missions", f"{path} is damaged: {finding}", remedy)
+
+
+def _version_of(library: str) -> str:
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
+        return "missing"

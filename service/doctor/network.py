@@ -1,0 +1,66 @@
+"""Checks of the network: where ground stations find the bridge, and whether its ports are free."""
+
+import re
+from collections.abc import Sequence
+
+from service.connection import GcsAddress
+from service.doctor.checked import Checked, note, ok, problem
+from service.doctor.host import Host
+
+#: Of /proc/net/tcp, where only a listening socket has a port to itself.
+_LISTENS = "0A"
+
+
+def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
+    """Look for an address that Mission Planner can be given."""
+    blocked = [
+        name
+        for name in host.names("/sys/class/rfkill")
+        if host.read(f"/sys/class/rfkill/{name}/type").strip() == "wlan"
+        and host.read(f"/sys/class/rfkill/{name}/soft").strip() == "1"
+    ]
+    if blocked:
+        remedy = "set the country (sudo raspi-config nonint do_wifi_country DE), then: sudo rfkill unblock wlan"
+        return [problem("Wi-Fi", "is switched off (rfkill)", remedy)]
+    cards = [name for name in host.names("/sys/class/net") if host.path(f"/sys/class/net/{name}/wireless").exists()]
+    if not cards:
+        return [note("Wi-Fi", "there is no Wi-Fi card", "connect ground stations by cable, or plug a card in")]
+    return [_card(host, card, gcs) for card in cards]
+
+
+def _card(host: Host, card: str, gcs: Sequence[GcsAddress]) -> Checked:
+    address = host.address(card)
+    if address is None:
+        return note("Wi-Fi", f"{card} has no address", "join a network or open an access point: docs/howto")
+    ports = [str(link.port) for link in gcs if link.kind in ("udpin", "tcpin")]
+    return ok(
+        "Wi-Fi", f"{card} is {address}" + (f"; ground stations connect to port {', '.join(ports)}" if ports else "")
+    )
+
+
+def check_ports(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
+    """Look whether the ports that the bridge listens on are free, or its own."""
+    return [_check_port(host, link) for link in gcs if link.kind in ("udpin", "tcpin")]
+
+
+def _check_port(host: Host, link: GcsAddress) -> Checked:
+    transport = "tcp" if link.kind == "tcpin" else "udp"
+    what = f"{transport.upper()} port {link.port}"
+    inode = _inode(host, transport, link.port)
+    if inode is None:
+        return ok("port for ground stations", f"{what} is free")
+    holder = host.holder(f"socket:[{inode}]")
+    if holder is not None and holder.is_naze_bridge:
+        return ok("port for ground stations", f"{what} is the running daemon's")
+    who = "another program (see: sudo naze-bridge doctor)" if holder is None else f"{holder.name} (pid {holder.pid})"
+    return problem("port for ground stations", f"{what} is taken by {who}", "stop that, or give gcs another port")
+
+
+def _inode(host: Host, transport: str, port: int) -> str | None:
+    for table in (transport, f"{transport}6"):
+        for line in host.read(f"/proc/net/{table}").splitlines()[1:]:
+            words = line.split()
+            taken = re.fullmatch(r"[0-9A-F]+:([0-9A-F]{4})", words[1])
+            if taken and int(taken[1], 16) == port and (transport == "udp" or words[3] == _LISTENS):
+                return words[9]
+    return None

@@ -1,0 +1,130 @@
+"""Checks of the flight controller's serial port: is it there, may the bridge use it, and who else does."""
+
+import grp
+import re
+import stat
+from pathlib import Path
+
+from service.connection import FcAddress, SerialFc
+from service.doctor.checked import Checked, note, ok, problem
+from service.doctor.host import Host, Process
+
+_PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
+_GROUP = "dialout"
+_CMDLINES = ("/boot/firmware/cmdline.txt", "/boot/cmdline.txt")
+_LOGIN_PROGRAMS = ("agetty", "getty", "login")
+_RULES = ("/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d")
+_RULE = "60-naze-bridge.rules"
+
+
+def check_port(host: Host, fc: FcAddress) -> Checked:
+    """Look whether it is there."""
+    if not isinstance(fc, SerialFc):
+        return ok("port", f"{fc}, no serial port")
+    device = host.resolve(fc.path)
+    if host.path(device).exists():
+        return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
+    there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
+    if fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
+        remedy = "switch the UART on and reboot: sudo raspi-config nonint do_serial_hw 0"
+    else:
+        remedy = "plug the flight controller in"
+    if there:
+        remedy += f"; or set fc to a port that is there: {', '.join(there)}"
+    return problem("port", f"{fc.path} is missing", remedy)
+
+
+def check_permission(host: Host, fc: FcAddress) -> Checked | None:
+    """Look whether the group dialout may use it, in which the service is."""
+    device = _device(host, fc)
+    if device is None:
+        return None
+    found = host.path(device).stat()
+    try:
+        group = grp.getgrgid(found.st_gid).gr_name
+    except KeyError:
+        group = str(found.st_gid)
+    if found.st_mode & stat.S_IRGRP and found.st_mode & stat.S_IWGRP and group == _GROUP:
+        return ok("permission", f"{device} is open to the group {_GROUP}")
+    mode = stat.filemode(found.st_mode)
+    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; a rule of udev that lasts: docs/install.md"
+    return problem("permission", f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}", remedy)
+
+
+def check_console(host: Host, fc: FcAddress) -> Checked | None:
+    """Look for a login console on it: both would read, and each eat half of what the flight controller says."""
+    device = _device(host, fc)
+    if device is None:
+        return None
+    names = {device.name, Path(fc.path).name if isinstance(fc, SerialFc) else device.name}
+    # The firmware knows the UART on the header by this name.
+    names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
+    found, remedies = [], []
+    if _getty(host, device.name):
+        found.append(f"serial-getty@{device.name} runs there")
+        remedies.append(f"sudo systemctl disable --now serial-getty@{device.name}.service")
+    elif host.names("/etc/systemd/system/getty.target.wants", f"serial-getty@{device.name}.service"):
+        found.append(f"serial-getty@{device.name} is enabled")
+        remedies.append(f"sudo systemctl disable --now serial-getty@{device.name}.service")
+    words = re.compile(rf"\bconsole=({'|'.join(map(re.escape, sorted(names)))})(?:,\S*)?(?=\s|$)")
+    for file in _CMDLINES:
+        named = words.search(host.read(file))
+        if named:
+            found.append(f"{named[0]} stands in {file}")
+            remedies.append(f"sudo sed -i 's/console={named[1]}[^ ]* *//' {file} && sudo reboot")
+            break
+    else:
+        booted = words.search(host.read("/proc/cmdline"))
+        if booted:
+            found.append(f"the kernel was started with {booted[0]}")
+            remedies.append("take that word out of the boot loader's command line, and reboot")
+    if not found:
+        return ok("console", f"no login console on {device}")
+    return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies))
+
+
+def check_holder(host: Host, fc: FcAddress) -> Checked | None:
+    """Look whether another program has it open."""
+    device = _device(host, fc)
+    if device is None:
+        return None
+    holder = holder_of_port(host, fc)
+    if holder is None:
+        return ok("other programs", f"nobody has {device} open")
+    if holder.name in _LOGIN_PROGRAMS:
+        return None  # the console's check says it
+    who = f"{holder.name} (pid {holder.pid})"
+    if holder.is_naze_bridge:
+        return ok("other programs", f"the daemon has {device} open, pid {holder.pid}")
+    return problem("other programs", f"{who} has {device} open", f"stop it: sudo kill {holder.pid}")
+
+
+def holder_of_port(host: Host, fc: FcAddress) -> Process | None:
+    """Return who has the port open, as far as we may see it."""
+    device = _device(host, fc)
+    return None if device is None else host.holder(str(device))
+
+
+def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
+    """Look whether ModemManager would look for modems on it."""
+    if not any(process.name == "ModemManager" for process in host.processes()):
+        return ok("ModemManager", "does not run")
+    device = _device(host, fc)
+    if device is None or not device.name.startswith(("ttyUSB", "ttyACM")):
+        return ok("ModemManager", "runs, and looks at USB only")
+    if any(host.path(f"{folder}/{_RULE}").exists() for folder in _RULES):
+        return ok("ModemManager", f"runs, and is kept off by {_RULE}")
+    remedy = "install the package's udev rule (docs/install.md), or: sudo systemctl disable --now ModemManager"
+    return note("ModemManager", f"runs, and sends modem commands to {device} when it is plugged in", remedy)
+
+
+def _device(host: Host, fc: FcAddress) -> Path | None:
+    """Return the port behind its links; None if there is none, which the first check says."""
+    if not isinstance(fc, SerialFc):
+        return None
+    device = host.resolve(fc.path)
+    return device if host.path(device).exists() else None
+
+
+def _getty(host: Host, terminal: str) -> bool:
+    return any(process.name in _LOGIN_PROGRAMS and terminal in process.arguments[1:] for process in host.processes())

@@ -1,0 +1,56 @@
+"""A machine made of files: what the checks read, with the faults that a test puts in."""
+
+import grp
+import os
+from pathlib import Path
+
+from service.connection import SerialFc
+from service.doctor.host import Host
+
+PORT = SerialFc("/dev/serial0", None)
+_HEADER = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n"
+
+
+class FaultyMachine(Host):
+    """Begins as a Pi on which all is well; /dev/serial0 leads to ttyAMA0."""
+
+    def __init__(self, root: Path) -> None:
+        super().__init__(root)
+        self.addresses = {"wlan0": "192.168.4.1"}
+        self.write("/dev/ttyAMA0").chmod(0o660)
+        self.owned_by("/dev/ttyAMA0", "dialout")
+        self.path("/dev/serial0").symlink_to("ttyAMA0")
+        self.write("/proc/cmdline", "console=tty1 root=/dev/mmcblk0p2 rootwait\n")
+        self.write("/boot/firmware/cmdline.txt", "console=tty1 root=PARTUUID=1 rootwait\n")
+        self.write("/sys/class/net/wlan0/wireless/x")
+        self.write("/sys/class/net/eth0/x")
+        self.write("/run/systemd/timesync/synchronized")
+        self.write("/etc/os-release", 'ID=debian\nPRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\n')
+        self.sockets()
+
+    def write(self, path: str, text: str = "") -> Path:
+        """Make a file of the machine."""
+        file = self.path(path)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+        return file
+
+    def owned_by(self, path: str, group: str) -> None:
+        """Give a file to a group: really, and so as root; as somebody else the group is one's own."""
+        if os.geteuid() == 0:
+            os.chown(self.path(path), 0, grp.getgrnam(group).gr_gid)
+
+    def runs(self, pid: int, *arguments: str, has_open: str = "") -> None:
+        """Let a program run, with a file or socket open."""
+        self.write(f"/proc/{pid}/cmdline", "\0".join(arguments) + "\0")
+        self.path(f"/proc/{pid}/fd").mkdir()
+        if has_open:
+            self.path(f"/proc/{pid}/fd/7").symlink_to(has_open)
+
+    def sockets(self, udp: str = "", tcp: str = "") -> None:
+        """Set what is open on the network, as the kernel's lines tell it."""
+        self.write("/proc/net/udp", _HEADER + udp)
+        self.write("/proc/net/tcp", _HEADER + tcp)
+
+    def address(self, interface: str) -> str | None:
+        return self.addresses.get(interface)

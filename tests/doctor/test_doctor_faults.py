@@ -1,0 +1,255 @@
+"""Faults made on purpose: each is found and named, with what to do about it."""
+
+import sqlite3
+from collections.abc import Iterable
+from contextlib import closing
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from faulty_machine import PORT, FaultyMachine
+
+from service.connection import SerialFc, parse_gcs
+from service.control import ControlError
+from service.doctor.checked import Checked, Grade
+from service.doctor.examination import examine
+from service.doctor.flight_controller import check_flight_controller
+from service.doctor.machine import check_clock, check_database, check_disk
+from service.doctor.network import check_ports, check_wifi
+from service.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
+from service.doctor.zenoh import check_zenoh
+from service.settings import Settings
+from service.zenoh_link.settings import ZenohSettings
+from storage.mission_store import open_store
+
+GCS = [parse_gcs("udpin:0.0.0.0:14550")]
+STATUS = {"flight_controller": "Harakiri", "state": "MSP", "speed_baud": 115200, "armed": False}
+UDP_14550 = "   1: 00000000:38D6 00000000:0000 07 00000000:00000000 00:00000000 00000000  1000        0 4711 2 0 0\n"
+TCP_14550 = "   1: 0100007F:38D6 0100007F:1F90 01 00000000:00000000 00:00000000 00000000  1000        0 4712 1 0 0\n"
+NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
+
+
+@pytest.fixture
+def pi(tmp_path: Path) -> FaultyMachine:
+    return FaultyMachine(tmp_path / "root")
+
+
+def one(found: Checked | Iterable[Checked] | None) -> Checked:
+    assert found is not None
+    if isinstance(found, Checked):
+        return found
+    (single,) = found
+    return single
+
+
+def assert_problem(found: Checked | Iterable[Checked] | None, named: str, remedy: str) -> None:
+    checked = one(found)
+    assert checked.grade is Grade.PROBLEM
+    assert named in checked.found
+    assert remedy in checked.remedy
+
+
+def assert_note(found: Checked | Iterable[Checked] | None, named: str) -> None:
+    checked = one(found)
+    assert checked.grade is Grade.NOTE
+    assert named in checked.found
+    assert checked.remedy
+
+
+def assert_ok(found: Checked | Iterable[Checked] | None, named: str) -> None:
+    checked = one(found)
+    assert (checked.grade, checked.remedy) == (Grade.OK, "")
+    assert named in checked.found
+
+
+def nobody() -> dict[str, object]:
+    raise ControlError("no flight controller answers on /dev/serial0")
+
+
+def test_a_healthy_pi(pi: FaultyMachine, tmp_path: Path) -> None:
+    settings = Settings(PORT, GCS, tmp_path / "state")
+    found = list(examine(pi, settings, nobody, lambda: STATUS))
+    # Who is not root has no dialout group to give a file to.
+    assert {each.check for each in found if each.grade is not Grade.OK} <= {"permission", "flight controller"}
+    told = " ".join(each.found for each in found)
+    assert "/dev/serial0 is /dev/ttyAMA0" in told
+    assert "wlan0 is 192.168.4.1; ground stations connect to port 14550" in told
+    assert "Debian GNU/Linux 12" in told
+
+
+# -- the port ------------------------------------------------------------------------------------------------
+
+
+def test_a_port_that_is_missing(pi: FaultyMachine) -> None:
+    pi.path("/dev/serial0").unlink()
+    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "do_serial_hw 0")
+    pi.write("/dev/ttyUSB0")
+    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "set fc to a port that is there: /dev/ttyUSB0")
+    assert_problem(check_port(pi, SerialFc("/dev/naze", None)), "/dev/naze is missing", "plug the flight controller in")
+    # There is nothing to say of what is not there.
+    assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
+
+
+def test_a_port_that_the_group_may_not_use(pi: FaultyMachine) -> None:
+    pi.path("/dev/ttyAMA0").chmod(0o600)
+    assert_problem(check_permission(pi, PORT), "-rw-------", "sudo chmod g+rw /dev/ttyAMA0")
+
+
+def test_a_login_console_that_runs(pi: FaultyMachine) -> None:
+    pi.runs(412, "/sbin/agetty", "--keep-baud", "115200,57600", "ttyAMA0", "vt220", has_open="/dev/ttyAMA0")
+    assert_problem(
+        check_console(pi, PORT),
+        "serial-getty@ttyAMA0 runs there",
+        "sudo systemctl disable --now serial-getty@ttyAMA0.service",
+    )
+    # It is one fault and told once.
+    assert check_holder(pi, PORT) is None
+
+
+def test_a_login_console_that_begins_with_the_next_boot(pi: FaultyMachine) -> None:
+    pi.write("/etc/systemd/system/getty.target.wants/serial-getty@ttyAMA0.service")
+    assert_problem(check_console(pi, PORT), "is enabled", "disable --now serial-getty@ttyAMA0.service")
+
+
+@pytest.mark.parametrize("word", ["console=serial0,115200", "console=ttyAMA0", "console=ttyAMA0,115200n8"])
+def test_a_console_of_the_kernel(pi: FaultyMachine, word: str) -> None:
+    pi.write("/boot/firmware/cmdline.txt", f"{word} console=tty1 rootwait\n")
+    name = word.removeprefix("console=").partition(",")[0]
+    assert_problem(
+        check_console(pi, PORT),
+        f"{word} stands in /boot/firmware/cmdline.txt",
+        f"sudo sed -i 's/console={name}[^ ]* *//' /boot/firmware/cmdline.txt && sudo reboot",
+    )
+
+
+def test_a_console_of_a_machine_with_another_boot_loader(pi: FaultyMachine) -> None:
+    pi.write("/proc/cmdline", "root=/dev/sda1 console=ttyAMA0,9600\n")
+    assert_problem(check_console(pi, PORT), "started with console=ttyAMA0,9600", "reboot")
+
+
+def test_a_console_on_another_port_is_no_fault(pi: FaultyMachine) -> None:
+    pi.runs(412, "/sbin/agetty", "ttyAMA10")
+    pi.write("/proc/cmdline", "console=ttyAMA10,115200 console=tty1")
+    assert_ok(check_console(pi, PORT), "no login console on /dev/ttyAMA0")
+
+
+def test_another_program_on_the_port(pi: FaultyMachine) -> None:
+    pi.runs(99, "/usr/bin/gpsd", "/dev/ttyAMA0", has_open="/dev/ttyAMA0")
+    assert_problem(check_holder(pi, PORT), "gpsd (pid 99) has /dev/ttyAMA0 open", "sudo kill 99")
+
+
+def test_the_daemon_on_the_port_is_no_fault_and_is_left_alone(pi: FaultyMachine, tmp_path: Path) -> None:
+    pi.runs(99, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="/dev/ttyAMA0")
+    assert_ok(check_holder(pi, PORT), "the daemon has /dev/ttyAMA0 open")
+
+    def never() -> dict[str, object]:
+        raise AssertionError("the port was opened beside the daemon")
+
+    found = list(examine(pi, Settings(PORT, GCS, tmp_path), nobody, never))
+    assert [each.found for each in found if each.check == "flight controller"] == ["/dev/serial0 was not listened to"]
+
+
+def test_modem_manager(pi: FaultyMachine) -> None:
+    usb = SerialFc("/dev/ttyUSB0", None)
+    pi.write("/dev/ttyUSB0")
+    assert_ok(check_modem_manager(pi, usb), "does not run")
+    pi.runs(77, "/usr/sbin/ModemManager")
+    assert_note(check_modem_manager(pi, usb), "sends modem commands to /dev/ttyUSB0")
+    assert_ok(check_modem_manager(pi, PORT), "looks at USB only")
+    pi.write("/usr/lib/udev/rules.d/60-naze-bridge.rules")
+    assert_ok(check_modem_manager(pi, usb), "kept off by 60-naze-bridge.rules")
+
+
+# -- the flight controller -----------------------------------------------------------------------------------
+
+
+def test_a_flight_controller_that_says_nothing() -> None:
+    assert_problem(check_flight_controller(PORT, nobody, nobody), "no flight controller answers", "TX goes to RX")
+    silent = STATUS | {"flight_controller": None, "state": "searching"}
+    (_, found) = check_flight_controller(PORT, lambda: silent, None)
+    assert_problem(found, "nobody answers on /dev/serial0: searching", "TX goes to RX")
+
+
+def test_a_daemon_is_asked_and_the_port_left_alone() -> None:
+    (daemon, found) = check_flight_controller(PORT, lambda: STATUS, nobody)
+    assert_ok(daemon, "runs, and was asked")
+    assert_ok(found, "Harakiri, MSP at 115200 baud, disarmed")
+
+
+# -- the network ---------------------------------------------------------------------------------------------
+
+
+def test_wifi(pi: FaultyMachine) -> None:
+    pi.addresses.clear()
+    assert_note(check_wifi(pi, GCS), "wlan0 has no address")
+    pi.write("/sys/class/rfkill/rfkill0/type", "wlan\n")
+    pi.write("/sys/class/rfkill/rfkill0/soft", "1\n")
+    assert_problem(check_wifi(pi, GCS), "switched off (rfkill)", "sudo rfkill unblock wlan")
+    pi.write("/sys/class/rfkill/rfkill0/type", "bluetooth\n")
+    pi.path("/sys/class/net/wlan0/wireless/x").unlink()
+    pi.path("/sys/class/net/wlan0/wireless").rmdir()
+    assert_note(check_wifi(pi, GCS), "no Wi-Fi card")
+
+
+def test_a_port_that_is_taken(pi: FaultyMachine) -> None:
+    pi.sockets(udp=UDP_14550)
+    assert_problem(check_ports(pi, GCS), "UDP port 14550 is taken by another program", "give gcs another port")
+    pi.runs(55, "/usr/bin/python3", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
+    assert_problem(check_ports(pi, GCS), "python3 (pid 55)", "stop that")
+
+
+def test_a_port_that_is_our_own(pi: FaultyMachine) -> None:
+    pi.sockets(udp=UDP_14550)
+    pi.runs(55, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="socket:[4711]")
+    assert_ok(check_ports(pi, GCS), "the running daemon's")
+
+
+def test_a_connection_from_a_port_does_not_take_it(pi: FaultyMachine) -> None:
+    pi.sockets(tcp=TCP_14550)
+    assert_ok(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is free")
+    pi.sockets(tcp=TCP_14550.replace(" 01 ", " 0A "))
+    assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is taken", "stop that")
+
+
+def test_zenoh(tmp_path: Path) -> None:
+    assert_ok(check_zenoh(None), "off")
+    assert_ok(check_zenoh(ZenohSettings(vehicle="naze-1")), "fleet/naze-1, connects to nobody")
+    nowhere = ZenohSettings(vehicle="naze-1", connect=("tcp/127.0.0.1:9",))
+    assert_note(check_zenoh(nowhere), "tcp/127.0.0.1:9: connection refused")
+    (tmp_path / "zenoh.json5").write_text("{mode: ")
+    broken = ZenohSettings(vehicle="naze-1", config_file=tmp_path / "zenoh.json5")
+    assert_problem(check_zenoh(broken), "zenoh.json5", "config_file")
+
+
+# -- the machine ---------------------------------------------------------------------------------------------
+
+
+def test_the_clock(pi: FaultyMachine) -> None:
+    assert_ok(check_clock(pi, NOW), "set by the network")
+    assert_problem(check_clock(pi, datetime(1970, 1, 1, tzinfo=UTC)), "1970-01-01", "sudo date --set")
+    pi.path("/run/systemd/timesync/synchronized").unlink()
+    assert_note(check_clock(pi, NOW), "not set by the network")
+    pi.runs(12, "/usr/sbin/chronyd")
+    assert_ok(check_clock(pi, NOW), "kept by chronyd")
+
+
+def test_the_disk(tmp_path: Path) -> None:
+    state = tmp_path / "not made yet" / "state"
+    assert_ok(check_disk(state, lambda _: 1 << 30), "1024 MB free")
+    assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove what is not needed")
+
+
+def test_the_missions(tmp_path: Path) -> None:
+    path = tmp_path / "missions.db"
+    assert_ok(check_database(tmp_path), "none stored yet")
+    open_store(path, 0).store.close()
+    assert_ok(check_database(tmp_path), "0 stored")
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("DROP TABLE missions")
+    assert_problem(check_database(tmp_path), "is damaged: no such table", "restart the bridge")
+    path.write_bytes(b"rubbish" * 1000)
+    assert_problem(check_database(tmp_path), "is damaged: file is not a database", "restart the bridge")
+    path.rename(tmp_path / "missions.db.corrupt-20261121-120000")
+    none, aside = check_database(tmp_path)
+    assert_ok(none, "none stored yet")
+    assert_note(aside, "corrupt-20261121-120000")

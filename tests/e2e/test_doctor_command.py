@@ -1,0 +1,52 @@
+"""`naze-bridge doctor` as a person and as a script use it, on the machine that runs this."""
+
+import json
+from pathlib import Path
+
+from benches import Starter
+from programs import free_port, run_naze_bridge, until
+
+
+def test_it_listens_to_the_flight_controller(start: Starter) -> None:
+    board = start.board()
+    config = start.directory / "config.toml"
+    config.write_text(f'fc = "{board.link}"\ngcs = ["udpin:127.0.0.1:{free_port()}"]\n')
+    ended = run_naze_bridge("doctor", "--config", config, "--state-dir", start.directory)
+    # A pty belongs to no group dialout: that is a problem of this port, and it is told.
+    assert ended.returncode == 1
+    assert f"ok       configuration: {config} can be used" in ended.stdout
+    assert "problem  permission: " in ended.stdout
+    assert "         -> sudo chgrp dialout " in ended.stdout
+
+
+def test_it_asks_a_running_daemon_and_does_not_disturb_it(start: Starter) -> None:
+    bench = start.bench(gcs=())
+    config = start.directory / "config.toml"
+    config.write_text(f'fc = "sim:"\ngcs = ["udpin:127.0.0.1:{bench.daemon.port}"]\n')
+    asked = until(lambda: bench.daemon.status(), "a daemon")
+    ended = run_naze_bridge("doctor", "--config", config, "--state-dir", bench.daemon.state_dir, "--json")
+    found = {line["check"]: line for line in map(json.loads, ended.stdout.splitlines())}
+    assert found["daemon"]["found"] == "runs, and was asked"
+    assert asked["flight_controller"] in found["flight controller"]["found"]
+    assert found["missions"]["grade"] == "ok"
+    assert found["port for ground stations"]["found"].startswith(f"UDP port {bench.daemon.port} is ")
+    after = bench.daemon.status()
+    assert after is not None
+    assert after["requests_lost"] == asked["requests_lost"]
+
+
+def test_nothing_in_the_way_is_0(tmp_path: Path) -> None:
+    config = tmp_path / "config.toml"
+    config.write_text(f'fc = "sim:"\ngcs = ["udpin:127.0.0.1:{free_port()}"]\n')
+    ended = run_naze_bridge("doctor", "--config", config, "--state-dir", tmp_path)
+    assert ended.returncode == 0, ended.stdout
+    assert "ok       flight controller: Harakiri with the mission extension" in ended.stdout
+
+
+def test_a_configuration_that_cannot_be_used_is_the_first_problem(tmp_path: Path) -> None:
+    config = tmp_path / "config.toml"
+    config.write_text('fc = "sim:"\nsysidd = 300\n')
+    ended = run_naze_bridge("doctor", "--config", config)
+    assert ended.returncode == 1
+    assert ended.stdout.startswith(f"problem  configuration: {config}:2: ")
+    assert "sysid" in ended.stdout

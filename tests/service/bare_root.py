@@ -1,0 +1,57 @@
+"""A Debian root to install into: this machine's own, seen through an overlay that is gone afterwards.
+
+It has namespaces of its own: nothing that is done in it reaches the machine, and it has no network but the loopback.
+"""
+
+import os
+import subprocess
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+_PATIENCE_S = 100
+#: On a tmpfs of its own, because an overlay cannot lie on an overlay. /run is empty: no systemd runs here.
+_MAKE = """
+set -e
+mount -t tmpfs none "$0"; cd "$0"; mkdir upper work root
+mount -t overlay overlay -o lowerdir=/,upperdir=upper,workdir=work root
+mount -t proc proc root/proc; mount --rbind /dev root/dev; mount -t tmpfs none root/run; mount -t tmpfs none root/tmp
+ip link set lo up 2>/dev/null || true
+exec chroot root sh -c 'echo ready; exec cat'
+"""
+
+
+class BareRoot:
+    """Runs commands in the root while it is entered."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+
+    def __enter__(self) -> Self:
+        # Who is not root is it in a user namespace.
+        maps = () if os.geteuid() == 0 else ("--map-root-user",)
+        command = ("unshare", "--mount", "--net", "--pid", "--fork", "--kill-child", *maps, "sh", "-c", _MAKE)
+        self._process = subprocess.Popen([*command, self._directory], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == b"ready\n"
+        children = Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split()
+        self._inside = ("nsenter", "--target", children[0], "--all", "--root", "--wd")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def put(self, source: Path, path: str) -> None:
+        """Copy a file into the root."""
+        self.run(f"cat > {path}", stdin=source.read_bytes())
+
+    def run(self, script: str, status: int = 0, stdin: bytes = b"") -> str:
+        """Run a shell script; return what it printed."""
+        command = (*self._inside, "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/root", "sh", "-c", script)
+        ended = subprocess.run(command, input=stdin, capture_output=True, timeout=_PATIENCE_S, check=False)
+        printed = ended.stdout.decode() + ended.stderr.decode()
+        assert ended.returncode == status, f"{script}: {ended.returncode}\n{printed}"
+        return printed

@@ -1,0 +1,140 @@
+"""The Debian package: what is in it, and its life on a machine without a network, from the first file to the purge."""
+
+import struct
+import subprocess
+import tarfile
+from collections.abc import Iterator
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from bare_root import BareRoot
+
+from deb.build import build
+
+_REPOSITORY = Path(__file__).resolve().parents[2]
+_MISSION = _REPOSITORY / "examples" / "naze-field.waypoints"
+_ELF_MACHINES = {"amd64": 62, "arm64": 183}
+#: `dpkg --print-architecture` of this machine must be one of them.
+_HOST = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
+#: Starts the daemon in the background as the unit does, with the folders that systemd would make.
+_START = """
+mkdir -p /var/lib/naze-bridge /run/naze-bridge
+export STATE_DIRECTORY=/var/lib/naze-bridge RUNTIME_DIRECTORY=/run/naze-bridge
+sed -n 's/^ExecStart=/exec /p' /usr/lib/systemd/system/naze-bridge.service > /run/start
+(sh /run/start >/run/log 2>&1 & echo $! >/run/pid)
+for turn in $(seq 300); do naze-bridge status 2>/dev/null | grep -q ' MSP$' && exit 0; sleep 0.1; done
+cat /run/log; exit 1
+"""
+_STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
+
+
+_built = cache(build)
+
+
+@pytest.fixture(params=_ELF_MACHINES)
+def package(request: pytest.FixtureRequest) -> tuple[str, Path]:
+    return request.param, _built(request.param)
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Iterator[BareRoot]:
+    package = _built(_HOST)
+    with BareRoot(tmp_path) as root:
+        root.put(package, "/root/naze-bridge.deb")
+        yield root
+
+
+def files_of(package: Path) -> dict[str, tarfile.TarInfo]:
+    return {member.name.removeprefix("."): member for member in _archive(package)}
+
+
+def _archive(package: Path) -> tarfile.TarFile:
+    data = subprocess.run(["dpkg-deb", "--fsys-tarfile", package], capture_output=True, check=True).stdout
+    return tarfile.open(fileobj=BytesIO(data))
+
+
+def test_what_is_in_it(package: tuple[str, Path]) -> None:
+    architecture, path = package
+    files = files_of(path)
+    for expected in (
+        "/usr/bin/naze-bridge",
+        "/usr/lib/systemd/system/naze-bridge.service",
+        "/usr/lib/udev/rules.d/60-naze-bridge.rules",
+        "/usr/lib/sysusers.d/naze-bridge.conf",
+        "/etc/naze-bridge/config.toml",
+        "/usr/share/doc/naze-bridge/copyright",
+        "/usr/share/doc/naze-bridge/changelog.gz",
+        "/usr/lib/naze-bridge/lib/python3.11/site-packages/storage/schema/0001_missions.sql",
+        "/usr/lib/naze-bridge/lib/python3.13/site-packages/storage/schema/0001_missions.sql",
+    ):
+        assert expected in files
+    assert {(member.uid, member.gid) for member in files.values()} == {(0, 0)}
+    assert not [name for name, member in files.items() if member.mode & 0o022 and not member.issym()]
+    described = subprocess.run(["dpkg-deb", "--field", path], capture_output=True, text=True, check=True).stdout
+    assert f"Architecture: {architecture}\n" in described
+
+
+def test_its_libraries_are_for_its_machine_and_for_both_pythons(package: tuple[str, Path]) -> None:
+    architecture, path = package
+    with _archive(path) as archive:
+        # A file that both Pythons share is a hard link, which has no content of its own.
+        libraries = [each for each in archive if each.name.endswith(".so") and each.isfile() and not each.islnk()]
+        machines = set()
+        for member in libraries:
+            content = archive.extractfile(member)
+            assert content is not None
+            machines.add(struct.unpack_from("<H", content.read(20), 18)[0])
+    assert machines == {_ELF_MACHINES[architecture]}
+    for python in ("cpython-311", "cpython-313"):
+        assert [each for each in libraries if python in each.name]
+
+
+def test_no_trace_of_the_machine_that_built_it(package: tuple[str, Path]) -> None:
+    _, path = package
+    with _archive(path) as archive:
+        for member in archive:
+            content = archive.extractfile(member) if member.isfile() else None
+            assert content is None or str(_REPOSITORY).encode() not in content.read(), member.name
+
+
+def test_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
+    assert "enable --now naze-bridge" in root.run("dpkg --install /root/naze-bridge.deb")
+    assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
+    # Enabled on request only.
+    assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
+    # Its byte code is there: the service could not write it.
+    assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
+    root.run("sed -i 's/^fc = .*/fc = \"sim:\"/' /etc/naze-bridge/config.toml")
+    root.put(_MISSION, "/root/naze-field.waypoints")
+
+    root.run(_START)
+    assert "ACCEPTED" in root.run("naze-bridge push /root/naze-field.waypoints")
+    assert "VERIFIED" in root.run("naze-bridge missions list")
+    root.run(_STOP)
+
+    # An upgrade asks nothing: what was changed in the configuration stays, and so do the missions.
+    root.run("dpkg --install /root/naze-bridge.deb")
+    assert 'fc = "sim:"' in root.run("cat /etc/naze-bridge/config.toml")
+    root.run("ln -s /usr/lib/systemd/system/naze-bridge.service /etc/systemd/system/multi-user.target.wants/")
+    root.run("dpkg --remove naze-bridge")
+    assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
+    root.run("ls /usr/lib/naze-bridge", status=2)
+    root.run("dpkg --install /root/naze-bridge.deb")
+    root.run(_START)
+    assert "VERIFIED" in root.run("naze-bridge missions list")
+    root.run(_STOP)
+
+    root.run("mkdir /var/lib/private; mv /var/lib/naze-bridge /var/lib/private/")
+    said = root.run("dpkg --purge naze-bridge")
+    assert "missions and logs stay in /var/lib/private/naze-bridge" in said
+    assert "missions.db" in root.run("ls /var/lib/private/naze-bridge")
+    left = root.run("find /etc /usr /var /opt -xdev -name '*naze-bridge*' -not -path '/var/lib/private/*'")
+    assert left == ""
+
+
+def test_the_demonstration_runs_from_the_package(root: BareRoot) -> None:
+    root.run("dpkg --install /root/naze-bridge.deb")
+    printed = root.run("naze-bridge demo --once")
+    assert "the flight controller holds 13, read back from it and compared" in printed

@@ -1,0 +1,72 @@
+"""The unit: how far it is shut, and that each door that is open says why beside its line."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+_UNIT = Path(__file__).resolve().parents[2] / "systemd" / "naze-bridge.service"
+#: Exposure that `systemd-analyze security` may find, in tenths.
+_BAR = 15
+#: What keeps it below. Where there is no systemd-analyze these words stand for it.
+_SHUT = """DynamicUser=yes
+CapabilityBoundingSet=
+AmbientCapabilities=
+NoNewPrivileges=yes
+ProtectSystem=strict
+ProtectHome=yes
+PrivateMounts=yes
+PrivateTmp=yes
+PrivateUsers=yes
+ProtectClock=yes
+ProtectControlGroups=yes
+ProtectHostname=yes
+ProtectKernelLogs=yes
+ProtectKernelModules=yes
+ProtectKernelTunables=yes
+LockPersonality=yes
+MemoryDenyWriteExecute=yes
+RemoveIPC=yes
+RestrictNamespaces=yes
+RestrictRealtime=yes
+RestrictSUIDSGID=yes
+SystemCallArchitectures=native
+SystemCallFilter=@system-service
+DevicePolicy=closed
+UMask=0077
+"""
+_SERIAL = {"char-ttyAMA rw", "char-ttyS rw", "char-ttyUSB rw", "char-ttyACM rw"}
+
+
+def settings() -> list[str]:
+    return [line for line in _UNIT.read_text().splitlines() if "=" in line and not line.startswith("#")]
+
+
+def test_its_exposure() -> None:
+    if shutil.which("systemd-analyze"):
+        command = ("systemd-analyze", "security", "--offline=true", f"--threshold={_BAR}", "--no-pager", str(_UNIT))
+        judged = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert judged.returncode == 0, judged.stdout + judged.stderr
+    assert [word for word in _SHUT.splitlines() if word not in settings()] == []
+
+
+def test_it_opens_serial_ports_and_no_other_device() -> None:
+    assert {line.removeprefix("DeviceAllow=") for line in settings() if line.startswith("DeviceAllow=")} == _SERIAL
+
+
+def test_every_open_door_says_why() -> None:
+    """What the comments call "not" is what systemd-analyze finds open."""
+    comments = " ".join(line[1:] for line in _UNIT.read_text().splitlines() if line.startswith("#"))
+    for door in (
+        "PrivateDevices=",
+        "PrivateNetwork=",
+        "IPAddressDeny=",
+        "AF_UNIX",
+        "ProtectProc=",
+        "ProcSubset=",
+        "RootDirectory=",
+    ):
+        assert door in comments
+
+
+def test_systemd_knows_when_it_runs_and_that_it_lives() -> None:
+    assert {"Type=notify", "WatchdogSec=10", "Restart=always", "StartLimitIntervalSec=0"} <= set(settings())
