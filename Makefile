@@ -25,7 +25,7 @@ BIN := $(VENV)/bin
 .NOTPARALLEL:
 .PHONY: demo test lint bench pictures soak deb lock message-table config-sample zenoh-schemas clean
 
-# Installed if they are missing and this is root, as the compilers of firmware/ are.
+# Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
 BROWSER_PACKAGES := chromium chromium-driver
 BROWSER := { command -v chromium && command -v chromedriver; } >/dev/null
 INSTALL = if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
@@ -39,6 +39,7 @@ demo: $(VENV)/.demo-ready
 test: $(VENV)/.test-ready
 	@$(BROWSER) || { $(call INSTALL,$(BROWSER_PACKAGES)); } || true
 	@$(BROWSER) || echo 'The status page: NOT TESTED in a browser: none here (apt-get install $(BROWSER_PACKAGES))'
+	@command -v systemd-analyze >/dev/null || { $(call INSTALL,systemd); } || true
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile \
 	    $$($(BROWSER) || echo --ignore=tests/web/test_web_page.py) $(ARGS)
 	$(if $(ARGS),,$(MAKE) -C firmware test)
