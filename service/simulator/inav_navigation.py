@@ -6,7 +6,8 @@ pilot's sticks, safe distances, and the climb before a return home.
 
 from enum import Enum
 
-from service.simulator.inav_mission import InavMission
+from service.simulator.inav_mission import CAPACITY, InavMission
+from service.simulator.msp_firmware import CrashError
 from service.simulator.nav_status import Error, Mode, NavStatus, State
 from service.simulator.nav_waypoint import FLAG_LAST, Action
 from service.simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
@@ -76,7 +77,7 @@ class InavNavigation:
         return NavStatus(mode, state, self._mission[self.index].action, number, error, round(self._craft.heading))
 
     def step(self, seconds: float, is_wished: bool) -> None:
-        """Let time pass in flight; `is_wished`: the pilot's switch NAV WP is on."""
+        """Let time pass in flight; `is_wished`: the pilot's switch NAV WP is on. CrashError."""
         if not is_wished:
             self.phase = Phase.IDLE
         elif self.phase is Phase.IDLE and self._mission.is_valid and self._mission.count:
@@ -85,7 +86,7 @@ class InavNavigation:
             case Phase.IDLE:
                 self._craft.hover(_HOVER_HEIGHT_M, seconds)
             case Phase.PRE_ACTION:
-                self._pre_action()
+                self.phase = Phase.ENROUTE
             case Phase.ENROUTE:
                 self._fly_leg(seconds)
             case Phase.HOLD:
@@ -104,25 +105,33 @@ class InavNavigation:
             self._mission.start_jumps()
             self.index = 0
         self._restarts = False
-        self.phase = Phase.PRE_ACTION
+        self._pre_action()
 
     def _pre_action(self) -> None:
-        waypoint = self._mission[self.index]
-        match waypoint.action:
-            case Action.RTH:
-                self._restarts = True
-                self.phase = Phase.RTH_ENROUTE
-            case Action.JUMP if waypoint.p3:
-                if waypoint.p3 > 0:
-                    self._mission.set_jump(self.index, waypoint.p3 - 1)
-                self.index = waypoint.p1
-            case Action.JUMP:
-                self._mission.set_jump(self.index, waypoint.p2)
-                self._next()
-            case Action.SET_POI | Action.SET_HEAD:
-                self._next()
-            case _:
-                self.phase = Phase.ENROUTE
+        """Carry out what is no place, which takes INAV 10 ms each, up to the next leg. CrashError."""
+        for _ in range(CAPACITY):
+            waypoint = self._mission[self.index]
+            match waypoint.action:
+                case Action.RTH:
+                    self._restarts = True
+                    self.phase = Phase.RTH_ENROUTE
+                    return
+                case Action.JUMP if waypoint.p3:
+                    if waypoint.p1 < 0:
+                        raise CrashError
+                    if waypoint.p3 > 0:
+                        self._mission.set_jump(self.index, waypoint.p3 - 1)
+                    self.index = min(waypoint.p1, CAPACITY - 1)
+                case Action.JUMP | Action.SET_POI | Action.SET_HEAD:
+                    if waypoint.action == Action.JUMP:
+                        self._mission.set_jump(self.index, waypoint.p2)
+                    if self._is_last():
+                        self._finish()
+                        return
+                    self.index += 1
+                case _:
+                    self.phase = Phase.PRE_ACTION
+                    return
 
     def _fly_leg(self, seconds: float) -> None:
         waypoint = self._mission[self.index]
@@ -158,11 +167,14 @@ class InavNavigation:
                 self._finish()
 
     def _next(self) -> None:
-        if self.index >= self._mission.count - 1 or self._mission[self.index].flag == FLAG_LAST:
+        if self._is_last():
             self._finish()
         else:
             self.index += 1
-            self.phase = Phase.PRE_ACTION
+            self._pre_action()
+
+    def _is_last(self) -> bool:
+        return self.index >= self._mission.count - 1 or self._mission[self.index].flag == FLAG_LAST
 
     def _finish(self) -> None:
         self._mission.end_jumps()

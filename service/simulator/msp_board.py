@@ -86,7 +86,11 @@ class MspBoard:
     def truth(self, now: float) -> Craft | None:
         """Return what the craft is doing; None while no firmware runs."""
         self._run_until(now)
-        return self._firmware.craft_at(now) if self._firmware else None
+        try:
+            return self._firmware.craft_at(now) if self._firmware else None
+        except CrashError:
+            self._crash()
+            return None
 
     def power_on(self, now: float) -> None:
         """Supply the board; it boots."""
@@ -166,6 +170,10 @@ class MspBoard:
     def _boot_at(self, at: float) -> Boot:
         return Boot(self.options, self.faults, self.counters, self._eeprom, at)
 
+    def _crash(self) -> None:
+        self.counters.crashes += 1
+        self._stop(MspPower.CRASHED)
+
     def _stop(self, power: MspPower) -> None:
         self._firmware = None
         self.power = power
@@ -188,8 +196,7 @@ class MspBoard:
             elif self._pending:
                 self._serve_letter(at)
         except CrashError:
-            self.counters.crashes += 1
-            self._stop(MspPower.CRASHED)
+            self._crash()
         self._next_look = at + _PILOTS_PATIENCE_S
         self._next_task = at + self.options.serial_task_ms / 1000 + self._busy
 

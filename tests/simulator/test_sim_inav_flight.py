@@ -8,7 +8,7 @@ from math import hypot
 import pytest
 from msp_bench import MspBench, waypoint
 
-from service.simulator.nav_waypoint import Action, NavWaypoint
+from service.simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
 from service.simulator.options import Faults
 
 NAV_WP = 1 << 13
@@ -99,8 +99,21 @@ def test_a_hold_takes_its_seconds() -> None:
 def test_a_jump_is_flown_as_often_as_it_says() -> None:
     flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=Action.JUMP, p1=1, p2=2), waypoint(17))
     flight.until(is_finished)
-    geo = [number for number in flight.numbers() if number != 4]
-    assert geo == [1, 2, 3, 1, 2, 3, 1, 2, 3, 5]
+    assert flight.numbers() == [1, 2, 3, 1, 2, 3, 1, 2, 3, 5]
+
+
+def test_a_jump_to_nowhere_that_came_in_flight_is_a_crash() -> None:
+    flight = Flight(waypoint(5), waypoint(9))
+    flight.until(is_finished)
+    flight.bench.faults.boxes = 0
+    flight.bench.run(1)
+    flight.bench.write(1, waypoint(5))
+    flight.bench.write(2, waypoint(action=Action.JUMP, p1=0, p2=1, flag=FLAG_LAST))
+    flight.bench.faults.boxes = NAV_WP
+    flight.bench.run(30)
+    assert flight.bench.board.truth(flight.bench.now) is None
+    assert flight.bench.ask(121) is None
+    assert flight.bench.board.counters.crashes == 1
 
 
 def test_a_jump_for_ever_never_ends() -> None:
@@ -112,8 +125,7 @@ def test_a_jump_for_ever_never_ends() -> None:
 def test_what_is_no_place_is_passed_by() -> None:
     flight = Flight(waypoint(3), waypoint(action=Action.SET_HEAD, p1=90), waypoint(6, Action.SET_POI), waypoint(9))
     flight.until(is_finished)
-    assert flight.numbers()[0] == 1
-    assert flight.numbers()[-1] == 4
+    assert flight.numbers() == [1, 4]
 
 
 @pytest.mark.parametrize(("p1", "state"), [(0, 13), (1, 10)])
