@@ -10,11 +10,13 @@ from enum import Enum
 from typing import Any
 
 from bridge.finding import Finding
+from bridge.item_request import ItemRequest
 from bridge.journal import Incidents, Journal
 from bridge.mission_check import ListCheck, check_count
 from bridge.mission_desk import ARMED, Delivery, MissionDesk, Refusal
 from bridge.mission_dialect import StoreReport
 from bridge.mission_log import ArrivedMission
+from bridge.recent_answers import RecentAnswers
 from bridge.runner import Runner
 from bridge.station import Peer, Post, Severity, Station
 from bridge.verdict import CLEARED_LIST, Result, Verdict
@@ -23,14 +25,7 @@ from protocols.mission_item import MissionItem, MissionResult
 
 MISSION_TYPE_MISSION = 0
 MISSION_TYPE_ALL = 255
-_FIRST_PATIENCE_S = 0.25
-_MAX_PATIENCE_S = 1.5
 _GIVE_UP_S = 5.0
-#: What comes twice within so short a time was doubled by the network. Answering each copy would double every message
-#: that follows, and MAVSDK gives up after five repeats; a ground station that missed our request repeats itself later.
-_REPEAT_AFTER_S = 0.1
-#: How long a refusal or a final ack is repeated to items that still come: Mission Planner sends its last item for 5 s.
-_MEMORY_S = 10.0
 
 
 class Phase(Enum):
@@ -51,23 +46,8 @@ class _Transfer:
     items: dict[int, MissionItem] = field(default_factory=dict)
     checked: int = 0  # items 0..checked-1 are there and have been checked
     progress_at: float = 0.0
-    requested_at: float = 0.0
-    request_due: float = 0.0
-    patience_s: float = _FIRST_PATIENCE_S
-    round_trip_s: float | None = None
-    requested: int | None = None  # the item that was asked for last
-    repeated: bool = False  # it was asked for more than once: its answer measures nothing
+    request: ItemRequest = field(default_factory=ItemRequest)
     announced_again: bool = False  # begun anew, or a COUNT that the network repeated: the next item tells
-
-
-@dataclass(frozen=True, slots=True)
-class _Answered:
-    """The last final answer to a ground station, for the items that it repeats."""
-
-    ack: MissionResult
-    count: int
-    until: float
-    refused: bool
 
 
 class MissionUploads:
@@ -91,7 +71,7 @@ class MissionUploads:
         self._fallback_home = fallback_home
         self._moved_to = moved_to
         self._transfer: _Transfer | None = None
-        self._answered: dict[Station, _Answered] = {}
+        self._answers = RecentAnswers(moved_to)
         self._queued: tuple[Station, int] | None = None
         self._is_asking = False
 
@@ -127,7 +107,7 @@ class MissionUploads:
                     self._request(present, now)
                 return
             self._end(now)
-        self._answered.pop(station, None)
+        self._answers.forget(station)
         transfer = _Transfer(self._incidents.begin("upload"), station, count)
         refusal = self._desk.acquire(station)
         if refusal is not None:
@@ -184,7 +164,8 @@ class MissionUploads:
         assert transfer.check is not None
         is_repeat = item.seq in transfer.items
         if not is_repeat:
-            self._measure(transfer, item.seq, now)
+            if item.seq == transfer.checked:
+                transfer.request.answered(now)
             transfer.items[item.seq] = item
             transfer.progress_at = now
             while transfer.checked in transfer.items:
@@ -194,7 +175,7 @@ class MissionUploads:
                     return
                 transfer.checked += 1
         if transfer.checked < transfer.count:
-            if not is_repeat or now >= transfer.requested_at + _REPEAT_AFTER_S:
+            if not is_repeat or not transfer.request.is_copy(now):
                 self._request(transfer, now)
             return
         items = tuple(transfer.items[seq] for seq in range(transfer.count))
@@ -202,9 +183,9 @@ class MissionUploads:
 
     def partial_list(self, station: Station, now: float) -> None:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
-        answered = self._recent(station, now)
-        if answered is not None and answered.refused:
-            self._ack(station, answered.ack)
+        answer = self._answers.to(station, now)
+        if answer is not None and answer.is_refusal:
+            self._ack(station, answer.ack)
             return
         self._post.say(Severity.ERROR, "A mission can only be written as a whole")
         self._ack(station, MissionResult.UNSUPPORTED)
@@ -250,8 +231,8 @@ class MissionUploads:
             return
         if now >= transfer.progress_at + _GIVE_UP_S:
             self._cancel(now, f"silent for {_GIVE_UP_S:.0f} s")
-        elif now >= transfer.request_due:
-            transfer.patience_s = min(transfer.patience_s * 2, _MAX_PATIENCE_S)
+        elif now >= transfer.request.due:
+            transfer.request.lost()
             self._request(transfer, now)
 
     def next_deadline(self) -> float | None:
@@ -259,7 +240,7 @@ class MissionUploads:
         transfer = self._transfer
         if transfer is None or transfer.phase is not Phase.RECEIVING:
             return None
-        return min(transfer.request_due, transfer.progress_at + _GIVE_UP_S)
+        return min(transfer.request.due, transfer.progress_at + _GIVE_UP_S)
 
     def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
         self._is_asking = False
@@ -288,14 +269,11 @@ class MissionUploads:
     def _request(self, transfer: _Transfer, now: float) -> None:
         """Ask for the lowest missing item; id 40, the only one that Mission Planner understands in both modes."""
         seq = 0 if transfer.announced_again else transfer.checked
-        transfer.repeated = seq == transfer.requested
-        transfer.requested = seq
-        transfer.requested_at = now
-        transfer.request_due = now + transfer.patience_s
+        transfer.request.asked(seq, now)
         station = transfer.station
         request = messages.MAVLink_mission_request_message(station.sysid, station.compid, seq, MISSION_TYPE_MISSION)
         self._post.to(station, request)
-        if transfer.repeated:
+        if transfer.request.is_repeated:
             for elsewhere in self._moved_to(station, now):
                 self._post.to(elsewhere, request)
 
@@ -307,8 +285,7 @@ class MissionUploads:
         transfer = self._transfer
         if transfer is None or transfer.station == station:
             return
-        self._forget_old_answers(now)
-        if station in self._answered or station not in self._moved_to(transfer.station, now):
+        if self._answers.was_said_to(station, now) or station not in self._moved_to(transfer.station, now):
             return
         self._journal(
             "info",
@@ -321,39 +298,10 @@ class MissionUploads:
         self._desk.acquire(station)
         transfer.station = station
 
-    def _measure(self, transfer: _Transfer, seq: int, now: float) -> None:
-        """Adapt the patience to the round trip.
-
-        An answer to a repeated request measures nothing. But if it came no sooner after the repeat than answers take,
-        something was lost, and patience shrinks again: MAVSDK gives up if we wait longer after each loss.
-        """
-        if seq != transfer.checked:
-            return
-        elapsed_s = now - transfer.requested_at
-        known_s = transfer.round_trip_s
-        if not transfer.repeated:
-            old = elapsed_s if known_s is None else known_s
-            transfer.round_trip_s = old * 7 / 8 + elapsed_s / 8
-            transfer.patience_s = min(max(2 * transfer.round_trip_s, _FIRST_PATIENCE_S), _MAX_PATIENCE_S)
-        elif known_s is not None and elapsed_s >= known_s / 2:
-            transfer.patience_s = max(transfer.patience_s / 2, 2 * known_s, _FIRST_PATIENCE_S)
-
     def _late_item(self, station: Station, seq: int, now: float) -> None:
-        answered = self._recent(station, now)
-        if answered is None:
-            return
-        if answered.refused or seq == answered.count - 1:
-            self._ack(station, answered.ack)
-
-    def _recent(self, station: Station, now: float) -> _Answered | None:
-        """Return the last answer to a ground station, wherever it was then."""
-        self._forget_old_answers(now)
-        if station in self._answered:
-            return self._answered[station]
-        return next((what for who, what in self._answered.items() if station in self._moved_to(who, now)), None)
-
-    def _forget_old_answers(self, now: float) -> None:
-        self._answered = {who: what for who, what in self._answered.items() if now <= what.until}
+        answer = self._answers.to(station, now)
+        if answer is not None and (answer.is_refusal or seq == answer.count - 1):
+            self._ack(station, answer.ack)
 
     def _reject(self, transfer: _Transfer, now: float) -> None:
         assert transfer.check is not None
@@ -422,10 +370,8 @@ class MissionUploads:
         )
 
     def _answer(self, station: Station, count: int, ack: MissionResult, now: float) -> None:
-        refused = ack is not MissionResult.ACCEPTED
-        self._forget_old_answers(now)
         for where in (station, *self._moved_to(station, now)):
-            self._answered[where] = _Answered(ack, count, now + _MEMORY_S, refused)
+            self._answers.note(where, ack, count, now)
             self._ack(where, ack)
 
     def _ack(self, station: Station, ack: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
