@@ -346,3 +346,13 @@ def test_a_save_whose_answer_is_lost_is_done_again() -> None:
     _, station = found(inav)
     assert Upload(station, plan(10)).run() is ACCEPTED
     assert inav.saves == 2
+
+
+def test_a_multiwii_is_not_made_to_store_what_it_holds() -> None:
+    multiwii = FakeMultiwii()
+    _, station = found(multiwii)
+    assert Upload(station, plan(20)).run() is ACCEPTED
+    written = multiwii.writes
+    assert Upload(station, plan(20)).run() is ACCEPTED
+    # The way home while it is checked, and the first record again.
+    assert multiwii.writes == written + 2

@@ -234,3 +234,17 @@ def test_a_stop_in_the_middle_loads_the_old_list_again() -> None:
     assert any("stopped meanwhile" in text for text in station.texts())
     assert without_home(Download(station).run()) == without_home(plan(10))
     assert board.counters.flash_writes == 1
+
+
+@pytest.mark.parametrize("size", [21, 100, 192])
+def test_a_frame_that_somebody_left_unfinished_does_not_hide_the_board(size: int) -> None:
+    """Its parser has no time-out: it waits for the rest, and takes our questions for it."""
+    board = make_board("inav", MspOptions())
+    world = World(speeds=(115200,), peer=board, plugged=False)
+    world.run(0.5)
+    board.receive(bytes((ord("$"), ord("M"), ord("<"), size, Nav.SET_WP, 1)), world.now)
+    world.run(0.5)
+    world.plug()
+    world.wait_until(lambda w: w.kind is Kind.INAV, 15)
+    assert Upload(GroundStation(world), plan(10)).run() is ACCEPTED
+    assert not board.counters.cli_entered
