@@ -1,11 +1,12 @@
 """Queries for what is the case now: state, mission/current and mission/list."""
 
+from bridge.bridge import Bridge
 from service.control import MissionJobs
 from service.mission_data import Json
 from service.zenoh_link import keys
 from service.zenoh_link.payload import Payloads, strict
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
-from service.zenoh_link.vehicle_data import VehicleData
+from service.zenoh_link.vehicle_data import VehicleData, mission_current
 
 _USUAL_LIMIT, _MAX_LIMIT = 20, 200
 _TIMES = ("received_at", "concluded_at")
@@ -14,7 +15,8 @@ _TIMES = ("received_at", "concluded_at")
 class Answers:
     """Answers in the encoding of the samples."""
 
-    def __init__(self, data: VehicleData, jobs: MissionJobs, payloads: Payloads) -> None:
+    def __init__(self, data: VehicleData, bridge: Bridge, jobs: MissionJobs, payloads: Payloads) -> None:
+        self._bridge = bridge
         self._data = data
         self._jobs = jobs
         self._payloads = payloads
@@ -28,7 +30,7 @@ class Answers:
         self._tell(question, keys.STATE, self._data.state())
 
     async def _mission_current(self, question: Question) -> None:
-        self._tell(question, keys.MISSION_CURRENT, self._data.mission_current())
+        self._tell(question, keys.MISSION_CURRENT, mission_current(self._bridge.desk.held))
 
     async def _mission_list(self, question: Question) -> None:
         limit = question.parameter("limit") or str(_USUAL_LIMIT)

@@ -58,7 +58,7 @@ def tls_files(config: zenoh.Config) -> TlsFiles:
     return TlsFiles(*(Path(tls[field.name]) if tls[field.name] else None for field in fields(TlsFiles)))
 
 
-def in_short(error: zenoh.ZError) -> str:
+def in_short(error: Exception) -> str:
     """Return what zenoh says, on one line and without the places in its source."""
     text = " ".join(str(error).split())
     return text.split(" at /")[0].removesuffix(".")

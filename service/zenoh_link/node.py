@@ -10,6 +10,7 @@ What may wait goes over the session's thread:
 import asyncio
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import structlog
 import zenoh
@@ -55,6 +56,7 @@ class Node:
         self._daemon = daemon
         self._loop = asyncio.get_running_loop()
         self._config = make_config(settings)
+        self._endpoints = connect_endpoints(self._config)
         self._thread = SessionThread(self._config, self._declare)
         self._payloads = Payloads(settings.encoding)
         self._publisher = Publisher(self._payloads, self._readers_changed)
@@ -63,7 +65,7 @@ class Node:
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others)
         self._queries = Queries(self._thread)
         jobs = MissionJobs(daemon)
-        self._answerers = Answers(self._data, jobs, self._payloads).answerers
+        self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads).answerers
         if settings.commands:
             self._answerers |= Commands(jobs).answerers
         self._sent_at: dict[Group, float] = {}
@@ -148,9 +150,10 @@ class Node:
             self._publisher.put(key, self._data.group(group))
 
     def _send_surely(self, key: Key, body: Callable[[], Json]) -> None:
+        """Publish on the session's thread, where the body is made, too: a report of a long list takes its time."""
         if self._publisher.has_readers(key):
-            data = self._payloads.sample(key, body())
-            self._thread.submit(lambda: self._publisher.put_raw(key, data))
+            head = self._payloads.head(key)
+            self._thread.submit(lambda: self._publisher.put_raw(key, self._payloads.encode(head | body())))
 
     def _news(self) -> None:
         """Publish what changes as a whole, once for all that changes now."""
@@ -165,7 +168,7 @@ class Node:
     def _look_into_silence(self) -> None:
         """Say why nobody is joined who should be: zenoh goes on trying and says nothing."""
         now = self._loop.time()
-        if not self._presence.is_alone:
+        if not self._presence.is_alone or not self._endpoints:
             self._ask_why_at = now + _PATIENCE_S
         elif now >= self._ask_why_at:
             self._ask_why_at = now + _PATIENCE_S
@@ -173,9 +176,8 @@ class Node:
             threading.Thread(target=self._find_out_why, name="zenoh why", daemon=True).start()
 
     def _find_out_why(self) -> None:
-        endpoints = connect_endpoints(self._config)
-        why = endpoint_trouble(endpoints, tls_files(self._config)) if endpoints else ""
-        if why and why != self._why_alone:
+        why = endpoint_trouble(self._endpoints, tls_files(self._config))
+        if why != self._why_alone:
             self._why_alone = why
             _log.warning("zenoh.alone", why=why)
 
@@ -187,4 +189,4 @@ class Node:
         held = self._daemon.bridge.desk.held
         if held is not self._held:
             self._held = held
-            self._send_surely(keys.MISSION_CURRENT, self._data.mission_current)
+            self._send_surely(keys.MISSION_CURRENT, partial(vehicle_data.mission_current, held))

@@ -29,19 +29,19 @@ class Payloads:
 
     def __init__(self, encoding: PayloadEncoding) -> None:
         self.encoding = ENCODINGS[encoding]
-        self._encode = _to_json if encoding is PayloadEncoding.JSON else cbor2.dumps
+        self.encode: Callable[[Json], bytes] = _to_json if encoding is PayloadEncoding.JSON else cbor2.dumps
         self._next: dict[str, int] = {}
 
-    def sample(self, key: Key, body: Json) -> bytes:
-        """Make a payload to be published."""
+    def head(self, key: Key) -> Json:
+        """Begin the next payload of a key."""
         seq = self._next.get(key.suffix, 0)
         self._next[key.suffix] = seq + 1
-        return self._encode({"v": VERSION, "seq": seq, "time_s": time.time(), **body})
+        return {"v": VERSION, "seq": seq, "time_s": time.time()}
 
     def answer(self, key: Key, body: Json) -> bytes:
         """Make the answer to a query: it has the number of the last sample."""
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
-        return self._encode({"v": VERSION, "seq": seq, "time_s": time.time(), **body})
+        return self.encode({"v": VERSION, "seq": seq, "time_s": time.time(), **body})
 
 
 def plain(thing: Any) -> Json:

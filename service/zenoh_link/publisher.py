@@ -51,7 +51,7 @@ class Publisher:
 
     def put(self, key: Key, body: Json) -> None:
         """Publish plain data."""
-        self.put_raw(key, self._payloads.sample(key, body))
+        self.put_raw(key, self._payloads.encode(self._payloads.head(key) | body))
 
     def put_raw(self, key: Key, data: bytes) -> None:
         """Publish bytes."""

@@ -88,7 +88,8 @@ class SessionThread:
                 job = self._jobs.popleft()
             try:
                 job()
-            except zenoh.ZError as error:
+            except (zenoh.ZError, TypeError, ValueError) as error:
+                # Of the encoders, too: one sample must not end all others.
                 self._complain("zenoh.not_sent", error)
 
     def _open(self) -> zenoh.Session | None:
@@ -106,7 +107,7 @@ class SessionThread:
                 self._wake.wait_for(lambda: self._is_closing, _RETRY_S)
         return None
 
-    def _complain(self, event: str, error: zenoh.ZError) -> None:
+    def _complain(self, event: str, error: Exception) -> None:
         """Tell of a fault once, not of each time that it comes again."""
         why = in_short(error)
         level = _log.debug if why == self._complaint else _log.warning

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from bridge.bridge import Bridge
 from bridge.journal import Level
-from bridge.mission_desk import Delivery
+from bridge.mission_desk import Delivery, HeldMission
 from bridge.mission_log import ArrivedMission
 from bridge.vehicle_groups import Group
 from service.mission_data import Json
@@ -32,16 +32,16 @@ class VehicleData:
             **plain(self._bridge.report.whole()),
         }
 
-    def mission_current(self) -> Json:
-        """Return what the flight controller holds."""
-        held = self._bridge.desk.held
-        if held is None:
-            return {"count": None, "checksum": None, "items": None}
-        return {
-            "count": held.identity.count,
-            "checksum": f"{held.identity.checksum:08x}",
-            "items": [strict(asdict(item)) for item in held.items],
-        }
+
+def mission_current(held: HeldMission | None) -> Json:
+    """Return what the flight controller holds."""
+    if held is None:
+        return {"count": None, "checksum": None, "items": None}
+    return {
+        "count": held.identity.count,
+        "checksum": f"{held.identity.checksum:08x}",
+        "items": [strict(asdict(item)) for item in held.items],
+    }
 
 
 def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
