@@ -9,7 +9,7 @@ import json
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,7 +24,7 @@ from service.control_socket import find_socket
 from service.daemon import Daemon
 from service.mission_data import Json, mission_items, to_json, verdict_data, whole_number
 from service.store_worker import as_dicts
-from storage.mission_store import StoreError
+from storage.mission_store import MissionSummary, ReceivedMission, StoredMission, StoreError
 
 #: The greatest number that a request may hold.
 MOST = 2**31 - 1
@@ -138,17 +138,16 @@ class MissionJobs:
     async def list_missions(self, limit: int) -> Json:
         """List what came in, newest first."""
         missions = await self._daemon.store.ask(lambda store: store.list(limit))
-        return {"missions": [asdict(mission) | {"checksum": _hex(mission.checksum)} for mission in missions]}
+        return {"missions": [_fields(mission) | {"checksum": _hex(mission.checksum)} for mission in missions]}
 
     async def show_mission(self, number: int) -> Json:
         """Return one mission with all that is known of it."""
         mission = await self._daemon.store.ask(lambda store: store.get(number))
         if mission is None:
             raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows which there are")
-        data = asdict(mission)
-        data["received"]["records"] = mission.received.records.hex()
-        data["received"]["checksum"] = _hex(mission.received.checksum)
-        return data
+        received = mission.received
+        as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
+        return _fields(mission) | {"received": _fields(received) | as_text}
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:
         """Push a stored mission again, as it was sent then: the rules of today apply."""
@@ -238,6 +237,11 @@ def _resolve(future: asyncio.Future[T], result: T) -> None:
     # Whoever asked may be gone by now.
     if not future.done():
         future.set_result(result)
+
+
+def _fields(thing: MissionSummary | StoredMission | ReceivedMission) -> Json:
+    """Return the fields by name. Unlike asdict() it copies nothing: for 146 items that takes 8 ms of the loop."""
+    return {field.name: getattr(thing, field.name) for field in fields(thing)}
 
 
 def _hex(checksum: int) -> str:

@@ -10,13 +10,14 @@ GET  /metrics                            for Prometheus
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable
 from dataclasses import asdict
 from http import HTTPStatus
 
 from starlette.requests import Request
 from starlette.responses import Response
 
+from bridge.mission_log import Outcome
 from protocols.mission_item import MissionItem
 from service.control import MOST, ControlError, MissionJobs
 from service.daemon import Daemon
@@ -25,6 +26,7 @@ from service.mission_data import Json, mission_items, to_json
 from service.version import version
 from service.web.access import Handler, Refused, check_token
 from service.web.comparison import difference, shown, stored_mission
+from service.web.kept_answers import KeptAnswers
 from service.web.restoring import Restoring
 from service.web.token import Token
 from storage.store_error import StoreError
@@ -40,6 +42,7 @@ class Api:
         self._jobs = MissionJobs(daemon)
         self._token = token
         self._metrics = Metrics(daemon)
+        self._kept = KeptAnswers()
         self.restoring = Restoring(self._jobs)
 
     def handlers(self) -> dict[tuple[str, str], Handler]:
@@ -92,12 +95,23 @@ class Api:
         return _json(await _told(self._jobs.list_missions(_LISTED)))
 
     async def _mission(self, request: Request) -> Response:
-        mission = await self._find(request, "number")
-        return await _made(lambda: stored_mission(mission))
+        number = _number(request, "number")
+
+        async def make() -> tuple[str, bool]:
+            mission = await self._find(number)
+            text = await asyncio.to_thread(lambda: to_json(stored_mission(mission)))
+            return text, mission["outcome"] != Outcome.PENDING.value
+
+        return _text(await self._kept.get(str(number), make))
 
     async def _difference(self, request: Request) -> Response:
-        first, second = await self._find(request, "number"), await self._find(request, "other")
-        return await _made(lambda: {"rows": difference(_sent(first), _sent(second))})
+        number, other = _number(request, "number"), _number(request, "other")
+
+        async def make() -> tuple[str, bool]:
+            first, second = await self._find(number), await self._find(other)
+            return await asyncio.to_thread(lambda: to_json({"rows": difference(_sent(first), _sent(second))})), True
+
+        return _text(await self._kept.get(f"{number} {other}", make))
 
     async def _restore(self, request: Request) -> Response:
         check_token(request, self._token)
@@ -107,9 +121,8 @@ class Api:
     async def _render_metrics(self, _request: Request) -> Response:
         return Response(self._metrics.render(), media_type=CONTENT_TYPE)
 
-    async def _find(self, request: Request, name: str) -> Json:
-        """Return the stored mission whose number the path has under this name."""
-        return await _told(self._jobs.show_mission(_number(request, name)))
+    async def _find(self, number: int) -> Json:
+        return await _told(self._jobs.show_mission(number))
 
 
 def _number(request: Request, name: str) -> int:
@@ -133,11 +146,9 @@ async def _told(asked: Awaitable[Json]) -> Json:
         raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
 
 
-async def _made(make: Callable[[], Json]) -> Response:
-    """Make an answer of hundreds of items beside the loop that serves the links."""
-    text = await asyncio.to_thread(lambda: to_json(make()))
-    return Response(text, media_type="application/json")
-
-
 def _json(value: Json, status: HTTPStatus = HTTPStatus.OK) -> Response:
-    return Response(to_json(value), status, media_type="application/json")
+    return _text(to_json(value), status)
+
+
+def _text(json: str, status: HTTPStatus = HTTPStatus.OK) -> Response:
+    return Response(json, status, media_type="application/json")

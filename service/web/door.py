@@ -13,9 +13,9 @@ LIFETIME_S = 15.0
 MAX_CONNECTIONS = 48
 #: One phone does not lock out the others. A page that is opened takes six at once.
 MAX_FROM_ONE = 16
-#: An open page asks once a second, one that is loaded a dozen times at once. A request costs about half a millisecond.
-MAX_IN_A_SECOND = 200
-MAX_IN_A_SECOND_FROM_ONE = 100
+#: An open page asks once a second, one that is loaded a dozen times at once. A request costs about a millisecond.
+MAX_IN_A_SECOND = 100
+MAX_IN_A_SECOND_FROM_ONE = 50
 
 
 class Door:

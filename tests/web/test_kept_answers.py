@@ -1,0 +1,39 @@
+"""Big answers are made one at a time and once; what may still change is made anew."""
+
+import asyncio
+
+from service.web.kept_answers import KeptAnswers
+
+
+class _Maker:
+    """Makes answers, and counts how many were in the making at once."""
+
+    def __init__(self, *, is_final: bool) -> None:
+        self.made = 0
+        self.at_once = 0
+        self._is_final = is_final
+        self._making = 0
+
+    async def make(self) -> tuple[str, bool]:
+        self._making += 1
+        self.at_once = max(self.at_once, self._making)
+        await asyncio.sleep(0)
+        self._making -= 1
+        self.made += 1
+        return f"answer {self.made}", self._is_final
+
+
+async def test_what_is_final_is_made_once() -> None:
+    kept, maker = KeptAnswers(), _Maker(is_final=True)
+    answers = await asyncio.gather(*(kept.get("1", maker.make) for _ in range(5)))
+    assert answers == ["answer 1"] * 5
+    for other in range(2, 12):
+        await kept.get(str(other), maker.make)
+    assert await kept.get("1", maker.make) == "answer 12"  # but not kept for ever
+
+
+async def test_what_may_change_is_made_each_time_but_never_two_at_once() -> None:
+    kept, maker = KeptAnswers(), _Maker(is_final=False)
+    answers = await asyncio.gather(*(kept.get(str(number % 2), maker.make) for number in range(4)))
+    assert sorted(answers) == [f"answer {number}" for number in range(1, 5)]
+    assert maker.at_once == 1
