@@ -18,7 +18,7 @@ from bridge.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, S
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.simulator.options import SimOptions, TelemetryProtocol
 
-EMPTY = {
+EMPTY: dict[Group, Any] = {
     Group.ATTITUDE: Attitude(),
     Group.POSITION: Position(),
     Group.GPS: Gps(),
@@ -156,7 +156,7 @@ def test_no_content_of_a_frame_is_too_odd(data: st.DataObject) -> None:
         crc = m.x25crc(checked + bytes((known.crc_extra,))).crc
         groups.take([MavlinkFrame(b"\xfd" + checked + crc.to_bytes(2, "little"))])
     for group in EMPTY:
-        found = getattr(groups, group.value)()
+        found: Any = getattr(groups, group.value)()
         assert isinstance(found, type(EMPTY[group]))
         assert json.dumps(asdict(found), allow_nan=False)
 

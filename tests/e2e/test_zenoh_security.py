@@ -4,6 +4,7 @@ import datetime
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,13 @@ import pytest
 import trustme
 from benches import Bench, Starter
 from plan import judge, plain_plan, records_of
-from programs import run_naze_bridge, until
+from programs import until
 from secured_fleet import Fleet, password_fleet, tls_fleet
 from zenoh_bench import Reader, ask, ask_surely, body, key, write_config, zenoh_bench
 
 from protocols.mission_file import write_qgc_wpl
+from service.settings.load import load_settings
+from service.settings.problem import SettingsError
 from service.zenoh_link.keys import COMMANDS
 
 UPLOAD = f"{COMMANDS}/mission/upload"
@@ -23,10 +26,26 @@ EXPIRED: dict[str, Any] = {"not_before": datetime.datetime(2020, 1, 1), "not_aft
 MISSION = write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(12))]).encode()
 
 
-@pytest.fixture(params=[tls_fleet, password_fleet], ids=["certificates", "passwords"], scope="module")
-def fleet(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
+@pytest.fixture(scope="module")
+def stack() -> Iterator[ExitStack]:
     with ExitStack() as stack:
-        yield request.param(tmp_path_factory.mktemp("fleet"), stack)
+        yield stack
+
+
+@pytest.fixture(scope="module")
+def tls(stack: ExitStack, tmp_path_factory: pytest.TempPathFactory) -> Fleet:
+    return tls_fleet(tmp_path_factory.mktemp("tls"), stack)
+
+
+@pytest.fixture(scope="module")
+def passwords(stack: ExitStack, tmp_path_factory: pytest.TempPathFactory) -> Fleet:
+    return password_fleet(tmp_path_factory.mktemp("passwords"), stack)
+
+
+@pytest.fixture(params=["tls", "passwords"])
+def fleet(request: pytest.FixtureRequest) -> Fleet:
+    found: Fleet = request.getfixturevalue(request.param)
+    return found
 
 
 def secured_bench(start: Starter, config: Path) -> Bench:
@@ -64,31 +83,27 @@ def test_a_vehicle_that_may_not_publish_goes_on_flying(start: Starter, fleet: Fl
     bench.board.assert_was_treated_well()
 
 
-@pytest.mark.parametrize("fault", ["expired", "of another name", "none"])
-def test_a_vehicle_whose_certificate_does_not_hold_says_so(start: Starter, tmp_path: Path, fault: str) -> None:
-    with ExitStack() as stack:
-        folder = tmp_path / "tls"
-        folder.mkdir()
-        fleet = tls_fleet(folder, stack)
-        config = fleet.config("vehicle", "naze-1")
-        if fault == "none":
-            (folder / "naze-1.pem").unlink()
-            said = f"there is no file {folder / 'naze-1.pem'}"
-        else:
-            authority = trustme.CA() if fault == "of another name" else own_authority(folder)
-            past: dict[str, Any] = {} if fault == "of another name" else EXPIRED
-            issued = authority.issue_cert("naze-1", common_name="naze-1", **past)
-            issued.private_key_pem.write_to_path(str(folder / "naze-1.key"))
-            issued.cert_chain_pems[0].write_to_path(str(folder / "naze-1.pem"))
-            said = "the router refuses our certificate"
-        bench = secured_bench(start, config)
-        alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a word about the certificate")
+def test_vehicles_whose_certificates_do_not_hold_say_so(tls: Fleet, stack: ExitStack, tmp_path: Path) -> None:
+    own = trustme.CA.from_pem((tls.folder / "ca.pem").read_bytes(), (tls.folder / "ca.key").read_bytes())
+    for name, issued in {
+        "old": own.issue_cert("naze-1", common_name="naze-1", **EXPIRED),
+        "foreign": trustme.CA().issue_cert("naze-1", common_name="naze-1"),
+    }.items():
+        issued.private_key_pem.write_to_path(str(tls.folder / f"{name}.key"))
+        issued.cert_chain_pems[0].write_to_path(str(tls.folder / f"{name}.pem"))
+    refused = "the router refuses our certificate"
+    wrong = {"old": refused, "foreign": refused, "nobody": f"there is no file {tls.folder / 'nobody.pem'}"}
+    daemons = {}
+    for name in wrong:
+        (tmp_path / name).mkdir()
+        config = write_config(tmp_path / name, f'config_file = "{tls.config("vehicle", name)}"')
+        daemons[name] = Starter(tmp_path / name, stack).daemon("sim:", options=("--config", str(config)))
+    for name, said in wrong.items():
+        alone = until(partial(daemons[name].has_logged, "zenoh.alone"), "a word about the certificate")
         assert said in alone["why"]
-        bench.daemon.push(plain_plan(9))
-
-
-def own_authority(folder: Path) -> trustme.CA:
-    return trustme.CA.from_pem((folder / "ca.pem").read_bytes(), (folder / "ca.key").read_bytes())
+        daemons[name].wait()
+        daemons[name].push(plain_plan(9))
+        assert daemons[name].end() == 0
 
 
 SETTINGS_THAT_END_IT = {
@@ -122,10 +137,12 @@ def test_settings_that_cannot_be_used_end_the_start_with_a_sentence(tmp_path: Pa
     if zenoh_file is not None:
         (tmp_path / "zenoh.json5").write_text(zenoh_file)
     config = write_config(tmp_path, table, vehicle="")
-    ended = run_naze_bridge("run", "--fc", "sim:", "--config", config, "--state-dir", tmp_path / "state")
-    assert ended.returncode == 2, ended
-    assert said in ended.stderr
-    assert "Traceback" not in ended.stderr
+    with pytest.raises(SettingsError) as caught:
+        load_settings(config, "sim:", (), tmp_path)
+    (problem,) = caught.value.problems
+    assert said in problem.text
+    assert "\n" not in problem.text
+    assert str(config) in problem.where
 
 
 @pytest.mark.parametrize("of", ["zenoh-tls", "zenoh-password"])
@@ -133,5 +150,6 @@ def test_the_examples_are_proof_enough_for_commands(tmp_path: Path, of: str) -> 
     """No "I know" is needed where everybody proves who it is."""
     example = Path(__file__).parents[2] / "examples" / of / "vehicle.json5"
     config = write_config(tmp_path, f'config_file = "{example}"\ncommands = true\nmavlink_in = true')
-    ended = run_naze_bridge("run", "--fc", "sim:", "--config", config, "--check-config")
-    assert ended.returncode == 0, ended
+    settings = load_settings(config, "sim:", (), tmp_path)
+    assert settings.zenoh is not None
+    assert (settings.zenoh.commands, settings.zenoh.mavlink_in) == (True, True)
