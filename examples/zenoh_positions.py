@@ -18,6 +18,8 @@ def main(endpoint: str) -> None:
     newest: dict[str, int] = {}
 
     def heard(sample: zenoh.Sample) -> None:
+        if sample.encoding != zenoh.Encoding.APPLICATION_JSON:
+            return  # a vehicle may be set to CBOR; cbor2.loads() reads that
         key = str(sample.key_expr)
         vehicle = key.split("/")[1]
         position = json.loads(sample.payload.to_bytes())

@@ -22,7 +22,6 @@ from service.fleet.roll_call import alive, chosen, roll_call
 from service.fleet.session import DEFAULT_ENDPOINT, FleetAddress, FleetError, is_connected, open_session
 from service.fleet.watch import Watch, watching
 from service.mission_source import mission_bytes, save_mission
-from service.mission_table import mission_table
 from service.printing import fail, print_json, print_table
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError, check_name
 
@@ -177,6 +176,9 @@ def _show(held: Held, *, with_items: bool) -> None:
         return
     click.echo(f"{held.vehicle}: {held.count} records, checksum {held.checksum}")
     if with_items and held.items:
+        # Here, because nothing else in the fleet's commands needs the names of MAVLink's commands.
+        from service.mission_table import mission_table
+
         print_table(mission_table(held.items, held.items, ()))
 
 

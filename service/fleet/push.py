@@ -4,23 +4,20 @@
 """
 
 import queue
-import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import zenoh
 
 from service.fleet.payload import decode, part, text, whole
-from service.fleet.roll_call import alive
-from service.fleet.session import send_query
+from service.fleet.session import ask, send_query
 from service.fleet.vehicle import Bridge, bridge_of
 from service.mission_data import Json
-from service.zenoh_link.keys import ALIVE, UPLOAD, full
+from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
 _PATIENCE_S = 120.0
-#: Of a vehicle that dies, the end of its answers may be heard a little before the end of its token.
-_GRACE_S = 0.5
+_STATE_PATIENCE_S = 2.0
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _LOOK = "`naze-bridge fleet list` tells what it holds"
 _LOST = f"it, or the router, went away before the end of the push was known; {_LOOK} when it is back"
@@ -125,12 +122,9 @@ def push(
 
     def ended(name: str) -> None:
         if not fleet.vehicles[name].is_done:
-            later = threading.Timer(_GRACE_S, lambda: events.put(lambda: judged(name)))
-            later.daemon = True
-            later.start()
-
-    def judged(name: str) -> None:
-        fleet.ended(name, is_alive=name in {bridge.vehicle for bridge in alive(session, prefix)})
+            # Its token does not tell: that of a vehicle which has just died may still be there.
+            state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_PATIENCE_S)
+            fleet.ended(name, is_alive=any(reply.ok is not None for reply in state))
 
     def start(name: str) -> None:
         send_query(

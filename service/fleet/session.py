@@ -12,7 +12,8 @@ from typing import Any
 
 import zenoh
 
-from service.zenoh_link.endpoint_trouble import TlsFiles, endpoint_trouble
+from service.zenoh_link.configuration import connect_endpoints, in_short, tls_files
+from service.zenoh_link.endpoint_trouble import endpoint_trouble
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
 #: Somebody who does not speak zenoh is given up after so long; zenoh's own patience is 10 s.
@@ -38,13 +39,13 @@ class FleetAddress:
 def open_session(address: FleetAddress) -> zenoh.Session:
     """Join; FleetError says why that is impossible."""
     config = _config(address)
-    endpoints = _get(config, "connect/endpoints") or []
-    if not isinstance(endpoints, list) or not endpoints:
+    endpoints = connect_endpoints(config)
+    if not endpoints:
         raise FleetError(f"{address.config_file} names no connect/endpoints: add them, or use --connect")
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        trouble = endpoint_trouble([str(each) for each in endpoints], _tls_files(config))
+        trouble = endpoint_trouble(endpoints, tls_files(config))
         raise FleetError(f"no way into the fleet; {trouble}") from error
 
 
@@ -99,7 +100,7 @@ def _config(address: FleetAddress) -> zenoh.Config:
         for key, value in settings.items():
             config.insert_json5(key, json.dumps(value))
     except zenoh.ZError as error:
-        raise FleetError(f"zenoh does not take --connect {' --connect '.join(endpoints)}: {_brief(error)}") from error
+        raise FleetError(f"zenoh does not take --connect {' --connect '.join(endpoints)}: {in_short(error)}") from error
     return config
 
 
@@ -110,25 +111,4 @@ def _from_file(path: Path) -> zenoh.Config:
     except OSError as error:
         raise FleetError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
     except zenoh.ZError as error:
-        raise FleetError(f"{path} is no zenoh configuration: {_brief(error)}") from error
-
-
-def _brief(error: zenoh.ZError) -> str:
-    """Return zenoh's words without the place in its source, on one line."""
-    return " ".join(str(error).split(" at /")[0].split())
-
-
-def _get(config: zenoh.Config, key: str) -> object:
-    try:
-        value: object = json.loads(config.get_json(key))
-    except (zenoh.ZError, ValueError):
-        return None
-    return value
-
-
-def _tls_files(config: zenoh.Config) -> TlsFiles:
-    def path(name: str) -> Path | None:
-        value = _get(config, f"transport/link/tls/{name}")
-        return Path(value) if isinstance(value, str) else None
-
-    return TlsFiles(path("root_ca_certificate"), path("connect_certificate"), path("connect_private_key"))
+        raise FleetError(f"{path} is no zenoh configuration: {in_short(error)}") from error

@@ -1,6 +1,7 @@
 """`naze-bridge fleet` as a person and a script use it: three daemons behind a router."""
 
 import json
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -176,6 +177,22 @@ def test_the_examples(fleet: Fleet, tmp_path: Path) -> None:
     finally:
         positions.kill()
         positions.wait()
+
+
+def test_the_line_for_the_shell(fleet: Fleet, tmp_path: Path) -> None:
+    page = (EXAMPLES.parent / "docs" / "fleet.md").read_text()
+    (line,) = [line.strip() for line in page.splitlines() if line.startswith("    python -u -c")]
+    program, flag, option, code = shlex.split(line)
+    assert (program, flag, option) == ("python", "-u", "-c")
+    output = tmp_path / "samples"
+    with output.open("w") as log:
+        command = [sys.executable, "-u", "-c", code.replace("tcp/localhost:7447", fleet.router.endpoint)]
+        reader = subprocess.Popen(command, stdout=log, stderr=log)
+    try:
+        until(lambda: "fleet/kite/telemetry/position b'{" in output.read_text(), "a position")
+    finally:
+        reader.kill()
+        reader.wait()
 
 
 def test_a_name_for_two(fleet: Fleet, tmp_path: Path) -> None:

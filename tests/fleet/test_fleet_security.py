@@ -14,7 +14,7 @@ import trustme
 import zenoh
 from programs import free_port, run_naze_bridge, until
 from secured_fleet import Fleet, password_fleet, tls_fleet
-from zenoh_router import running_router
+from zenoh_router import EXAMPLES, running_router
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +46,11 @@ def stands_in_for(stack: ExitStack, session: zenoh.Session, vehicle: str) -> Non
         with query:
             query.reply(query.key_expr, "{}")
 
+    def accept(query: zenoh.Query) -> None:
+        with query:
+            result = {"ack": "MAV_MISSION_ACCEPTED", "text": "Mission verified: 15 records", "findings": []}
+            query.reply(query.key_expr, json.dumps({"result": result}))
+
     # The answer is given under the vehicle's own key, as a bridge does: a query's may have wildcards.
     def state(query: zenoh.Query) -> None:
         with query:
@@ -53,6 +58,7 @@ def stands_in_for(stack: ExitStack, session: zenoh.Session, vehicle: str) -> Non
 
     stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/state", state))
     stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/@cmd/v1/status", answer))
+    stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/@cmd/v1/mission/upload", accept))
     stack.enter_context(session.liveliness().declare_token(f"fleet/{vehicle}/alive/{session.zid()}"))
 
 
@@ -79,6 +85,20 @@ def test_a_vehicle_is_seen_by_everybody_and_commanded_by_the_pilot(secured: Flee
         until(hears, "a sample")
         listed = secured.fleet_list(secured.config("pilot", "pilot"))
         assert (listed.returncode, "naze-1" in listed.stdout) == (0, True), listed
+
+
+def test_a_push_is_the_pilots(secured: Fleet) -> None:
+    def push(name: str) -> subprocess.CompletedProcess[str]:
+        file, config = EXAMPLES / "naze-field.waypoints", secured.config("pilot", name)
+        return run_naze_bridge("fleet", "push", file, "--vehicle", "naze-1", "--zenoh-config", config)
+
+    with ExitStack() as stack:
+        stands_in_for(stack, stack.enter_context(secured.open("vehicle", "naze-1")), "naze-1")
+        until(lambda: "naze-1" in secured.fleet_list(secured.config("pilot", "pilot")).stdout, "the vehicle")
+        assert push("pilot").returncode == 0
+        denied = push("guest")
+    assert denied.returncode == 1, denied
+    assert "the router's access control denies them to you" in " ".join(denied.stdout.split())
 
 
 def test_a_vehicle_cannot_be_another_one(secured: Fleet) -> None:
