@@ -17,14 +17,19 @@ def socket_of_daemon(state_dir: Path) -> Path:
 
 
 def find_socket(state_dir: Path | None) -> Path:
-    """Return where the daemon that is meant listens: on `state_dir`, else the user's own, else the service's."""
+    """Return where the daemon that is meant listens: on `state_dir`, else the user's own, else the service's.
+
+    SettingsError if this is a user without a home, and there is no service.
+    """
     if state_dir is not None:
         return state_dir / SOCKET_NAME
     service = (_runtime_directory() or Path(_SERVICE_FOLDER)) / SOCKET_NAME
     try:
         own = default_state_dir() / SOCKET_NAME
     except SettingsError:
-        return service
+        if service.exists():
+            return service
+        raise
     return service if service.exists() and not own.exists() else own
 
 

@@ -49,13 +49,17 @@ def find_console(path: str) -> str | None:
 
 def find_holder(path: str) -> str | None:
     """Return "NAME (pid N)" of another process that has the port open, as far as we may see it."""
-    target = os.path.realpath(path)
+    try:
+        target = os.stat(path)
+    except OSError:
+        return None
     for process in _processes():
         if process.name == str(os.getpid()):
             continue
         try:
             for descriptor in (process / "fd").iterdir():
-                if os.path.realpath(descriptor) == target:
+                # By the device: a process in a container may have another one of the same name.
+                if os.path.samestat(descriptor.stat(), target):
                     return f"{(process / 'comm').read_text().strip()} (pid {process.name})"
         except OSError:
             continue
