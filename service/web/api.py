@@ -17,6 +17,7 @@ from http import HTTPStatus
 from starlette.requests import Request
 from starlette.responses import Response
 
+from bridge.mission_desk import HeldMission
 from bridge.mission_log import Outcome
 from protocols.mission_item import MissionItem
 from service.control import MOST, ControlError, MissionJobs
@@ -43,6 +44,7 @@ class Api:
         self._token = token
         self._metrics = Metrics(daemon)
         self._kept = KeptAnswers()
+        self._held_text: tuple[HeldMission, str] | None = None
         self.restoring = Restoring(self._jobs)
 
     def handlers(self) -> dict[tuple[str, str], Handler]:
@@ -83,13 +85,9 @@ class Api:
         held = self._daemon.bridge.desk.held
         if held is None:
             return _json({"count": None, "checksum": None, "items": []})
-        return _json(
-            {
-                "count": held.identity.count,
-                "checksum": f"{held.identity.checksum:08x}",
-                "items": [shown(item) for item in held.items],
-            }
-        )
+        if self._held_text is None or self._held_text[0] is not held:
+            self._held_text = held, _held_text(held)
+        return _text(self._held_text[1])
 
     async def _missions(self, _request: Request) -> Response:
         return _json(await _told(self._jobs.list_missions(_LISTED)))
@@ -144,6 +142,11 @@ async def _told(asked: Awaitable[Json]) -> Json:
         raise Refused(HTTPStatus.NOT_FOUND, str(error)) from error
     except StoreError as error:
         raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+
+
+def _held_text(held: HeldMission) -> str:
+    identity, items = held.identity, [shown(item) for item in held.items]
+    return to_json({"count": identity.count, "checksum": f"{identity.checksum:08x}", "items": items})
 
 
 def _json(value: Json, status: HTTPStatus = HTTPStatus.OK) -> Response:

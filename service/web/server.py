@@ -21,7 +21,7 @@ from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
 
 #: An access point's address may come up after the daemon: it is waited for.
-_RETRY_S = 5.0
+_RETRY_S = 2.0
 #: Connections that come at once are taken a few at a time; in between the links are served.
 _BACKLOG = 16
 _log = structlog.get_logger()

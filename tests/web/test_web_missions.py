@@ -76,6 +76,21 @@ def test_nothing_is_restored_while_armed(web: WebBench) -> None:
     assert web.board.records() == held
 
 
+def test_a_craft_that_is_armed_and_speaks_mavlink(start: Starter) -> None:
+    """One vehicle, whatever its flight controller speaks now."""
+    board = start.board("--tele-prot", "2")
+    web = web_daemon(start, str(board.link))
+    web.daemon.push(plain_plan(9))
+    board.set("armed 1")
+    state = until(
+        lambda: (now := web.state())["link"]["state"] == "MAVLink" and now["status"]["armed"] and now, "MAVLink"
+    )
+    assert state["traffic"]["fc"]["bytes_received"] > 0
+    ended = web.restore(1)
+    assert not ended["ok"]
+    assert "rmed" in ended["text"]
+
+
 def test_one_restore_at_a_time(web: WebBench) -> None:
     assert web.board is not None
     web.daemon.push(plain_plan(9))
