@@ -11,6 +11,7 @@
 #   make deb            build the Debian packages for amd64 and arm64 in dist/ (ARCH=arm64: only that one)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
+#   make cli-page    write docs/cli.md anew
 #   make config-sample  write systemd/config.toml and the keys of docs/configuration.md anew
 #   make zenoh-schemas  write service/zenoh_link/schemas/ anew, from the types that the payloads are made of
 #   make clean          remove everything that the above have made
@@ -23,7 +24,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench pictures soak deb lock message-table config-sample zenoh-schemas clean
+.PHONY: demo test lint bench pictures soak deb lock message-table config-sample cli-page zenoh-schemas clean
 
 # Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -93,6 +94,9 @@ lock:
 message-table: $(VENV)/.test-ready
 	$(BIN)/python -m protocols.mavlink.make_message_table > $(VENV)/message_table.py
 	mv $(VENV)/message_table.py protocols/mavlink/
+
+cli-page: $(VENV)/.test-ready
+	$(BIN)/python -m service.cli_page > docs/cli.md
 
 # The sample file of all settings, and their reference page.
 config-sample: $(VENV)/.test-ready

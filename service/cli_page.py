@@ -1,0 +1,36 @@
+"""The reference page of the command line, docs/cli.md: what each command says to --help (`make cli-page`)."""
+
+import sys
+from collections.abc import Iterator
+
+import click
+
+from service.cli import main
+
+_WIDTH = 100
+_HEAD = """\
+# The command line
+
+What every command says to `--help`. Exit codes that all share: 0 done, 1 refused or failed, 2 wrong usage or an unreadable file, 74 the output cannot be
+written.
+"""
+
+
+def page() -> str:
+    """Return the page."""
+    return _HEAD + "".join(f"\n## {name}\n\n```\n{text}\n```\n" for name, text in _helps(main, "naze-bridge", None))
+
+
+def _helps(command: click.Command, name: str, parent: click.Context | None) -> Iterator[tuple[str, str]]:
+    short = name.split()[-1]
+    context = click.Context(command, parent=parent, info_name=short, terminal_width=_WIDTH, max_content_width=_WIDTH)
+    yield name, command.get_help(context)
+    if isinstance(command, click.Group):
+        for each in command.list_commands(context):
+            inner = command.get_command(context, each)
+            if inner is not None:
+                yield from _helps(inner, f"{name} {each}", context)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page())

@@ -1,0 +1,9 @@
+"""docs/cli.md is what the commands say themselves."""
+
+from pathlib import Path
+
+from service.cli_page import page
+
+
+def test_the_page_is_up_to_date() -> None:
+    assert (Path(__file__).parents[1] / "docs" / "cli.md").read_text() == page(), "run make cli-page"
