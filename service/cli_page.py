@@ -11,8 +11,8 @@ _WIDTH = 100
 _HEAD = """\
 # The command line
 
-What every command says to `--help`. Exit codes that all share: 0 done, 1 refused or failed, 2 wrong usage or an unreadable file, 74 the output cannot be
-written.
+What every command says to `--help`. Exit codes that all share: 0 done, 1 refused or failed, 2 wrong usage or an
+unreadable file, 74 the output cannot be written.
 """
 
 
