@@ -19,7 +19,7 @@ from bridge.reply_debt import ReplyDebt
 from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.commands import Msp
-from protocols.msp.frame import Direction, MspFrame, MspParser, request
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 
 PROBE = request(Msp.IDENT)
 
@@ -112,7 +112,7 @@ class Autosense:
         self.speed = next(self._order)
         self.phase = Phase.LISTEN
         self.found: Found | None = None
-        self._debt = debt or ReplyDebt()
+        self.debt = debt or ReplyDebt()
         self._output: list[bytes] = []
         self._visit = self._new_visit(now)
 
@@ -165,8 +165,8 @@ class Autosense:
 
     def _probe(self, now: float) -> float:
         """Ask, if there is room for the answer; return how long to wait for it."""
-        room = self._debt.room(self.speed, now)
-        waiting = self._debt.questions(self.speed, now)
+        room = self.debt.room(self.speed, now)
+        waiting = self.debt.questions(self.speed, now)
         interval_s = _PROBE_INTERVAL_S * max(waiting / _QUICK_PROBES, 1)
         # Each second probe also fills a parser that was left in mid-frame.
         if self._visit.probes % 2 and room >= RESYNC_REPLY_SIZE:
@@ -178,7 +178,7 @@ class Autosense:
     def _ask(self, frame: bytes, reply_size: int, now: float) -> float:
         """Send; return how long the question and its answer are on the wire."""
         self._visit.probes += 1
-        self._debt.add(self.speed, reply_size, now)
+        self.debt.add(self.speed, reply_size, now)
         self._output.append(frame)
         return self._on_wire_s(frame)
 
@@ -189,7 +189,7 @@ class Autosense:
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
         visit = self._visit
         if frame.direction is not Direction.REQUEST:
-            self._debt.settle()
+            self.debt.heard(self.speed, len(frame.payload) + FRAME_OVERHEAD, now)
         if self.found or frame.command != Msp.IDENT or frame.direction is Direction.REQUEST:
             return
         if visit.answer == frame:
@@ -197,13 +197,15 @@ class Autosense:
             return
         visit.answer = frame
         self.phase = Phase.CONFIRM
-        visit.phase_ends = now + self._ask(PROBE, _ANSWER_SIZE, now) + _CONFIRM_S
+        # Without room for one more, the answers that are owed will do.
+        has_room = self.debt.room(self.speed, now) >= _ANSWER_SIZE
+        visit.phase_ends = now + (self._ask(PROBE, _ANSWER_SIZE, now) if has_room else 0.0) + _CONFIRM_S
         visit.ends = max(visit.ends, visit.phase_ends)
 
     def _mavlink_frame(self, frame: MavlinkFrame, now: float) -> None:
         visit = self._visit
         before, visit.last_mavlink = visit.last_mavlink, frame
-        self._debt.settle()
+        self.debt.heard(self.speed, 0, now)
         if self.found or visit.heartbeat is not None:
             return
         follows = (

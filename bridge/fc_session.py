@@ -217,7 +217,8 @@ class FcSession:
         was_known = self.controller is not None
         debt = ReplyDebt()
         if self.link is not None:
-            debt.add(self.speed, self.link.outstanding_bytes, self.link.last_heard_at)
+            for sent_at, size in self.link.unanswered():
+                debt.add(self.speed, size, sent_at)
         self._drop(now)
         if was_known:
             self._journal("warning", "fc.lost", why=why, speed_baud=self.speed, incident=self._follow_incident())
@@ -250,7 +251,7 @@ class FcSession:
         if found is None:
             return
         self._output += self._search.take_output()
-        self._search = None
+        debt, self._search = self._search.debt, None
         self._journal(
             "debug",
             "fc.sensed",
@@ -264,7 +265,7 @@ class FcSession:
             self._known_speed = found.speed
         if found.spoken is Spoken.MSP:
             self._enter(State.IDENTIFYING)
-            self.link = MspLink(found.speed, now)
+            self.link = MspLink(found.speed, now, debt.size(found.speed, now))
             self._runner.link_up(self.link)
             self._runner.start(identify_msp(), lambda who, at: self._identified(who, found, at), now)
         elif found.spoken is Spoken.MAVLINK:

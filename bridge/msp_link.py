@@ -32,6 +32,7 @@ _FIRST_GUESS_S = 0.03
 #: After so long without a byte nothing more comes of a frame that has begun.
 _LINE_SILENCE_S = 0.05
 _ANY_SIZE = 1 << 16
+_NO_COMMAND = -1
 #: An INAV that lost a frame's header reads the rest as typed by hand: a '#' and then silence for 100 ms opens its
 #: command line, an 'R' its boot loader. So after such a frame the line is not left silent: a harmless question follows.
 _FOLLOW_UP_S = 0.04
@@ -65,14 +66,19 @@ class _Request:
 
 
 class MspLink:
-    """One MSP line. `baud` is None where the line has no speed (TCP, the built-in simulator)."""
+    """One MSP line. `baud` is None where the line has no speed (TCP, the built-in simulator).
 
-    def __init__(self, baud: int | None, now: float) -> None:
+    `owed`: bytes of answers to others that may still come first.
+    """
+
+    def __init__(self, baud: int | None, now: float, owed: int = 0) -> None:
         self._byte_s = 10 / baud if baud else 0.0
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
         self._parser = MspParser()
         self._waiting: deque[Send] = deque()
         self._sent: list[_Request] = []  # in the order in which they went out
+        if owed:
+            self._sent.append(_Request(_NO_COMMAND, owed, now, now + owed * self._byte_s, exclusive=False, awaited=False))
         self._output: list[bytes] = []
         self._line_free_at = now
         self._round_trip_s = _FIRST_GUESS_S
@@ -93,6 +99,10 @@ class MspLink:
     def outstanding_bytes(self) -> int:
         """Reply bytes that may still come."""
         return sum(sent.reply_size for sent in self._sent)
+
+    def unanswered(self) -> list[tuple[float, int]]:
+        """Return when what may still be answered was asked, and the sizes of the replies."""
+        return [(sent.sent_at, sent.reply_size) for sent in self._sent]
 
     @property
     def round_trip_s(self) -> float:

@@ -11,25 +11,37 @@ class ReplyDebt:
     """Reply bytes that are owed, by the speed at which they were asked for: at another one nothing is understood."""
 
     def __init__(self) -> None:
-        self._owed: dict[int | None, list[tuple[float, int]]] = {}  # asked when, bytes
+        self._owed: dict[int | None, list[tuple[float, int]]] = {}  # until when, bytes; the oldest first
 
     def add(self, speed: int | None, size: int, asked_at: float) -> None:
         """Take note of a question whose reply has `size` bytes."""
-        self._owed.setdefault(speed, []).append((asked_at, size))
+        self._owed.setdefault(speed, []).append((asked_at + LONGEST_STALL_S, size))
 
     def room(self, speed: int | None, now: float) -> int:
         """Return how long the reply to another question may be."""
-        return MAX_OUTSTANDING_BYTES - sum(size for _, size in self._present(speed, now))
+        return MAX_OUTSTANDING_BYTES - self.size(speed, now)
+
+    def size(self, speed: int | None, now: float) -> int:
+        """Return how many bytes may still come."""
+        return sum(size for _, size in self._present(speed, now))
 
     def questions(self, speed: int | None, now: float) -> int:
         """Return how many questions may still be answered."""
         return len(self._present(speed, now))
 
-    def settle(self) -> None:
-        """Somebody has spoken: it goes on, and has answered all that it will."""
-        self._owed.clear()
+    def heard(self, speed: int | None, size: int, now: float) -> None:
+        """A reply of `size` bytes has come, or of none something else: it goes on, and the rest is on its way."""
+        rest: list[tuple[float, int]] = []
+        left_ring_at = now
+        for until, owed in self._present(speed, now):
+            paid = min(owed, size)
+            size -= paid
+            if owed > paid:
+                left_ring_at += (owed - paid) * 10 / speed if speed else 0.0
+                rest.append((min(until, left_ring_at), owed - paid))
+        self._owed = {speed: rest}
 
     def _present(self, speed: int | None, now: float) -> list[tuple[float, int]]:
-        owed = [entry for entry in self._owed.get(speed, ()) if now < entry[0] + LONGEST_STALL_S]
+        owed = [entry for entry in self._owed.get(speed, ()) if now < entry[0]]
         self._owed[speed] = owed
         return owed

@@ -77,7 +77,7 @@ def test_lost_bytes_make_no_ring_overflow(rate: float, extension: bool) -> None:
 
 
 @pytest.mark.parametrize("hang_s", [0.3, 1.0, 1.6, 2.0, 2.4, 2.8])
-@pytest.mark.parametrize("baud", [115200, 9600])
+@pytest.mark.parametrize("baud", [115200, 9600, 1200])
 @pytest.mark.parametrize("extension", [True, False])
 def test_a_board_that_stands_still_answers_no_more_than_its_ring_holds(
     hang_s: float, baud: int, extension: bool
