@@ -78,7 +78,9 @@ class MspLink:
         self._waiting: deque[Send] = deque()
         self._sent: list[_Request] = []  # in the order in which they went out
         if owed:
-            self._sent.append(_Request(_NO_COMMAND, owed, now, now + owed * self._byte_s, exclusive=False, awaited=False))
+            self._sent.append(
+                _Request(_NO_COMMAND, owed, now, now + owed * self._byte_s, exclusive=False, awaited=False)
+            )
         self._output: list[bytes] = []
         self._line_free_at = now
         self._round_trip_s = _FIRST_GUESS_S
