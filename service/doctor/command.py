@@ -1,8 +1,9 @@
 """`naze-bridge doctor`."""
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import click
@@ -33,18 +34,19 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
     help=f"The daemon's configuration. Default: {_SERVICE_CONFIG}, if it is there.",
 )
 @click.option("--state-dir", type=click.Path(path_type=Path), help="The daemon's folder for missions.")
-@click.option("--root", type=click.Path(path_type=Path), default=Path("/"), hidden=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each check.")
-def doctor(fc: str | None, config: Path | None, state_dir: Path | None, root: Path, as_json: bool) -> None:
+def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json: bool) -> None:
     """Look for what stands in the way of the bridge, and say what to do.
 
     Nothing is changed, and a daemon that runs is not disturbed. Exit code 0: no problem, 1: a problem was found.
     """
+    # A service's control socket is not in its state directory: only what was named is asked there.
+    asked = partial(ask_daemon, state_dir, STATUS)
     if config is None and fc is None and _SERVICE_CONFIG.exists():
         config = _SERVICE_CONFIG
         state_dir = state_dir or (_SERVICE_STATE if _SERVICE_STATE.is_symlink() else None)
     worst = Grade.OK
-    for checked in _examine(Host(root), fc, config, state_dir):
+    for checked in _examine(config, fc, state_dir, asked):
         _tell(checked, as_json=as_json)
         if checked.grade is Grade.PROBLEM:
             worst = Grade.PROBLEM
@@ -52,7 +54,9 @@ def doctor(fc: str | None, config: Path | None, state_dir: Path | None, root: Pa
         raise SystemExit(1)
 
 
-def _examine(host: Host, fc: str | None, config: Path | None, state_dir: Path | None) -> Iterator[Checked]:
+def _examine(
+    config: Path | None, fc: str | None, state_dir: Path | None, ask_running: Callable[[], Json]
+) -> Iterator[Checked]:
     try:
         settings = load_settings(config, fc, (), state_dir)
     except SettingsError as error:
@@ -61,7 +65,7 @@ def _examine(host: Host, fc: str | None, config: Path | None, state_dir: Path | 
         return
     if config is not None:
         yield Checked("configuration", Grade.OK, f"{config} can be used")
-    yield from examine(host, settings, lambda: ask_daemon(state_dir, STATUS), lambda: _listen(settings))
+    yield from examine(Host(), settings, ask_running, lambda: _listen(settings))
 
 
 def _listen(settings: Settings) -> Json:

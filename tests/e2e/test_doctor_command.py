@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import pytest
 from benches import Starter
 from programs import free_port, run_naze_bridge, until
 
@@ -22,7 +23,7 @@ def test_it_listens_to_the_flight_controller(start: Starter) -> None:
 def test_it_asks_a_running_daemon_and_does_not_disturb_it(start: Starter) -> None:
     bench = start.bench(gcs=())
     config = start.directory / "config.toml"
-    config.write_text(f'fc = "sim:"\ngcs = ["udpin:127.0.0.1:{bench.daemon.port}"]\n')
+    config.write_text(f'fc = "{bench.board.link}"\ngcs = ["udpin:127.0.0.1:{bench.daemon.port}"]\n')
     asked = until(lambda: bench.daemon.status(), "a daemon")
     ended = run_naze_bridge("doctor", "--config", config, "--state-dir", bench.daemon.state_dir, "--json")
     found = {line["check"]: line for line in map(json.loads, ended.stdout.splitlines())}
@@ -30,9 +31,19 @@ def test_it_asks_a_running_daemon_and_does_not_disturb_it(start: Starter) -> Non
     assert asked["flight_controller"] in found["flight controller"]["found"]
     assert found["missions"]["grade"] == "ok"
     assert found["port for ground stations"]["found"].startswith(f"UDP port {bench.daemon.port} is ")
-    after = bench.daemon.status()
-    assert after is not None
-    assert after["requests_lost"] == asked["requests_lost"]
+    assert bench.daemon.has_logged("fc.lost") is None
+    assert bench.daemon.has_logged("fc.port_lost") is None
+
+
+def test_it_asks_the_service(start: Starter, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its control socket is not in its state directory."""
+    runtime = start.directory / "run"
+    runtime.mkdir()
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(runtime))
+    start.daemon("sim:")
+    monkeypatch.setenv("XDG_STATE_HOME", str(start.directory / "a home without a daemon"))
+    until(lambda: run_naze_bridge("status").returncode == 0, "an answer of the service")
+    assert "daemon: runs, and was asked" in run_naze_bridge("doctor", "--fc", "sim:").stdout
 
 
 def test_nothing_in_the_way_is_0(tmp_path: Path) -> None:
