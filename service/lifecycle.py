@@ -9,7 +9,7 @@ import structlog
 
 from service.daemon import Daemon
 from service.notify import Notifier
-from service.reload import reload
+from service.reload import reload_when_told
 from service.settings import Settings
 
 #: How often the line for `systemctl status` is looked at, and at least how often within the watchdog's time it is fed.
@@ -43,7 +43,9 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
 
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, signalled, number)
-    loop.add_signal_handler(signal.SIGHUP, reload, daemon, notifier, load)
+    told_to_reload = asyncio.Event()
+    loop.add_signal_handler(signal.SIGHUP, told_to_reload.set)
+    reloading = loop.create_task(reload_when_told(told_to_reload, daemon, notifier, load))
     reporting = _Reporting(daemon, notifier)
     ready = loop.create_task(_tell_ready(daemon, notifier))
     try:
@@ -52,6 +54,7 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
     finally:
         reporting.end()
         ready.cancel()
+        reloading.cancel()
         if stopping is not None:
             stopping.cancel()
         notifier.close()

@@ -20,15 +20,27 @@ _WEIGHTS = {level: weight for weight, level in enumerate(_PRIORITIES)}
 #: An event that comes more often than this is left out for the rest of the time, and counted.
 _MOST, _WITHIN_S = 20, 10.0
 
+_log = structlog.get_logger()
+
 
 class _StandardError:
     """Prints a line, or loses it: a full disk behind a log, or a pipe that nobody reads, must not stop the bridge."""
 
+    def __init__(self) -> None:
+        self._is_broken_off = False
+
     def msg(self, line: str) -> None:
+        if sys.stderr is None:  # closed by who started us, as daemons of old were started
+            return
+        start = "\n" if self._is_broken_off else ""
+        rest = f"{start}{line}\n".encode(errors="backslashreplace")
         with suppress(OSError):
-            if not select.select([], [sys.stderr], [], 0)[1]:
-                return
-            print(line, file=sys.stderr, flush=True)  # noqa: T201
+            descriptor = sys.stderr.fileno()
+            # A pipe that takes anything takes so much without waiting.
+            while rest and select.select([], [descriptor], [], 0)[1]:
+                self._is_broken_off = True
+                rest = rest[os.write(descriptor, rest[: select.PIPE_BUF]) :]
+        self._is_broken_off = self._is_broken_off and bool(rest)
 
     debug = info = warning = error = msg
 
@@ -46,18 +58,20 @@ class _LeastLevel:
 
 
 class _RateLimit:
-    """Keeps a fault that repeats itself from filling the log: the first line after it tells how many were left out."""
+    """Keeps a fault that repeats itself from filling the log; before the next line it is told what was left out."""
 
     def __init__(self) -> None:
         self._seen: dict[str, tuple[float, int]] = {}
 
     def __call__(self, _logger: object, _method: str, event: EventDict) -> EventDict:
         now = time.monotonic()
-        began, count = self._seen.get(event["event"], (now, 0))
-        if now >= began + _WITHIN_S:
+        over = [(name, count) for name, (began, count) in self._seen.items() if now >= began + _WITHIN_S]
+        for name, _ in over:
+            del self._seen[name]
+        for name, count in over:
             if count > _MOST:
-                event["left_out"] = count - _MOST
-            began, count = now, 0
+                _log.warning("log.left_out", of=name, times=count - _MOST)
+        began, count = self._seen.get(event["event"], (now, 0))
         self._seen[event["event"]] = began, count + 1
         if count >= _MOST:
             raise structlog.DropEvent
@@ -85,6 +99,7 @@ def set_log_level(level: str) -> None:
 def set_up_logging(level: str) -> None:
     """Configure structlog for this process."""
     set_log_level(level)
+    output = _StandardError()
     structlog.configure(
         processors=[
             _least_level,
@@ -94,7 +109,7 @@ def set_up_logging(level: str) -> None:
             *_output(),
         ],
         wrapper_class=structlog.make_filtering_bound_logger(0),
-        logger_factory=lambda *_: _StandardError(),
+        logger_factory=lambda *_: output,
         cache_logger_on_first_use=True,
     )
 
@@ -102,6 +117,6 @@ def set_up_logging(level: str) -> None:
 def _output() -> list[Processor]:
     if os.environ.get("JOURNAL_STREAM"):
         return [_JournalLines()]
-    if sys.stderr.isatty():
+    if sys.stderr is not None and sys.stderr.isatty():
         return [structlog.processors.TimeStamper(fmt="%H:%M:%S", utc=False), structlog.dev.ConsoleRenderer()]
     return [structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.JSONRenderer()]

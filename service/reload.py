@@ -1,5 +1,6 @@
 """SIGHUP: the settings are read again, and what can be taken over in flight is."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import fields, replace
 
@@ -13,14 +14,19 @@ from service.settings import Settings, SettingsError
 _log = structlog.get_logger()
 
 
-def reload(daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]) -> None:
-    """Take over what `load` returns; settings that cannot be used change nothing."""
-    notifier.reloading()
-    try:
-        _take_over(daemon, load())
-    except SettingsError as error:
-        _log.error("config.rejected", why=[str(problem) for problem in error.problems], what="nothing is changed")
-    notifier.ready()
+async def reload_when_told(
+    told: asyncio.Event, daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]
+) -> None:
+    """Take over what `load` returns each time that `told` is set; settings that cannot be used change nothing."""
+    while await told.wait():
+        told.clear()
+        notifier.reloading()
+        try:
+            # Files are read beside the loop: a slow disk must not hold the links up.
+            _take_over(daemon, await asyncio.to_thread(load))
+        except SettingsError as error:
+            _log.error("config.rejected", why=[str(problem) for problem in error.problems], what="nothing is changed")
+        notifier.ready()
 
 
 def _take_over(daemon: Daemon, new: Settings) -> None:

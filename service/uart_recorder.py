@@ -118,6 +118,9 @@ class RecordedPort(FcPort):
 def _open(path: Path) -> tuple[int, int]:
     """Open a new or an earlier capture to append to; return its descriptor and its size."""
     try:
+        if path.exists() and not path.is_file():
+            # A serial port would be written to: an aircraft may hang there.
+            raise UartFileError(f"{path} is no file: name a new file for --record-uart")
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
     except OSError as error:
         raise UartFileError(f"cannot record into {path}: {error.strerror}") from error

@@ -8,11 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from service.bounded_file import read_bounded
+from service.settings.key import short
+from service.settings.key_lines import key_lines
 from service.settings.problem import Problem
 from service.settings.table import KEYS, TABLES
 
 DROP_INS = "conf.d"
 _MAX_BYTES = 1 << 20
+#: Of one file; who names another program's file needs no longer list.
+_MOST_UNKNOWN = 20
 _NAMES = frozenset(key.name for key in KEYS)
 
 
@@ -40,6 +44,10 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
+    if path.is_fifo():
+        # Nobody may ever write into it, and a reload would find it empty.
+        problems.append(Problem(str(path), "this is a pipe: name a file, which can be read again at a reload"))
+        return {}
     try:
         text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")
         tables = tomllib.loads(text)
@@ -49,16 +57,24 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
     except (ValueError, RecursionError) as error:
         problems.append(Problem(str(path), f"this is no valid TOML: {error}"))
         return {}
+    lines = key_lines(text)
     found: dict[str, Given] = {}
+    unknown: list[tuple[str, str]] = []
     for keys, value in _flat(tables):
-        name = ".".join(keys)
-        where = f"{path}:{_line(text, keys)}"
+        # A dot within quotes belongs to the name, and no setting has one.
+        name = ".".join(f'"{key}"' if "." in key else key for key in keys)
+        where = f"{path}:{lines[keys]}" if keys in lines else str(path)
         if name in _NAMES or (name in TABLES and isinstance(value, dict)):
             found[name] = Given(True if name in TABLES else value, where, path.parent)
         elif name in TABLES:
             problems.append(Problem(where, f"{name} must be a table: begin it with [{name}]"))
         else:
-            problems.append(Problem(where, f"{name!r} is no setting; {nearest(name, _NAMES)}"))
+            unknown.append((where, name))
+    for where, name in unknown[:_MOST_UNKNOWN]:
+        problems.append(Problem(where, f"{short(name)} is no setting; {nearest(name, _NAMES)}"))
+    if len(unknown) > _MOST_UNKNOWN:
+        text = f"{len(unknown) - _MOST_UNKNOWN} more are no settings: name a file that is naze-bridge's"
+        problems.append(Problem(str(path), text))
     return found
 
 
@@ -68,22 +84,3 @@ def _flat(tables: Mapping[str, Any]) -> Iterable[tuple[tuple[str, ...], Any]]:
         if name in TABLES and isinstance(value, dict):
             for key, inner in value.items():
                 yield (name, key), inner
-
-
-def _line(text: str, keys: tuple[str, ...]) -> int:
-    """Return the line in which a key begins: after the longest beginning of the file that is TOML and lacks it."""
-    lines = text.splitlines(keepends=True)
-    before = 0
-    for count in range(len(lines) + 1):
-        try:
-            here: Any = tomllib.loads("".join(lines[:count]))
-        except ValueError:
-            continue
-        for key in keys:
-            if not isinstance(here, dict) or key not in here:
-                before = count
-                break
-            here = here[key]
-        else:
-            break
-    return before + 1

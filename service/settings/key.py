@@ -3,9 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from reprlib import Repr
 from typing import Protocol
 
 _ENVIRONMENT = "NAZE_BRIDGE_"
+_repr = Repr()
+_repr.maxstring = _repr.maxother = _repr.maxlong = 80
 
 
 class Unfit(ValueError):
@@ -42,8 +45,17 @@ class Key:
         return _ENVIRONMENT + self.name.upper().replace(".", "_")
 
 
+def short(value: object) -> str:
+    """Return what was given as it is shown in a sentence: in quotes if it is text, and not more than a line of it."""
+    try:
+        return _repr.repr(value)
+    except ValueError:
+        # Python does not write a number of thousands of digits.
+        return "far too large"
+
+
 def _wrong(value: object, wanted: str) -> Unfit:
-    return Unfit(f"is {value!r}, but must be {wanted}")
+    return Unfit(f"is {short(value)}, but must be {wanted}")
 
 
 @dataclass(frozen=True, slots=True)

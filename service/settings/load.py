@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from service.connection import FcAddress, GcsAddress, parse_gcs
+from service.connection import FcAddress, GcsAddress, SerialFc, parse_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import Unfit
 from service.settings.ports import port_conflicts
@@ -64,8 +64,12 @@ def load_settings(
     tlog = _tlog_limits(values, given, problems)
     zenoh = ZenohSettings(**_table("zenoh", values)) if "zenoh" in given else None
     web = WebSettings(**_table("web", values)) if "web" in given else None
+    record_to = values.get("record_uart")
+    if isinstance(values.get("fc"), SerialFc) and str(record_to) == values["fc"].path:
+        text = f"record_uart {record_to} is the flight controller's port: name a file"
+        problems.append(Problem(given["record_uart"].where, text))
     used = Given(None, "--gcs") if gcs else given.get("gcs", Given(None, ""))
-    problems += [Problem(used.where, text) for text in port_conflicts(addresses, zenoh, web)]
+    problems += [Problem(used.where, text) for text in port_conflicts(values.get("fc"), addresses, zenoh, web)]
     if zenoh is not None:
         problems += _zenoh_problems(zenoh, given)
     if problems:

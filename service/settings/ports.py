@@ -1,11 +1,12 @@
-"""Two users of one port: found before either of them has opened it."""
+"""Two users of one port, or of one link: found before either of them has opened it."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from ipaddress import ip_address
 from itertools import combinations
 
-from service.connection import GcsAddress
+from service.connection import FcAddress, GcsAddress, TcpFc
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings
 
@@ -20,8 +21,10 @@ class _Use:
     port: int
 
 
-def port_conflicts(gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None, web: WebSettings | None) -> Iterator[str]:
-    """Yield one sentence for each two of them that listen on one port."""
+def port_conflicts(
+    fc: FcAddress | None, gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None, web: WebSettings | None
+) -> Iterator[str]:
+    """Yield one sentence for each two of them that listen on one port, or whose other end is the bridge itself."""
     uses = [
         _Use(f"gcs {address}", "TCP" if address.kind == "tcpin" else "UDP", address.host, address.port)
         for address in gcs
@@ -35,9 +38,29 @@ def port_conflicts(gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None, web: 
         if port.isdecimal():
             transport = "TCP" if protocol in _TCP_LINKS else "UDP"
             uses.append(_Use(f"zenoh.listen {endpoint}", transport, host.strip("[]"), int(port)))
+    for address, count in Counter(address for address in gcs if address.kind in ("udpout", "udpbcast")).items():
+        if count > 1:
+            yield f"gcs {address} is named {count} times: once is enough"
+    if isinstance(fc, TcpFc):
+        yield from (
+            f"fc {fc} is {use.user}, so the bridge would be its own flight controller: change one"
+            for use in uses
+            if (use.transport, use.port) == ("TCP", fc.port) and _reaches(fc.host, use.host)
+        )
     for first, second in combinations(uses, 2):
         if (first.transport, first.port) == (second.transport, second.port) and _overlap(first.host, second.host):
             yield f"{first.user} and {second.user} would both listen on {first.transport} port {first.port}: change one"
+
+
+def _reaches(host: str, listening: str) -> bool:
+    """Tell whether this machine's own address `host` is listened at; other addresses of its own are not known here."""
+    if host == listening:
+        return True
+    try:
+        one = ip_address("127.0.0.1" if host == "localhost" else host)
+        return one.is_loopback and ip_address(listening).is_unspecified
+    except ValueError:
+        return False
 
 
 def _overlap(first: str, second: str) -> bool:

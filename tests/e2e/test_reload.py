@@ -110,3 +110,11 @@ def test_a_missing_file_changes_nothing(daemon: ConfiguredDaemon, start: Starter
     Path(start.directory / "config.toml").unlink()
     daemon.reload("config.rejected")
     assert daemon.stations() == []
+
+
+def test_a_pipe_instead_of_the_file_holds_nothing_up(daemon: ConfiguredDaemon, start: Starter) -> None:
+    Path(start.directory / "config.toml").unlink()
+    os.mkfifo(start.directory / "config.toml")
+    daemon.reload("config.rejected")
+    assert "this is a pipe" in daemon.log
+    assert daemon.stations() == []

@@ -1,5 +1,6 @@
 """The capture file: what is written is read again; one that was torn, cut or appended to, as far as it goes."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -138,5 +139,12 @@ def test_nothing_else_is_written_into(tmp_path: Path) -> None:
     with pytest.raises(UartFileError, match=r"notes\.txt is no UART capture"):
         UartRecorder(path)
     assert path.read_text() == "mine"
-    with pytest.raises(UartFileError, match="Is a directory"):
-        UartRecorder(tmp_path)
+    near, far = os.openpty()
+    for no_file in (tmp_path, Path(os.ttyname(far))):
+        with pytest.raises(UartFileError, match="is no file: name a new file"):
+            UartRecorder(no_file)
+    os.set_blocking(near, False)
+    with pytest.raises(BlockingIOError):
+        os.read(near, 1)
+    os.close(near)
+    os.close(far)

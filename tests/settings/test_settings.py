@@ -1,5 +1,6 @@
 """Settings from files, drop-ins, environment and flags, and what is said of those that cannot be used."""
 
+import os
 import tomllib
 from pathlib import Path
 
@@ -115,6 +116,7 @@ def test_a_table_that_is_none(folder: Path) -> None:
         ('gcs = ["tcpin:[::]:5760", "tcpin:[::]:5760"]', "would both listen on TCP port 5760"),
         ('gcs = ["tcpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]', "zenoh.listen tcp/0.0.0.0:7447"),
         ('gcs = ["udpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["quic/0.0.0.0:7447"]', "UDP port 7447: change one"),
+        ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is named 2 times: once is enough"),
     ],
 )
 def test_two_users_of_one_port(folder: Path, text: str, words: str) -> None:
@@ -134,6 +136,79 @@ def test_two_users_of_one_port(folder: Path, text: str, words: str) -> None:
 )
 def test_ports_that_are_different_ones(folder: Path, text: str) -> None:
     assert len(load(folder, text).gcs) == 2
+
+
+@pytest.mark.parametrize(
+    ("fc", "more", "words"),
+    [
+        ("tcp:127.0.0.1:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would be its own flight controller"),
+        ("tcp:localhost:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would be its own flight controller"),
+        ("tcp:127.0.0.1:8080", "[web]", "fc tcp:127.0.0.1:8080 is web.listen 127.0.0.1:8080"),
+        ("/dev/ttyUSB0,57600", 'record_uart = "/dev/ttyUSB0"', "is the flight controller's port: name a file"),
+    ],
+)
+def test_a_flight_controller_that_is_something_else(folder: Path, fc: str, more: str, words: str) -> None:
+    config = folder / "naze.toml"
+    config.write_text(f'fc = "{fc}"\n{more}')
+    with pytest.raises(SettingsError) as caught:
+        load_settings(config, None, (), folder)
+    (problem,) = caught.value.problems
+    assert words in str(problem)
+
+
+def test_another_flight_controller_on_a_port_of_that_number(folder: Path) -> None:
+    config = folder / "naze.toml"
+    config.write_text('fc = "tcp:192.168.4.9:5760"\ngcs = ["tcpin:0.0.0.0:5760"]')
+    assert str(load_settings(config, None, (), folder).fc) == "tcp:192.168.4.9:5760"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('"zenoh.prefix" = "x"', """'"zenoh.prefix"' is no setting; did you mean 'zenoh.prefix'?"""),
+        ("sysid = 0x" + "f" * 8000, "sysid is far too large, but must be 1..255"),
+        (f'log_level = "{"x" * 100_000}"', "xxx', but must be "),
+        ("x" * 100_000 + " = 1", "xxx' is no setting"),
+    ],
+)
+def test_odd_values_make_one_short_sentence(folder: Path, text: str, words: str) -> None:
+    (found,) = problems(folder, text)
+    assert words in found
+    assert len(found) < 500
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"fc = ", "this is no valid TOML: Invalid value (at end of document)"),
+        (b"\xff\xfef\0c\0", "this is no valid TOML"),
+        (b"a = " + b"[" * 5000, "this is no valid TOML"),
+        (b"#" * (2 << 20), "this cannot be read: it is larger than 1 MB"),
+    ],
+)
+def test_a_file_that_is_no_configuration(folder: Path, content: bytes, words: str) -> None:
+    (folder / "conf.d" / "x.toml").write_bytes(content)
+    (found,) = problems(folder, "")
+    assert found.startswith(f"conf.d/x.toml: {words}")
+
+
+def test_what_is_no_file(folder: Path) -> None:
+    os.mkfifo(folder / "conf.d" / "a.toml")
+    (folder / "conf.d" / "b.toml").mkdir()
+    (folder / "conf.d" / "c.toml").symlink_to("/dev/null")
+    (folder / "conf.d" / "d.toml").symlink_to("nowhere")
+    assert problems(folder, "") == [
+        "conf.d/a.toml: this is a pipe: name a file, which can be read again at a reload",
+        "conf.d/b.toml: this cannot be read: Is a directory",
+        "conf.d/d.toml: this cannot be read: No such file or directory",
+    ]
+
+
+def test_the_file_of_another_program(folder: Path) -> None:
+    told = problems(folder, "\n".join(f"option{number} = 1" for number in range(5000)))
+    assert len(told) == 21
+    assert told[19].startswith("naze.toml:20: 'option19' is no setting")
+    assert told[20] == "naze.toml: 4980 more are no settings: name a file that is naze-bridge's"
 
 
 def test_check_config_says_that_it_is_well_or_what_is_not(folder: Path) -> None:

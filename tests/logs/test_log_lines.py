@@ -1,0 +1,70 @@
+"""What a program's log looks like to whoever reads it, or does not; each log is a program's own."""
+
+import json
+import os
+import subprocess
+import sys
+
+from programs import PATIENCE, REPOSITORY
+
+BEGIN = """
+import sys, time
+now = [0.0]
+time.monotonic = lambda: now[0]
+import structlog
+from service.log_setup import set_up_logging
+set_up_logging("info")
+log = structlog.get_logger()
+"""
+
+
+def run(script: str, *shell: str) -> subprocess.CompletedProcess[str]:
+    command = [*shell, sys.executable, "-c", BEGIN + script]
+    return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=True)
+
+
+def test_what_was_left_out_is_told_even_if_it_never_comes_again() -> None:
+    printed = run("""
+for _ in range(50): log.info("gcs.found", station="one")
+log.warning("fc.lost")
+now[0] = 11.0
+log.info("fc.found")
+log.info("gcs.found", station="two")
+""").stderr
+    events = [json.loads(line) for line in printed.splitlines()]
+    assert [event["event"] for event in events] == ["gcs.found"] * 20 + [
+        "fc.lost",
+        "log.left_out",
+        "fc.found",
+        "gcs.found",
+    ]
+    assert (events[21]["of"], events[21]["times"], events[21]["level"]) == ("gcs.found", 30, "warning")
+
+
+def test_a_line_that_is_longer_than_the_pipe_holds_nothing_up_and_spoils_no_other() -> None:
+    script = """
+log.info("fc.lost", why="x" * 1_000_000)
+log.info("never.read")
+print("went on", flush=True)
+sys.stdin.readline()
+log.info("fc.found")
+"""
+    unread, full = os.pipe()
+    command = [sys.executable, "-c", BEGIN + script]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": full}
+    with subprocess.Popen(command, cwd=REPOSITORY, **pipes) as program, os.fdopen(unread, "rb", 0) as log:  # type: ignore[call-overload]
+        os.close(full)
+        try:
+            assert program.stdout.readline() == b"went on\n"
+            log.read(1 << 20)
+            program.stdin.write(b"\n")
+            program.stdin.flush()
+            lines = log.read(1 << 20).splitlines()
+        finally:
+            program.kill()
+    assert json.loads(lines[-1])["event"] == "fc.found"
+
+
+def test_a_program_whose_standard_error_is_closed_goes_on() -> None:
+    ended = run('log.error("fc.lost")\nprint("went on")', "sh", "-c", 'exec "$@" 2>&-', "sh")
+    assert ended.stdout == "went on\n"
