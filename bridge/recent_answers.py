@@ -8,6 +8,8 @@ from protocols.mission_item import MissionResult
 
 #: Mission Planner sends its last item for 5 s.
 _MEMORY_S = 10.0
+#: Ground stations are few; who makes up numbers takes the oldest one's place.
+_MOST = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,9 @@ class RecentAnswers:
     def note(self, station: Station, ack: MissionResult, count: int, now: float) -> None:
         """A ground station was told so."""
         self._forget_old(now)
+        self._answers.pop(station, None)
+        if len(self._answers) >= _MOST:
+            del self._answers[next(iter(self._answers))]
         self._answers[station] = Answer(ack, count, now + _MEMORY_S)
 
     def forget(self, station: Station) -> None:

@@ -1,6 +1,7 @@
 """Ground stations over TCP."""
 
 import asyncio
+import errno
 import socket
 from collections.abc import Callable
 
@@ -19,6 +20,8 @@ _KERNEL_BUFFER = 32768
 _STALL_MS = 60000
 #: Each costs a copy of the telemetry.
 _MAX_CLIENTS = 32
+#: When the process has no file descriptor left for another client.
+_REST_S = 1.0
 
 _log = structlog.get_logger()
 
@@ -34,6 +37,10 @@ class TcpLink:
         self._complained = False
         self._socket = socket.create_server((address.host, address.port), family=family_of(address.host))
         self._socket.setblocking(False)
+        self._resting: asyncio.TimerHandle | None = None
+        self._listen()
+
+    def _listen(self) -> None:
         self._loop.add_reader(self._socket.fileno(), self._acceptable)
 
     def send(self, peer: Peer, data: bytes) -> None:
@@ -44,6 +51,8 @@ class TcpLink:
 
     def close(self) -> None:
         """Close the server and its clients."""
+        if self._resting is not None:
+            self._resting.cancel()
         self._loop.remove_reader(self._socket.fileno())
         self._socket.close()
         for client in self._clients.values():
@@ -53,7 +62,11 @@ class TcpLink:
     def _acceptable(self) -> None:
         try:
             connection, sender = self._socket.accept()
-        except OSError:
+        except OSError as error:
+            if error.errno in (errno.EMFILE, errno.ENFILE):
+                # Who waits goes on waiting, and would wake us up again at once.
+                self._loop.remove_reader(self._socket.fileno())
+                self._resting = self._loop.call_later(_REST_S, self._listen)
             return
         if len(self._clients) >= _MAX_CLIENTS:
             connection.close()
@@ -67,6 +80,10 @@ class TcpLink:
         # The kernel would keep minutes of old telemetry for who does not read.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
         peer = Peer(self.name, sender)
+        if (former := self._clients.pop(peer, None)) is not None:
+            # Its end was never heard of: a laptop that was switched off, and connects from the same port.
+            former.close()
+            self._events.gcs_gone(peer)
         # A TCP client hears the vehicle from the start: it may wait for a heartbeat before it speaks.
         self._events.add_default_peer(peer)
 

@@ -1,12 +1,17 @@
 """TCP clients that stop reading cost nobody anything, and find what matters when they read again."""
 
 import asyncio
+import os
+import resource
 import socket
+
+import pytest
 
 from bridge.station import Peer
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from service import tcp_link
 from service.connection import GcsAddress
 from service.tcp_link import TcpLink
 
@@ -90,3 +95,30 @@ async def test_a_stalled_client_loses_old_telemetry_and_nothing_else() -> None:
     link.close()
     stalled.close()
     reading.close()
+
+
+async def test_without_a_descriptor_left_it_does_not_spin(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tcp_link, "_REST_S", 0.05)
+    loop = asyncio.get_running_loop()
+    listener, port = Listener(), free_port()
+    link = TcpLink(GcsAddress("tcpin", "127.0.0.1", port), listener)
+    client = socket.socket()
+    client.setblocking(False)
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    spare = [os.dup(client.fileno()) for _ in range(8)]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(spare) + 1, hard))
+    try:
+        await loop.sock_connect(client, ("127.0.0.1", port))
+        async with asyncio.timeout(10):
+            while link._resting is None:  # noqa: ASYNC110 - a product's timer, not an event of ours
+                await asyncio.sleep(0)
+        # Nobody wakes the loop up for the one that waits.
+        assert not loop.remove_reader(link._socket.fileno())
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        for descriptor in spare:
+            os.close(descriptor)
+    async with asyncio.timeout(10):
+        await listener.came.wait()
+    link.close()
+    client.close()
