@@ -1,17 +1,20 @@
 """Put 120 records on an INAV, each read back: over TCP beside a bare loop of the same frames, on a UART at its pace.
 
-The bare loop is a blocking socket that sends a frame and waits for its answer, nothing else: no parser, no telemetry,
-no event loop. It and the daemon take turns with the same simulated INAV in another process (one client at a time), so
-that both see the same load of the machine. The daemon runs on this process's event loop; its clock is read within the
-conversation: from the proof of the first record to that of the last one, and a record's share more for the first. SAVE,
-which stands still for the flash, is not in it.
+The bare loop sends a frame and waits for its answer, nothing else: no parser, no telemetry, no event loop. It and the
+daemon take turns with the same simulated INAV in another process (one client at a time), so that both see the same load
+of the machine. On the UART it shows how late the simulated line itself is. The daemon runs on this process's event
+loop; its clock is read within the conversation: from the proof of the first record to that of the last one, and a
+record's share more for the first. SAVE, which stands still for the flash, is not in it.
 """
 
 import asyncio
+import os
 import socket
 import statistics
 import tempfile
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
@@ -44,7 +47,10 @@ def _over_tcp() -> list[Figure]:
         for turn in range(_ROUNDS):
             with socket.create_connection((host, port)) as connection:
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                bare += [_bare_loop(connection, _records(turn * _RUNS + run)) for run in range(_RUNS)]
+                bare += [
+                    _bare_loop(connection.sendall, connection.recv, _records(turn * _RUNS + run))
+                    for run in range(_RUNS)
+                ]
             whole += asyncio.run(_push_all(TcpFc(host, port), turn))
     name = f"{_COUNT} records to INAV over TCP, each read back, {_ROUNDS * _RUNS} runs"
     floor = Floor(statistics.median(bare) * 1000, "a bare loop of the same frames")
@@ -56,12 +62,21 @@ def _over_tcp() -> list[Figure]:
 
 def _over_a_uart() -> list[Figure]:
     with tempfile.TemporaryDirectory() as name, inav_on_a_uart(Path(name)) as fc:
-        times = asyncio.run(_push_all(SerialFc(fc, _BAUD), 0))
+        line = os.open(fc, os.O_RDWR | os.O_NOCTTY)
+        bare = [_bare_loop(partial(_write_all, line), partial(os.read, line), _records(run)) for run in range(_RUNS)]
+        os.close(line)
+        times = asyncio.run(_push_all(SerialFc(fc, _BAUD), 1))
     floor = Floor(_WIRE_S * 1000, f"{_BYTES} bytes at {_BAUD} 8N1")
     name = f"{_COUNT} records to INAV at {_BAUD} baud, each read back, {_RUNS} runs"
     return [
         Figure(f"{name}, median", statistics.median(times) * 1000, "ms", floor, 1.15, times_floor=True),
         Figure(f"{name}, worst", max(times) * 1000, "ms", floor),
+        Figure(
+            "a bare loop on that line: what line and machine take of it, median",
+            statistics.median(bare) * 1000,
+            "ms",
+            floor,
+        ),
     ]
 
 
@@ -86,19 +101,22 @@ def _records(seed: int) -> tuple[NavRecord, ...]:
     return records
 
 
-def _bare_loop(connection: socket.socket, records: tuple[NavRecord, ...]) -> float:
+def _bare_loop(send: Callable[[bytes], None], read: Callable[[int], bytes], records: tuple[NavRecord, ...]) -> float:
     began = time.monotonic()
     for number, record in enumerate(records, 1):
-        connection.sendall(encode_set_wp(number, record))
-        _receive(connection, FRAME_OVERHEAD)
-        connection.sendall(encode_read_wp(number))
-        _receive(connection, FRAME_OVERHEAD + WP_SIZE)
+        for frame, answer in (
+            (encode_set_wp(number, record), FRAME_OVERHEAD),
+            (encode_read_wp(number), FRAME_OVERHEAD + WP_SIZE),
+        ):
+            send(frame)
+            left = answer
+            while left:
+                left -= len(read(left))
     return time.monotonic() - began
 
 
-def _receive(connection: socket.socket, size: int) -> None:
-    while size:
-        size -= len(connection.recv(size))
+def _write_all(line: int, data: bytes) -> None:
+    os.write(line, data)
 
 
 async def _push_all(fc: FcAddress, turn: int) -> list[float]:
