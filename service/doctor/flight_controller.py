@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from bridge.fc_session import State
 from service.connection import FcAddress
 from service.control import ControlError
 from service.doctor.checked import Checked, note, ok, problem
@@ -30,6 +31,8 @@ def check_flight_controller(
 
 def _who(fc: FcAddress, status: Json) -> Checked:
     name = status["flight_controller"]
+    if status["state"] == State.NO_PORT.value:
+        return note("flight controller", f"{fc} cannot be opened yet", "see the port, and the daemon's log")
     if name is None:
         return problem("flight controller", f"nobody answers on {fc}: {status['state']}", _WIRING)
     speed = "" if status["speed_baud"] is None else f" at {status['speed_baud']} baud"

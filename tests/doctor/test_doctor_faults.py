@@ -168,6 +168,8 @@ def test_a_flight_controller_that_says_nothing() -> None:
     silent = STATUS | {"flight_controller": None, "state": "searching"}
     (_, found) = check_flight_controller(PORT, lambda: silent, None)
     assert_problem(found, "nobody answers on /dev/serial0: searching", "TX goes to RX")
+    (_, found) = check_flight_controller(PORT, lambda: silent | {"state": "no port"}, None)
+    assert_note(found, "/dev/serial0 cannot be opened yet")
 
 
 def test_a_daemon_is_asked_and_the_port_left_alone() -> None:
