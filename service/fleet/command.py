@@ -26,6 +26,7 @@ from service.printing import fail, print_json, print_table
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError, check_name
 
 _UNREADABLE = 2
+_STANDARD_OUTPUT = Path("-")
 _INTERRUPTED = 130
 _REFRESH_S = 0.5
 _PATH = click.Path(path_type=Path)
@@ -143,16 +144,22 @@ def push_mission(file: Path, names: tuple[str, ...], to_all: bool, as_json: bool
 def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **where: Any) -> None:
     """Fetch what the vehicles' flight controllers hold, of all that are alive or of those that are named.
 
-    PATH is a folder, in which each vehicle's mission becomes NAME.waypoints; for one named vehicle it may be a file.
-    Without it the missions are shown. Exit code 0: all were told, 1: one was not, or cannot be written.
+    PATH is a folder, in which each vehicle's mission becomes NAME.waypoints; for one named vehicle it may be a file, or
+    - for standard output. Without it the missions are shown. Exit code 0: all were told, 1: one was not, or cannot be
+    written.
     """
+    to_output = path == _STANDARD_OUTPUT
+    if to_output and (len(names) != 1 or as_json):
+        raise click.UsageError("standard output takes one mission: name one --vehicle, and leave --json away")
     with _session(where) as (session, prefix):
         held = pull(session, prefix, chosen(alive(session, prefix), names, prefix))
     for each in held:
-        if each.error is None and path is not None:
+        if each.error is None and to_output:
+            click.echo(write_qgc_wpl(each.items), nl=False)
+        elif each.error is None and path is not None:
             _save(each, path, is_file=len(names) == 1 and not path.is_dir())
         if not as_json:
-            _show(each, with_items=path is None)
+            _show(each, with_items=path is None, to_error=to_output)
     if as_json:
         print_json({"vehicles": [asdict(each) for each in held]})
     if any(each.error for each in held):
@@ -170,11 +177,11 @@ def _save(held: Held, path: Path, *, is_file: bool) -> None:
         fail(f"{click.format_filename(path)} is no folder that can be written: {(error.strerror or '').lower()}")
 
 
-def _show(held: Held, *, with_items: bool) -> None:
+def _show(held: Held, *, with_items: bool, to_error: bool) -> None:
     if held.error is not None:
         click.echo(f"{held.vehicle}: {held.error}", err=True)
         return
-    click.echo(f"{held.vehicle}: {held.count} records, checksum {held.checksum}")
+    click.echo(f"{held.vehicle}: {held.count} records, checksum {held.checksum}", err=to_error)
     if with_items and held.items:
         # Here, because nothing else in the fleet's commands needs the names of MAVLink's commands.
         from service.mission_table import mission_table

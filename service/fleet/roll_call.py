@@ -53,4 +53,4 @@ def _replier(reply: zenoh.Reply) -> Bridge | None:
     """Return whose reply it is: its key names the vehicle, its sender the session."""
     if reply.ok is None or reply.replier_id is None:
         return None
-    return Bridge(str(reply.ok.key_expr).split("/")[-len(STATE.suffix.split("/")) - 1], str(reply.replier_id.zid))
+    return Bridge(str(reply.ok.key_expr).split("/")[1], str(reply.replier_id.zid))

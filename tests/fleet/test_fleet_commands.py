@@ -91,6 +91,10 @@ def test_push_to_one_and_pull_it_into_a_file(fleet: Fleet, tmp_path: Path) -> No
     file = tmp_path / "owls"
     assert fleet.ask("pull", file, "--vehicle", "owl").returncode == 0
     assert len(read_mission_file(file.read_bytes(), "owls")) == 4
+    printed = fleet.ask("pull", "-", "--vehicle", "owl")
+    assert (printed.returncode, printed.stdout) == (0, file.read_text())
+    assert printed.stderr == shown.splitlines()[0] + "\n"
+    assert fleet.ask("pull", "-").returncode == 2
     data = json.loads(fleet.ask("pull", "--vehicle", "owl", "--vehicle", "kite", "--json").stdout)["vehicles"]
     assert [(each["vehicle"], each["error"]) for each in data] == [("owl", None), ("kite", None)]
 
