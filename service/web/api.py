@@ -113,7 +113,7 @@ class Api:
 
     async def _restore(self, request: Request) -> Response:
         check_token(request, self._token)
-        await self.restoring.begin(_number(request, "number"))
+        self.restoring.begin(_number(request, "number"))
         return _json({"begun": True}, HTTPStatus.ACCEPTED)
 
     async def _render_metrics(self, _request: Request) -> Response:

@@ -17,11 +17,10 @@ class Restoring:
         self._task: asyncio.Task[None] | None = None
         self.state: Json | None = None
 
-    async def begin(self, number: int) -> None:
+    def begin(self, number: int) -> None:
         """Begin to restore a mission; Refused if that is impossible at this moment."""
         if self._task is not None and not self._task.done():
             raise Refused(HTTPStatus.CONFLICT, "A mission is being restored already.")
-        # In the same step as the question, so that two browsers cannot both begin.
         state: Json = {"mission": number, "records": 0, "done": False, "ok": False, "text": ""}
         self.state = state
         self._task = asyncio.get_running_loop().create_task(self._restore(number, state))

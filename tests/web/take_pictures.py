@@ -4,10 +4,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-from chromium import LAPTOP, PHONE, browser
+from chromium import PHONE, browser
 from plan import plain_plan
 from web_bench import web_bench
 
+#: High enough for the whole map.
+_LAPTOP = (1100, 1060)
 PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
 
 
@@ -16,7 +18,7 @@ def take_pictures(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as name, web_bench(Path(name)) as bench:
         bench.daemon.push(plain_plan(9))
         bench.push_example()
-        with browser(bench.port, LAPTOP) as laptop:
+        with browser(bench.port, _LAPTOP) as laptop:
             laptop.open()
             laptop.wait_for_looks(2)
             laptop.picture(folder / "status-page.png")

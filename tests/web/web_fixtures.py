@@ -24,7 +24,7 @@ def web(tmp_path: Path) -> Iterator[WebBench]:
 
 @pytest.fixture(scope="module")
 def lasting_web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WebBench]:
-    """The same for all tests of a module that break nothing; two missions are in its store."""
+    """The same for all tests of a module that break nothing; one mission is in its store."""
     with web_bench(tmp_path_factory.mktemp("web")) as bench:
         bench.push_example()
         yield bench
