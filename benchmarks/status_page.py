@@ -58,14 +58,14 @@ def measure() -> list[Figure]:
         Figure("daemon with everything on: resident", resident, "MB", None, _PROMISED_MB),
         Figure("the same after hostile browsers", after, "MB", None, _PROMISED_MB),
         Figure(
-            f"push of 146 records under {answered:.0f} answers/s, median",
+            f"{name}, median",
             statistics.median(pressed),
             "ms",
             floor,
             1.25,
             times_floor=True,
         ),
-        Figure(f"push of 146 records under {answered:.0f} answers/s, worst", max(pressed), "ms", floor),
+        Figure(f"{name}, worst", max(pressed), "ms", floor),
     ]
 
 
