@@ -19,6 +19,9 @@ class Group(Enum):
     STATUS = "status"
     LINK = "link"
 
+    # Enum's own is a Python function, and groups are looked up several times for each sample.
+    __hash__ = object.__hash__
+
 
 @dataclass(frozen=True, slots=True)
 class Attitude:

@@ -14,6 +14,8 @@ from bridge.vehicle_groups import Group, Link, MissionIdentity, VehicleReport
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.commands import Msp
 
+_FROM_MSP = {group: getattr(MspGroups, group.value) for group in Group if group is not Group.LINK}
+_FROM_MAVLINK = {group: getattr(MavlinkGroups, group.value) for group in Group if group is not Group.LINK}
 _NOTHING: frozenset[Group] = frozenset()
 
 
@@ -74,8 +76,8 @@ class VehicleReporter:
         if group is Group.LINK:
             return self._link()
         if self._session.state is not State.MAVLINK:
-            return getattr(MspGroups(self._session.vehicle), group.value)()
-        found = getattr(self._mavlink, group.value)()
+            return _FROM_MSP[group](MspGroups(self._session.vehicle))
+        found = _FROM_MAVLINK[group](self._mavlink)
         home = self._session.vehicle.home
         if group is Group.POSITION and found.home_lat_deg is None and home is not None:
             # It was told of before the craft armed.

@@ -49,6 +49,8 @@ class VehicleState:
     armed: bool | None = None
     mode: FlightMode | None = None
     status: StatusReport | None = None
+    #: Whether the heading is one: without a compass a Harakiri's stays 0.
+    has_compass: bool = False
     attitude: Attitude | None = None
     gps: RawGps | None = None
     fix: Fix = Fix.NO_FIX
@@ -100,11 +102,6 @@ class VehicleState:
         return self.fix is not Fix.NO_FIX
 
     @property
-    def has_compass(self) -> bool:
-        """Whether the heading is one: without a compass a Harakiri's stays 0."""
-        return self.status is not None and bool(self.status.sensors & Sensor.COMPASS)
-
-    @property
     def height(self) -> Altitude | None:
         """Height and climb, if anything measures them: a board without a barometer answers zeros."""
         altitude, status = self.altitude, self.status
@@ -135,6 +132,7 @@ class VehicleState:
         if status is None:
             return
         self.status = status
+        self.has_compass = bool(status.sensors & Sensor.COMPASS)
         arm_bit = controller.arm_bit
         if arm_bit is not None:
             self.armed = bool(status.box_flags >> arm_bit & 1)

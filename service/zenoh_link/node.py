@@ -39,8 +39,6 @@ from service.zenoh_link.settings import ZenohSettings
 from service.zenoh_link.vehicle_data import VehicleData
 
 _STATE_INTERVAL_S = 1.0
-#: An autopilot may send faster than this; nobody reads it so.
-_LEAST_INTERVAL_S = 0.004
 #: How long nobody is there before it is looked into, and until it is looked again.
 _PATIENCE_S = 5.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
@@ -68,7 +66,6 @@ class Node:
         self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads).answerers
         if settings.commands:
             self._answerers |= Commands(jobs).answerers
-        self._sent_at: dict[Group, float] = {}
         self._held: HeldMission | None = None
         self._ask_why_at = self._loop.time() + _PATIENCE_S
         self._why_alone = ""
@@ -93,11 +90,8 @@ class Node:
 
     def telemetry(self, groups: frozenset[Group]) -> None:
         """Publish groups."""
-        now = self._loop.time()
         for group in groups:
-            if now >= self._sent_at.get(group, 0.0) + _LEAST_INTERVAL_S:
-                self._sent_at[group] = now
-                self._publish(group)
+            self._publish(group)
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
         """Publish an event, and soon after it the state: something has changed."""

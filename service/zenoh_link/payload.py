@@ -76,4 +76,24 @@ def _layout(kind: Hashable) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any,
 
 
 def _to_json(body: Json) -> bytes:
-    return _JSON.encode(body).encode()
+    """Write numbers without json's encoder: called now and then, with cold caches, it costs a third of the put."""
+    parts = []
+    for name, value in body.items():
+        write = _WRITERS.get(type(value), _JSON.encode)
+        parts.append(f'"{name}":{write(value)}')
+    return f"{{{','.join(parts)}}}".encode()
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is no number in JSON")
+    return repr(value)
+
+
+#: What JSON writes as Python does. Names need no quoting: they are our own.
+_WRITERS: dict[type, Callable[[Any], str]] = {
+    float: _number,
+    int: repr,
+    bool: lambda value: str(value).lower(),
+    type(None): lambda _: "null",
+}
