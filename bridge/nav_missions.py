@@ -109,29 +109,38 @@ class NavMissions(ABC):
     def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Procedure[PushResult[NavRecord]]:
         """Put the list there and prove it; after a failure put back what was there, if that is known."""
         before, self._known = self._known, None
-        failure = PushFailure.NO_ANSWER  # if the link is lost now
+        # What to say if the link is lost now.
+        failure = PushFailure.NO_ANSWER
+        writing = False
+
+        def proven(done: int) -> None:
+            nonlocal failure
+            failure = PushFailure.INCOMPLETE
+            progress(done)
+
         try:
             yield from self._make_sure_disarmed()
             if before and not (yield from self._still_holds(before)):
                 before = None
-            failure = PushFailure.INCOMPLETE
-            yield from self._write_surely(records or NOTHING, progress)
-            failure = PushFailure.UNCERTAIN
+            # Until the first record is read back it may have come, and wiped the old list, or not.
+            failure, writing = PushFailure.UNCERTAIN, True
+            yield from self._write_surely(records or NOTHING, proven)
+            failure, writing = PushFailure.UNCERTAIN, False
             yield from self._keep()
             self._known = records
             return PushResult(None)
         except Stopped:
-            if failure is PushFailure.INCOMPLETE:
-                restored = yield from self._restore_at_once(before)
-                return PushResult(PushFailure.STOPPED if restored else failure)
-            return PushResult(PushFailure.STOPPED if failure is PushFailure.NO_ANSWER else failure)
+            if failure is PushFailure.NO_ANSWER or (writing and (yield from self._restore_at_once(before))):
+                failure = PushFailure.STOPPED
+            return PushResult(failure)
         except LinkLost:
             return PushResult(failure)
         except Failed as failed:
             if failure is PushFailure.NO_ANSWER:
                 self._known = before
-            elif failure is PushFailure.INCOMPLETE and not (yield from self._restore(before)):
-                return PushResult(_UNRESTORED.get(failed.failure, failure))
+            elif writing and not (yield from self._restore(before)):
+                is_gone = failure is PushFailure.INCOMPLETE
+                return PushResult(_UNRESTORED.get(failed.failure, failure) if is_gone else failure)
             return PushResult(failed.failure)
 
     @abstractmethod

@@ -356,3 +356,14 @@ def test_a_multiwii_is_not_made_to_store_what_it_holds() -> None:
     assert Upload(station, plan(20)).run() is ACCEPTED
     # The way home while it is checked, and the first record again.
     assert multiwii.writes == written + 2
+
+
+def test_as_long_as_the_first_record_may_not_have_come_nothing_is_said_of_the_old_list() -> None:
+    inav = FakeInav()
+    world, station = found(inav)
+    assert Upload(station, plan(12)).run() is ACCEPTED
+    inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP else ""
+    assert Upload(station, plan(10, 1)).run() is DENIED
+    assert "read the mission back" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    inav.drop = lambda _frame: ""
+    assert Download(station).run()[1:] == plan(12)[1:]
