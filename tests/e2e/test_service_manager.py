@@ -108,6 +108,26 @@ def test_a_start_that_fails_is_never_ready(start: Starter, systemd: Systemd) -> 
     assert "READY=1" not in systemd.listen()
 
 
+def test_a_service_manager_in_the_abstract_namespace(tmp_path: Path) -> None:
+    """systemd names it with an @ in front."""
+    name = f"naze-bridge-test-{tmp_path}"
+    with closing(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) as systemd:
+        systemd.bind(f"\0{name}")
+        systemd.settimeout(PATIENCE)
+        notifier = Notifier({"NOTIFY_SOCKET": f"@{name}"})
+        assert notifier.watchdog_s is None
+        notifier.reloading()
+        kind, moment = systemd.recv(100).decode().splitlines()
+        assert kind == "RELOADING=1"
+        assert int(moment.removeprefix("MONOTONIC_USEC=")) <= time.monotonic_ns() // 1000
+        notifier.close()
+
+
+@pytest.mark.parametrize("environment", [{"WATCHDOG_PID": "1"}, {"WATCHDOG_USEC": "soon"}, {}])
+def test_a_watchdog_that_is_not_for_us(environment: dict[str, str]) -> None:
+    assert Notifier({"WATCHDOG_USEC": "1000000", **environment}).watchdog_s == (None if environment else 1.0)
+
+
 def test_no_service_manager_and_one_that_is_gone(start: Starter, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NOTIFY_SOCKET", str(start.directory / "nobody"))
     daemon = start.daemon("sim:")

@@ -99,7 +99,7 @@ def test_no_trace_of_the_machine_that_built_it(package: tuple[str, Path]) -> Non
             assert content is None or str(_REPOSITORY).encode() not in content.read(), member.name
 
 
-def test_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
+def test_in_a_bare_root_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
     assert "enable --now naze-bridge" in root.run("dpkg --install /root/naze-bridge.deb")
     assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
     # Enabled on request only.
@@ -134,7 +134,7 @@ def test_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
     assert left == ""
 
 
-def test_the_demonstration_runs_from_the_package(root: BareRoot) -> None:
+def test_in_a_bare_root_the_demonstration_runs(root: BareRoot) -> None:
     root.run("dpkg --install /root/naze-bridge.deb")
     printed = root.run("naze-bridge demo --once")
     assert "the flight controller holds 13, read back from it and compared" in printed
