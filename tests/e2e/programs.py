@@ -1,7 +1,6 @@
 """The daemon and the simulated Naze as programs of their own, as a user starts them."""
 
 import json
-import os
 import signal
 import socket
 import subprocess
@@ -205,7 +204,7 @@ class Daemon(Program):
 
     def kill_and_restart(self) -> None:
         """Die as by a power cut, and start again as by systemd."""
-        os.kill(self.process.pid, signal.SIGKILL)
+        self.process.kill()
         self.process.wait()
         self.process = self._start()
 

@@ -21,20 +21,30 @@ from protocols.mission_file import write_qgc_wpl
 
 #: 146 records at this speed take some seconds: time enough for something to go wrong.
 _SLOW_BAUD = 9600
-_LONG = plain_plan(146)
+_COUNT = 146
 _NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')", "fleet"]
 
 
-@pytest.fixture
-def fleet(tmp_path: Path) -> Iterator[Fleet]:
+@pytest.fixture(scope="module")
+def lasting_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
     """`kite` is quick, `snail` has a slow line."""
     with ExitStack() as stack:
-        fleet = Fleet(tmp_path, stack)
+        fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
         board = fleet.board("snail", "--baud", str(_SLOW_BAUD))
         fleet.start("kite")
         fleet.start("snail", fc=f"{board.link},{_SLOW_BAUD}")
-        fleet.wait("kite", "snail")
         yield fleet
+
+
+@pytest.fixture
+def fleet(lasting_fleet: Fleet) -> Fleet:
+    """Both are there, whatever the test before did to them, and idle."""
+    for daemon in lasting_fleet.daemons.values():
+        if not daemon.is_alive:
+            daemon.kill_and_restart()
+    lasting_fleet.wait("kite", "snail")
+    until(lasting_fleet.daemons["snail"].clears, "the end of an earlier push")
+    return lasting_fleet
 
 
 class Command:
@@ -60,10 +70,20 @@ class Command:
 def long_push(fleet: Fleet, *options: str) -> Command:
     """Begin to write the long mission to all, and return when the slow vehicle is in the middle of it."""
     file = fleet.folder / "long.waypoints"
-    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(_LONG)]))
+    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(_COUNT))]))
+
+    def pushes() -> int:
+        return sum(event["event"] == "mission.push_started" for event in fleet.daemons["snail"].events())
+
+    before = pushes()
     command = Command(fleet, "push", file, "--all", *options)
-    until(lambda: fleet.daemons["snail"].has_logged("mission.push_started"), "the beginning of the slow push")
+    until(lambda: pushes() > before, "the beginning of the slow push")
     return command
+
+
+def the_push_ends_on_the_vehicle(fleet: Fleet) -> None:
+    records = records_of(judge(plain_plan(_COUNT)))
+    until(lambda: fleet.boards["snail"].records() == records, "the end of the push on the vehicle")
 
 
 def outcomes(ended: tuple[int, str, str]) -> dict[str, Any]:
@@ -78,12 +98,16 @@ def test_the_router_stops_in_the_middle_of_a_push(fleet: Fleet) -> None:
     fleet.router.stop()
     snail = outcomes(command.end())["snail"]
     assert (snail["ok"], "router, went away" in snail["error"]) == (False, True), snail
-    until(lambda: fleet.boards["snail"].records() == records_of(judge(_LONG)), "the end of the push on the vehicle")
+    until(
+        lambda: fleet.boards["snail"].records() == records_of(judge(plain_plan(_COUNT))),
+        "the end of the push on the vehicle",
+    )
     gone = fleet.ask("list")
     assert (gone.returncode, "connection refused" in gone.stderr) == (1, True)
     fleet.router.start_again()
     until(
-        lambda: {each["mission_count"] for each in fleet.listed().values()} == {146}, "both vehicles with the mission"
+        lambda: {each["mission_count"] for each in fleet.listed().values()} == {_COUNT},
+        "both with the mission",
     )
     fleet.boards["snail"].assert_was_treated_well()
 
@@ -104,7 +128,10 @@ def test_ctrl_c_in_the_middle_of_a_push(fleet: Fleet) -> None:
     assert (code, output) == (130, "")
     assert error.startswith("naze-bridge: stopped; what has begun goes on there: "), error
     assert len(error.splitlines()) == 1
-    until(lambda: fleet.boards["snail"].records() == records_of(judge(_LONG)), "the end of the push on the vehicle")
+    until(
+        lambda: fleet.boards["snail"].records() == records_of(judge(plain_plan(_COUNT))),
+        "the end of the push on the vehicle",
+    )
 
 
 def test_a_second_push_meanwhile_is_refused(fleet: Fleet) -> None:
@@ -180,6 +207,7 @@ def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
         terminal.shows("snail")
         fleet.boards["snail"].set("armed 1")
         terminal.shows("ARMED")
+        fleet.boards["snail"].set("armed 0")
         fleet.daemons["snail"].end()
         until(lambda: "kite" in terminal.newest and "snail" not in terminal.newest, "its end on the terminal")
         fleet.router.stop()
