@@ -1,5 +1,6 @@
 """The ground stations' side: who is there, what they sent, and what is on its way to them. Sans-IO."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from bridge.journal import Journal
@@ -48,6 +49,8 @@ class Ground:
         self._now = 0.0
         #: Frames from ground stations whose checksum was wrong.
         self.bad_frames = 0
+        #: Whole frames from ground stations, by link and message id.
+        self.frames_received: Counter[tuple[str, int]] = Counter()
         self._everyone: list[Peer] | None = None  # counted anew after each change
 
     # Who is there.
@@ -147,6 +150,7 @@ class Ground:
             self._everyone = None
             self._journal("info", "gcs.found", station=str(station))
             self._on_newcomer()
+        self.frames_received[peer.link, frame.msgid] += 1
         self.tap([frame.raw])
         return True
 

@@ -10,6 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from bridge.procedure import Send
+from bridge.round_trips import RoundTrips
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
@@ -96,6 +97,8 @@ class MspLink:
         self._follow_up_at: float | None = None
         self._risky: int | None = None  # the command of the frame that is followed up
         self.requests_lost = 0
+        #: From a request's last byte on the wire to its reply.
+        self.round_trips = RoundTrips()
 
     @property
     def outstanding_bytes(self) -> int:
@@ -280,4 +283,5 @@ class MspLink:
             answered.awaited = False
         elif not answered.exclusive:
             measured = max(now - answered.sent_at, 0.0)
+            self.round_trips.add(measured)
             self._round_trip_s += (measured - self._round_trip_s) / 8

@@ -5,15 +5,17 @@ Imported only where it is served: the client library costs several megabytes.
 
 import time
 from collections.abc import Iterator, Mapping
+from itertools import accumulate
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from bridge.fc_session import State
 from bridge.journal import Level
 from bridge.mission_desk import Delivery
 from bridge.mission_log import ArrivedMission
+from bridge.round_trips import BOUNDS_S, RoundTrips
 from bridge.vehicle_groups import Group
 from service.daemon import Daemon
 from service.mission_data import Json
@@ -109,6 +111,12 @@ class _State(Collector):
             yield pieces
         bridge = self._daemon.bridge
         yield _gauge("ground_stations", "Ground stations that are heard.", {}, len(bridge.ground.peers()))
+        frames = _counters(
+            "ground_received_frames", "Frames of ground stations, by MAVLink message id.", "link", "msgid"
+        )
+        for (link, msgid), count in bridge.ground.frames_received.items():
+            frames.add_metric([link, str(msgid)], count)
+        yield frames
         damaged = _counters("ground_damaged_frames", "Frames of ground stations with a wrong checksum.")
         damaged.add_metric([], bridge.ground.bad_frames)
         yield damaged
@@ -131,7 +139,7 @@ class _State(Collector):
             lost = _counters("fc_lost_requests", "MSP requests that were not answered in time.")
             lost.add_metric([], session.link.requests_lost)
             yield lost
-            yield _gauge("fc_round_trip_seconds", "MSP request to reply, smoothed.", {}, session.link.round_trip_s)
+            yield _round_trips(session.link.round_trips)
 
     def _vehicle(self) -> Iterator[Metric]:
         report = self._daemon.bridge.report.whole()
@@ -145,6 +153,13 @@ class _State(Collector):
         for name, (meaning, value) in known.items():
             if value is not None:
                 yield _gauge(name, meaning, {}, value)
+
+
+def _round_trips(measured: RoundTrips) -> Metric:
+    bounds = [*map(str, BOUNDS_S), "+Inf"]
+    classes = list(zip(bounds, accumulate(map(float, measured.counts)), strict=True))
+    name, meaning = f"{_PREFIX}fc_round_trip_seconds", "MSP request to reply."
+    return HistogramMetricFamily(name, meaning, buckets=classes, sum_value=measured.sum_s)
 
 
 def _gauge(name: str, meaning: str, labels: Mapping[str, str], value: float) -> Metric:

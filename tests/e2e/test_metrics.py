@@ -52,6 +52,12 @@ async def test_what_a_daemon_counts(tmp_path: Path) -> None:
     assert after["mission_records", ()] == 12
     assert after["ground_stations", ()] == 1
     assert 0 < after["battery_volts", ()] < 30
+    # MISSION_ITEM_INT, each asked for until it is there.
+    assert after["ground_received_frames_total", (str(link), "73")] >= 12
+    answered = after["fc_round_trip_seconds_bucket", ("+Inf",)]
+    assert answered == after["fc_round_trip_seconds_count", ()] >= 12
+    assert answered >= after["fc_round_trip_seconds_bucket", ("0.1",)]
+    assert 0 <= after["fc_round_trip_seconds_sum", ()] < answered
     # Twelve items, the count twice, and the greeting.
     assert after["link_received_pieces_total", (str(link),)] >= 15
     for way in ("received", "sent"):
