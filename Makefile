@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # `make demo` shows the main job on a simulated flight controller, `make test` proves it. Both set up what they need in
 # .venv, from python3 >= 3.11 with venv and from make: every package is pinned by its hash, and none needs a compiler.
 #

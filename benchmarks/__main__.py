@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m benchmarks [NAME...]`: measure, print a table, keep it as JSON; exit 1 if a promise is broken."""
 
 import logging

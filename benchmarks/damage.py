@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Streams of MAVLink frames with damage of one kind in them."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One measured figure, what the machine could do at best, and what was promised."""
 
 from dataclasses import dataclass

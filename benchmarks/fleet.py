@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A fleet of 5 and of 50 through one router: `fleet list`, `fleet push` to all, and what one more vehicle costs.
 
 Each vehicle is the daemon itself (`naze-bridge run`) in a process of its own, with the simulated Naze within it, which

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The floors that need a program of their own: `python -m benchmarks.floors echo`, or `... poll LINK`.
 
 echo        sends every UDP datagram back; prints its port

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink passed on from the flight controller to a ground station: CPU time a message, latency, losses.
 
 Each forwarder has a pseudo-terminal and a UDP port of its own; flight controller and ground station are this process.

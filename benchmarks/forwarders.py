@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Programs that pass MAVLink on from a terminal to UDP: ours, the floor, and what others use."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the daemon costs while nobody does anything: CPU, memory, and the time from its start to its first heartbeat.
 
 It polls a simulated Naze behind a pseudo-terminal at 115200 baud and sends telemetry to one ground station over UDP;

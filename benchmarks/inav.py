@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Put 120 records on an INAV, each read back: over TCP beside a bare loop of the same frames, on a UART at its pace.
 
 The bare loop sends a frame and waits for its answer, nothing else: no parser, no telemetry, no event loop. It and the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A line between an autopilot and a ground station, both of them this process, for a forwarder to stand in.
 
 The autopilot writes frames of MAVLink 2 into a pseudo-terminal, each with its number and the time of its sending; the

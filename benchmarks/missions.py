@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Missions of 146 items that the rules take as they are, no two alike."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m benchmarks.paced_inav`: a simulated INAV on a pseudo-terminal that keeps a UART's pace to the microsecond.
 
 `naze-bridge sim` sleeps until its next byte is due, and an event loop oversleeps by up to a millisecond. Where a frame

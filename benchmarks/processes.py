@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The programs under measurement, each in a process of its own, so that only its own CPU and memory count."""
 
 import json

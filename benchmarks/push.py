@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Push 146 records at 115200 baud, against the time that their bare bytes take at line rate.
 
 The daemon (service.daemon.Daemon with its own port, links and timers) runs on this process's event loop; the simulated

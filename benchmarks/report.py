@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The figures as a table for people, and as JSON to compare one day with another."""
 
 import json

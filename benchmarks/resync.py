@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What becomes of whole frames among damaged ones: lost by the forwarder, and damaged ones that it passes on.
 
 1,500 frames, one in twenty damaged, one kind of damage after the other (benchmarks.damage), at a pace that every

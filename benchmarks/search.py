@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How long the daemon takes to find a flight controller, and to find it again, and what it makes of noise.
 
 Daemon and simulated Naze have a process of their own each. The daemon runs and the port is missing when the clock

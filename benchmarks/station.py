@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station whose own time does not count: frames packed beforehand, clocks read next to the socket."""
 
 import socket

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the status page costs: memory and CPU while nobody looks, and time while hostile browsers do.
 
 The daemon has everything switched on: the page, zenoh, telemetry log. Then a list of 146 records is pushed again and

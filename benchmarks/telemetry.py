@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What telemetry from MSP costs: CPU at 100 polls a second, the time from a reply to its datagram, and noise.
 
 CPU: the daemon polls a simulated Naze that keeps the pace of a UART, and sends 100 datagrams a second to one ground

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Upload 146 items over loopback UDP: to a ground station that answers at once, over a slow link, to a slow flash.
 
 The daemon, the simulated Naze behind its pseudo-terminal, and the echo that is the floor have a process of their own

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What zenoh costs the daemon: time on the way, CPU for each sample, CPU while nobody reads, memory.
 
 Time: from a flight controller's reply at the other end of the terminal to the callback of a subscriber, both in this

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What both benchmarks over zenoh need: a router in a process of its own, a client, a process's own clock."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Finds out what speaks on a serial port, and at which speed. Sans-IO.
 
 The other side (harakiri.md, "Protocol switching"): a disarmed Harakiri sends MAVLink heartbeats until it is spoken

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Names of boxes by their permanent ids, for flight controllers whose BOXNAMES outgrew a frame (INAV, Betaflight).
 
 Only what the bridge looks for is named; the order of the ids is the order of the flags in STATUS.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The bridge as a whole: one flight controller on one side, ground stations on the other. Sans-IO.
 
 The service feeds bytes, time and the store's answers in, and afterwards takes what is to be sent, stored and said.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """COMMAND_LONG and COMMAND_INT: every one is acknowledged (https://mavlink.io/en/services/command.html).
 
 Nothing here may arm, steer or restart an aircraft; such commands are refused with a reason.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which dialect of missions is spoken with which flight controller: the one table."""
 
 from collections.abc import Callable, Mapping

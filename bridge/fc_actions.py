@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What may be done to a flight controller on the ground: calibrations, and writing its settings to flash.
 
 The firmware looks neither whether it flies nor whether it is asked twice (serial.c): a calibration freezes it for

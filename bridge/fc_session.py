@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One flight controller on one port: searched, identified, polled, lost, searched again. Sans-IO."""
 
 from collections.abc import Callable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A finding: one thing about a mission that its pilot must hear of."""
 
 from collections.abc import Callable

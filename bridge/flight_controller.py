@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which flight controller is on the line, found out by asking it (harakiri.md, inav.md)."""
 
 from dataclasses import dataclass, replace

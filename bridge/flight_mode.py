@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which flight mode the active boxes make, in ArduCopter's terms: what ground stations can name and colour."""
 
 from collections.abc import Sequence

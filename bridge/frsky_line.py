@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A port on which an armed Harakiri sends FrSky telemetry (tele_prot 1): nothing to read, only to be waited out."""
 
 from protocols.frsky import FrskyWatch

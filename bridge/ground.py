@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The ground stations' side: who is there, what they sent, and what is on its way to them. Sans-IO."""
 
 from collections import Counter

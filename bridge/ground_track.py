@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Velocity over ground, for flight controllers that send a speed but no course: its direction is that of two fixes."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who may write over which link: the one place that every frame from a ground station passes first. Sans-IO.
 
 Reading is free for all who reach a link. Everything else may change what the aircraft does, be it a message that nobody

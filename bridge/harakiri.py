@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri with the mission extension: docs/msp-mission.md, the companion's side."""
 
 from collections.abc import Mapping, Sequence

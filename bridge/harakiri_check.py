@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The rules for a Harakiri's mission list (mission-rules.md): what a list becomes there, and why."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Missions for a Harakiri that answers nothing but MAVLink: its own mission messages (baseflight_mavlink.c).
 
 It takes MISSION_ITEM only, with coordinates in single precision, one item at a time, and forgets a transfer after

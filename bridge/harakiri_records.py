@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Records to items: what a Harakiri holds, as a ground station reads it."""
 
 from collections.abc import Iterable, Mapping

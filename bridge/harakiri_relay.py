@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A Harakiri in MAVLink mode, shown as the vehicle that ground stations know already. Sans-IO.
 
 It sends as component 200 and in MAVLink 1. Passed on as they are, its frames would be a second vehicle on every screen

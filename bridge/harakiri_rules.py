@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What Harakiri can hold, command by command: the table of mission-rules.md ("Each item")."""
 
 import math

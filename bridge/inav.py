@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """INAV: the list is in its memory until SAVE; what is not whole cannot be flown (docs/inav.md)."""
 
 from contextlib import suppress

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which message from a ground station is whose business: one table."""
 
 from collections.abc import Callable

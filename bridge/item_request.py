@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How long an item of an upload is waited for before it is asked for again. Sans-IO."""
 
 from dataclasses import dataclass

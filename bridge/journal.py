@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How the bridge says what happens; the service decides where it goes."""
 
 from typing import Literal, Protocol

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A vehicle's groups from the MAVLink of a flight controller that speaks for itself.
 
 Thousands of frames may come in a second, and mostly nobody looks: the newest of each kind is kept as bytes and decoded

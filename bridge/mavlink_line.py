@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A port on which MAVLink is spoken: what comes in, and when it is over. Sans-IO."""
 
 from bridge.autosense import PROBE, is_plausible_heartbeat

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Sends MAVLink to a Harakiri without setting off its traps. Sans-IO."""
 
 from protocols.mavlink.codec import FrameWriter, Packed

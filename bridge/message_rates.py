@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How often each ground station gets which message: its own wishes, else the defaults. Sans-IO."""
 
 from collections.abc import Iterable, Mapping

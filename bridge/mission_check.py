@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How a mission list is judged, whatever the flight controller: item by item, by the rules that its dialect brings.
 
 Rules for one kind of flight controller are a `MissionRules` and its `ListCheck`: `bridge.harakiri_check` is one.

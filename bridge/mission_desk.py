@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What every way to a mission shares: one transfer at a time, the checks before, the delivery, the reading back.
 
 Mission Planner over UDP (bridge.mission_upload, bridge.mission_download) and the command line go through this one desk.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The seam between missions and the flight controllers that store them.
 
 A dialect is one kind of flight controller: by which rules a list is judged, how it is put there, proven and read back.

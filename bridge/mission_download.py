@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station reads the mission: the vehicle's side of MAVLink's download (mission-rules.md, "Read-back")."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is remembered of every mission that comes in."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where a craft is in its mission, as NAV_STATUS tells it: which record it flies to, and which it has reached."""
 
 from enum import Enum

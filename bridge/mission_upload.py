@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (mission-rules.md, clients.md).
 
 One transfer at a time. Mission Planner eats its own packets and takes any ack to MISSION_COUNT as "go on"; what is odd

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A vehicle's groups from what MSP telemetry has told: the values of docs/telemetry.md, not in MAVLink's units."""
 
 from functools import cache

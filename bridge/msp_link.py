@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The request side of an MSP line: what may be sent when, how long to wait, what is still unanswered.
 
 Harakiri's send ring holds 255 bytes and has no overflow check, so the sum of the replies that are still to come

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii 2.4 NAV: each record goes to EEPROM at once, the list ends with the first that says so (docs/inav.md)."""
 
 from bridge.nav_missions import NOTHING, NavMissions

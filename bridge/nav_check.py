@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The rules for a mission list on INAV and MultiWii NAV (docs/inav.md): what a list becomes there, and why."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Records to items: what an INAV or a MultiWii NAV holds, as a ground station reads it.
 
 A leg's speed is shown as a DO_CHANGE_SPEED before it, so a list may have more items than records, and home (item 0) is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where the JUMPs of a list go, as the flight controller counts: records from 1, without what was dropped or folded."""
 
 from dataclasses import dataclass, field, replace

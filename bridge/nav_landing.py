@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where a LAND lands that does not say so: ground stations send it without a place, or with height 0."""
 
 from collections.abc import Sequence

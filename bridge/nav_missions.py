@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How a list is put on INAV and MultiWii NAV (docs/inav.md): record by record, each read back before the next is sent.
 
 An answer to SET_WP does not mean that anything was stored, so nothing is believed but what is read. Nothing is sent to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What INAV and MultiWii NAV can hold, command by command: the table of docs/inav.md."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """DO_CHANGE_SPEED on a flight controller whose legs each have a speed of their own."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The vehicle that ground stations see while the flight controller does not speak for itself. Sans-IO.
 
 It is there from the start and keeps its ids whatever the flight controller does: no ground station loses it because

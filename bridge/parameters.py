@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The short list of parameters that ground stations need to see (https://mavlink.io/en/services/parameter.html)."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Frames between an autopilot that speaks MAVLink for itself and its ground stations: routed, never changed. Sans-IO.
 
 Routing as MAVLink describes it (https://mavlink.io/en/guide/routing.html): a frame without a target goes to everyone

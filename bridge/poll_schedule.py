@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which telemetry question is asked when. Sans-IO.
 
 Each poll has an interval at which it is wanted: what ground stations asked for, or what the bridge itself needs. The

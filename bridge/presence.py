@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the pilot is told about the flight controller coming and going. Sans-IO.
 
 A craft that arms may change protocol and speed, and is searched for a second or two. That is no news: Mission Planner

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Procedures: conversations with the flight controller and the store, written top to bottom without any I/O.
 
 A procedure is a generator. It yields one effect at a time and is sent the effect's answer; `bridge.runner.Runner`

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The last final answer to each ground station, for the items that it goes on to repeat. Sans-IO."""
 
 from collections.abc import Callable

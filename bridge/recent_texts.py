@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What each ground station was told lately: Mission Planner asks seven times over, and one refusal is enough."""
 
 from collections.abc import Iterable

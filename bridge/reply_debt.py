@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a flight controller that stands still may answer all at once when it goes on. Sans-IO.
 
 Harakiri's send ring has no overflow check (bridge.msp_link). Whoever is silent is searched for, and each question that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Carries out procedures, one at a time: two conversations about missions never mix on the wire."""
 
 from collections import deque

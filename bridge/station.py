@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ground stations, and how the bridge speaks to them."""
 
 from collections.abc import Hashable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which ground stations are there, and in which MAVLink version each is spoken to."""
 
 from dataclasses import dataclass, field

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which message is made from which poll's reply, how often by default, and in which of ArduPilot's streams it is."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of a vehicle, in groups with a name for each value: for zenoh, the web page and the command line.
 
 None means "not known". The notes beside the fields are part of the published schemas (service/zenoh_link/schemas).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The MAVLink messages that make a flight controller on MSP a vehicle: docs/telemetry.md, field by field.
 
 What is not known is MAVLink's "unknown"; a message whose fields have no such value is not made (None).

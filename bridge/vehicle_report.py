@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One place to ask what is known of the vehicle, whatever protocol its flight controller speaks now. Sans-IO."""
 
 from collections.abc import Callable, Iterable, Sequence

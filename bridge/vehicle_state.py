@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of the vehicle now, from MSP telemetry. None means "unknown", never 0."""
 
 from dataclasses import dataclass, field

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a checked mission list comes to."""
 
 from collections.abc import Mapping

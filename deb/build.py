@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the Debian package: `make deb`, or `python -m deb.build amd64 arm64` in the project's folder.
 
 The libraries are the wheels that requirements.lock pins, for Debian 12's Python and for Debian 13's side by side; pip

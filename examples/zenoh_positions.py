@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Hear where every vehicle of a fleet is: `python zenoh_positions.py [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
 
 The same for the shell, with the zenoh project's own tools: docs/fleet.md. Fields and units: docs/zenoh.md.

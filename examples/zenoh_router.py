@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A zenoh router for a small fleet, from the Python package: `python zenoh_router.py [FILE or ENDPOINT...]`.
 
 FILE is a zenoh configuration (zenoh-tls/router.json5); an ENDPOINT is where to listen, "tcp/0.0.0.0:7447" if nothing is

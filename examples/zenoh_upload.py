@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Write a mission to one vehicle: `python zenoh_upload.py VEHICLE FILE [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
 
 The vehicle must take commands: `commands = true` in its [zenoh] table, docs/zenoh.md.

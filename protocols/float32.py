@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Single precision as a flight controller computes with it."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Recognises FrSky hub telemetry, which an armed Harakiri with tele_prot 1 sends at 9600 baud (Harakiri: telemetry.c).
 
 A value is 0x5E, an id, two bytes; 0x5E and 0x5D within it are sent as 0x5D and the byte XOR 0x60. Nothing here is read:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One mission item as a ground station sends it, whatever message or file it came in."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What all flight controllers' stored records have in common: bytes, and a list's identity by their checksum."""
 
 import zlib

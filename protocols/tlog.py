@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Telemetry logs (.tlog) as Mission Planner, MAVProxy and pymavlink write and replay them.
 
 A record is 8 bytes, big-endian: microseconds since the Unix epoch, then the frame as it was on the wire.

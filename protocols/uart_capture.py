@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """UART captures (.uart): what was read from and written to a flight controller's port, when, and at which speed.
 
 One JSON object a line, each line for itself, so a capture may be appended to, cut with head and tail, and torn:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's 16-byte mission record `wp_t` (firmware: mw.h, floppy.c; layout: docs/msp-mission.md)."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How a command of the command line reaches a bridge: the running daemon's, or one of its own with `--fc`."""
 
 import asyncio

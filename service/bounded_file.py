@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Files that a person names: read to their end, but not for ever."""
 
 import errno

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge check`: what would become of a mission file, offline."""
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The reference page of the command line, docs/cli.md: what each command says to --help (`make cli-page`)."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a mission command is called where a person reads it."""
 
 from protocols.mavlink.dialect import messages

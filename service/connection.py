@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Connection strings, as pymavlink and MAVProxy users know them."""
 
 import socket

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon's local control socket: `push`, `pull`, `status` and their like talk to a running daemon through it.
 
 A Unix socket in the state directory; one JSON object a line. A request has the key "do"; the daemon answers with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where a daemon's control socket is: as a service of systemd in its runtime directory, else in its state directory."""
 
 import os

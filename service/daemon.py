@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The running bridge: its links, its store and its clock, on one event loop."""
 
 import asyncio

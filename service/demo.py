@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge demo`: the main job on a simulated Naze, from a mission file to the proof."""
 
 import shutil

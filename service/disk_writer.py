@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Bytes from the event loop to a slow disk, on a thread: who has something to write never waits for it."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Opens what a flight controller hangs on: a serial port, a TCP connection, or the simulated Naze."""
 
 import asyncio

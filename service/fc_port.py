@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller's port: opened, read, written, and opened again whenever it comes back."""
 
 import asyncio

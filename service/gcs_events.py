@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a link to ground stations tells the daemon."""
 
 from typing import Protocol

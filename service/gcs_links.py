@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Links to ground stations, made from their addresses. None of them ever waits for a slow peer."""
 
 import errno

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A daemon from its start to a signal, and what systemd hears meanwhile."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Logs to standard error: coloured and short on a terminal, one JSON object a line elsewhere.
 
 For journald each line has its priority in front (sd-daemon(3)).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Prometheus' text of a daemon: what it counts anyway, read when somebody asks for it.
 
 Imported only where it is served: the client library costs several megabytes.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A small MAVLink ground station: writes and reads a mission over UDP, as the demonstration and a script would."""
 
 from collections.abc import Callable, Iterator, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge push`, `pull`, `clear` and `status`."""
 
 from dataclasses import asdict

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Missions as plain data: on the control socket and in what --json prints."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A mission as it was sent beside what is stored of it, for a terminal."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What systemd is told, and how often it wants to hear from us: sd_notify(3).
 
 Own code, because the protocol is one datagram: the packages for it that have a wheel know nothing of STOPPING and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Says why a serial port cannot be used: missing, not permitted, busy (by whom), or a login console."""
 
 import errno

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What commands print: tables that end where their text ends, strict JSON, and the sentence of a failure."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a daemon records of itself: telemetry logs always, the UART if it is asked to."""
 
 from collections.abc import Callable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """SIGHUP: the settings are read again, and what can be taken over in flight is."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge run`: the daemon in the foreground."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a TCP client has not read yet: whole frames, and the oldest telemetry gives way first."""
 
 from collections import deque

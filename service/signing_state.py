@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The keys of a daemon's links, and their timestamps, which outlive it.
 
 A Pi has no clock that runs without power: after a reboot it may believe that it is yesterday. Signatures would begin

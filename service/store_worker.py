@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The mission store on a thread of its own: a slow SD card never holds the links up."""
 
 import asyncio

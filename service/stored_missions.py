@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge missions`: what came in, and what became of it."""
 
 import difflib

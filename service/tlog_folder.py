@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of telemetry logs: one file at a time, bounded in size, total and age.
 
 No clock is read here: which time it is says the caller, or the records themselves.

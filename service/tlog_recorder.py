@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Writes what ground stations hear and say into telemetry logs."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Records what passes at the flight controller's port (`run --record-uart FILE`), so that it can be played again."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who may write over a link to ground stations: what the table form of a `gcs` setting says.
 
 gcs = [

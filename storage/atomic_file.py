@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A small file that is whole at every moment, even if the power is cut while it is written."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Open the database file: see that it is whole, make commits durable, bring it to this release's schema.
 
 Damage is looked for at every start, because SD cards rot and lose power. A damaged file is neither repaired

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Every mission that came in, accepted or not: what was sent, what it became, the craft's answer."""
 
 import builtins

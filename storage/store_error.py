@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The one error of this package, and SQLite's error codes in a person's words."""
 
 import sqlite3

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/cli.md is what the commands say themselves."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/events.md lists every event that the log can have, and no other."""
 
 import ast

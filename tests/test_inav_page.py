@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/inav.md says what the rules do: for each command the action that is stored, and whether it is dropped."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The worked exchange on docs/msp-mission.md is what the encoders and the simulated Naze really say."""
 
 import re

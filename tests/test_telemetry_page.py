@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/telemetry.md says what the table in the code says: every message, its poll, its rate and its fields."""
 
 import re

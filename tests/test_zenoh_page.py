@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/zenoh.md says what the code says: every key and its delivery, and every field of every payload."""
 
 import json

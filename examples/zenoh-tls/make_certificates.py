@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Certificates for a fleet of one's own: `python make_certificates.py FOLDER ROUTER_HOST[,HOST...] NAME...`.
 
 Needs `pip install trustme`. Makes in FOLDER: ca.pem, which everybody gets, and ca.key, which stays here; router.pem and

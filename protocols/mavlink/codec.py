@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Messages from frames and frames from messages, for the messages that the bridge itself reads or writes."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The MAVLink dialect that the bridge itself speaks: pymavlink's generated message classes.
 
 ardupilotmega is the dialect because ground stations take the vehicle for an ArduCopter: they ask it

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Splits a byte stream into MAVLink 1 and 2 frames (https://mavlink.io/en/guide/serialization.html).
 
 Frames are checked by CRC but not decoded: what is only passed on stays bytes.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink FTP is not offered; a request is refused at once so that nobody waits (https://mavlink.io/en/services/ftp.html)."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m protocols.mavlink.make_message_table`: print message_table.py anew, from pymavlink's dialect `all`.
 
 A frame can only be checked with its message's CRC_EXTRA, so that every message counts that any flight controller may
@@ -20,7 +21,8 @@ from pymavlink.dialects.v20 import all as mavlink_2
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.message_format import MessageFormat
 
-_HEAD = '''"""The format of every message that is known to MAVLink. Made by `make message-table`, not by hand."""
+_HEAD = '''# SPDX-License-Identifier: GPL-3.0-or-later
+"""The format of every message that is known to MAVLink. Made by `make message-table`, not by hand."""
 
 from protocols.mavlink.message_format import MessageFormat
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What framing and routing must know of a message: nothing of its meaning."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The format of every message that is known to MAVLink. Made by `make message-table`, not by hand."""
 
 from protocols.mavlink.message_format import MessageFormat

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MissionItem to and from MISSION_ITEM and MISSION_ITEM_INT (https://mavlink.io/en/services/mission.html)."""
 
 from protocols.mavlink.dialect import Message, messages

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mission files as ground stations write them."""
 
 from protocols.mission_file.error import MissionFileError

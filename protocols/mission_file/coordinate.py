@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A latitude or longitude in a mission file: degrees, or not given."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is wrong with a mission file, in words for the person who gave it to us."""
 
 _LONGEST_QUOTE = 24

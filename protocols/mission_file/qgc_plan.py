@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """QGroundControl's .plan (JSON; docs.qgroundcontrol.com, "Plan File Format"). Fence and rally points are passed over.
 
 An item's frame and params are what QGroundControl would send; its AltitudeMode only says how it arrived at them.

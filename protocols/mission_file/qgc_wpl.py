@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """QGC WPL 110, the text format of Mission Planner and most others (https://mavlink.io/en/file_formats/).
 
 A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MSP command numbers that the bridge uses (Harakiri's serial.c; the others: inav.md)."""
 
 from enum import IntEnum

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MSP v1 frames: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c)."""
 
 from dataclasses import dataclass

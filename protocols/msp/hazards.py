@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Bytes that make Harakiri act on its own, and how frames avoid them.
 
 Three 0x0D in a row enter the CLI, in AUTOSENSE three '#' do so too and three 'R' reset the board (serial.c, serialCom).

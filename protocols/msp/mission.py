@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The mission extension's messages, both directions (docs/msp-mission.md is the specification)."""
 
 import struct

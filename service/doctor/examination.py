@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The list of checks, in the order in which a pilot mends things."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The check of the flight controller: a running daemon is asked, and else the port listened to."""
 
 from collections.abc import Callable

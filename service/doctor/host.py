@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The machine as the checks see it: files below a root, which tests make with faults in it."""
 
 import fcntl

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of the machine: its clock, its disk, the missions on it, and what runs there."""
 
 import os

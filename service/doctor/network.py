@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of the network: where ground stations find the bridge, and whether its ports are free."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of the flight controller's serial port: is it there, may the bridge use it, and who else does."""
 
 import grp

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of zenoh: does its configuration hold, and do its routers answer."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The fleet as a table for a terminal."""
 
 from collections.abc import Iterable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What comes over zenoh, as plain data that may be printed. Strangers publish, too: nothing here raises."""
 
 import json

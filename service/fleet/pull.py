@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the vehicles' flight controllers hold, brought home."""
 
 from collections.abc import Collection

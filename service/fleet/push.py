@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One mission to many vehicles at once; what happens to one is nothing to the others.
 
 `FleetPush` is told what comes and knows how each vehicle stands; `push` lets zenoh tell it.

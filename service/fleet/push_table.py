@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How a push to the fleet goes, and how it went, for a terminal."""
 
 from collections.abc import Callable, Iterator

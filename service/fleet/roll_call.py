@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who is alive, and how each one is: one question to the whole fleet."""
 
 import zenoh

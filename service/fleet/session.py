@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How `naze-bridge fleet` joins the vehicles' zenoh: as a client of one router, or of one vehicle directly.
 
 A client, because sessions in mode peer that meet at a router only do not see each other through it.

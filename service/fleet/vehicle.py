@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A vehicle of the fleet, as its `state` tells."""
 
 from collections import Counter

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The fleet as it changes: who is alive, and everybody's newest state."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where settings come from: flags over environment over the configuration files over defaults."""
 
 from service.settings.load import default_state_dir, load_settings

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The configuration file, and those in `conf.d` beside it: TOML, in the order of their names, the later one wins."""
 
 import difflib

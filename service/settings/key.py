@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One setting: its name, what it means, and how a value is read."""
 
 from collections.abc import Callable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """In which line of a TOML file each key begins: the parser of the standard library keeps that to itself."""
 
 import tomllib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Puts the settings of a daemon together, and tells of all that is wrong at once."""
 
 import os

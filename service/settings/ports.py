@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Two users of one port, or of one link: found before either of them has opened it."""
 
 from collections import Counter

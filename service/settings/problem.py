@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is wrong with settings, all of it at once."""
 
 from collections.abc import Sequence

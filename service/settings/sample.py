@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The sample configuration file, and the table of the reference page: `python -m service.settings.sample [--page]`.
 
 Both are made from the table of keys, and a test compares them with what is checked in (`make config-sample`).

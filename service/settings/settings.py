@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a daemon is started with."""
 
 from collections.abc import Mapping, Sequence

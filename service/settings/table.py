@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """All settings there are: the one table that reading, the sample file, the reference and the environment go by."""
 
 from pathlib import Path

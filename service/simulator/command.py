@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge sim`: a simulated flight controller alone, behind a link that looks like a serial port, or a socket."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The firmware's own mission core, compiled for this machine (make -C firmware sim), on the simulated board.
 
 firmware/naze_mission.h is the manual: the core knows only the functions that its board gives it, so the simulated board

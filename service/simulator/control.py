@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Lines from a test in another process: switch faults, pull plugs, read the counters.
 
     FAULT VALUE         a field of Faults and a number (switches: 0 or 1)

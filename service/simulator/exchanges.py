@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Takes a UART capture apart: which answer belongs to which request, and what the flight controller sent unasked."""
 
 from bisect import bisect_right

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What may be on the other end of a line: the simulated Naze, or a capture of a real one that is played."""
 
 from typing import Protocol

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which boards beside the Naze can be simulated, and how one is made."""
 
 from functools import partial

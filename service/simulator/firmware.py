@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri from one boot to the next: its main loop, and its serial port as serialCom has it (serial.c, mw.c).
 
 All that lives in RAM lives in this object, so a new one is a reset.

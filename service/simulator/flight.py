@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A plausible flight: sitting on a field while disarmed, circling slowly above it while armed."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's own mission store and the MAVLink messages that fill it (baseflight_mavlink.c, floppy.c).
 
 The list in RAM is changed item by item. A second after the last item it is written to flash, whether the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """FrSky hub telemetry as Harakiri sends it while armed with tele_prot 1 (telemetry.c)."""
 
 import struct

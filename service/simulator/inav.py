@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A model of INAV as a copter with GPS and compass, versions 6.1.1 to 9.1.0 (src/main/fc/fc_msp.c).
 
 Its lengths and oddities were compared with INAV's own simulator of each version.

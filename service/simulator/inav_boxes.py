@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The modes of an INAV copter with GPS, as each version's own simulator lists them: MSP_BOXNAMES and MSP_BOXIDS."""
 
 ARM, ANGLE, NAV_ALTHOLD, NAV_RTH, NAV_WP = 0, 1, 3, 10, 28

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """INAV's waypoint list in RAM and the copy of it in the EEPROM, with all that it acknowledges and does not do.
 
 After setWaypoint, getWaypoint, loadNonVolatileWaypointList and saveNonVolatileWaypointList of INAV 6.1.1 to 9.1.0

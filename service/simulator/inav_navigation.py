@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """INAV's waypoint mode as a copter flies it: the states of its navigation that a mission goes through.
 
 After navOnEnteringState_NAV_STATE_WAYPOINT_... of INAV 9.1.0 (src/main/navigation/navigation.c). Not simulated: the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a UART makes of bytes that were sent at another speed."""
 
 _FRAME_BITS = 10

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's MAVLink 1 stream: what it sends, when, and as whom (baseflight_mavlink.c).
 
 Payloads are packed here rather than by pymavlink: the firmware sends them without the fields that MAVLink 2

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A file that keeps what a simulated board's flash or EEPROM holds."""
 
 import mmap

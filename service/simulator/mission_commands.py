@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A model of the flight controller's side of the mission extension: requests in, replies out (docs/msp-mission.md)."""
 
 import struct

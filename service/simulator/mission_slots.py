@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Two flash slots for the mission, of which the newest valid one counts, and the configuration's page.
 
 A slot is the records' space and then a header, programmed last and with its magic number last of all: until

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The seam between the firmware and its mission extension: two things fit it, the model and the compiled core."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A simulated board with MSP that is no Harakiri: power, wires and EEPROM around a firmware, without a clock.
 
 As SimulatedNaze is, but simpler: these boards speak nothing but MSP, at one speed.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The seam between a simulated board with MSP and its firmware: INAV, MultiWii, and those with telemetry only."""
 
 import struct

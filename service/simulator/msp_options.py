@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a simulated board with MSP that is no Harakiri can be made to be."""
 
 from dataclasses import dataclass

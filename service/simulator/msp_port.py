@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's MSP: the receiver that works byte by byte, and the answers to its commands (serial.c)."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A model of MultiWii 2.4.1 with navigation, as a quadrocopter on an AVR (Protocol.cpp)."""
 
 import struct

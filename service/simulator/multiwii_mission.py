@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii's waypoints: each has its place in the EEPROM, with a checksum of its own (EEPROM.cpp)."""
 
 import struct

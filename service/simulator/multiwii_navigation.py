@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii 2.4's mission mode (GPS.cpp): it fetches one step after the other out of the EEPROM.
 
 Not simulated: safe distances, the settling before a landing, and a mission that goes on where it was interrupted.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What MSP_NAV_STATUS tells, in MultiWii's numbers, which INAV kept and added to (mwState, mwError)."""
 
 import struct

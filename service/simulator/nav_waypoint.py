@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A waypoint as MSP_WP and MSP_SET_WP carry it (inav.md "Layouts")."""
 
 import struct

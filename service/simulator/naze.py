@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated board: power, wires and flash around the firmware, without a clock of its own.
 
 Time is passed in (seconds of any monotonic clock). Whatever happens between two calls is computed at its nominal time,

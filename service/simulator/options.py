@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a simulated Naze can be made to be, and what it has counted."""
 
 from dataclasses import dataclass

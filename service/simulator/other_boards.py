@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge sim --kind`: a flight controller with MSP that is no Naze."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A simulated Naze within the daemon's process, behind one end of a socket pair (`--fc sim:`)."""
 
 import asyncio

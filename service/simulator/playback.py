@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Plays the flight controller of a UART capture: a user's field problem on a desk, or in simulated time in a test.
 
 What it sent of its own accord comes at its time. What it answered comes when it is asked: the bridge that listens now

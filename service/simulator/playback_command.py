@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge sim --play`: the flight controller of a UART capture, behind a link that looks like a serial port."""
 
 import asyncio

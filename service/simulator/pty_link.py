@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A simulated board on a pseudo-terminal that looks like a serial port, speed included."""
 
 import asyncio

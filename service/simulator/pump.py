@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Moves bytes between a simulated board and a file descriptor, at the right times of an asyncio loop."""
 
 import asyncio

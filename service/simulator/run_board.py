@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A simulated board behind its plug, from its first moment to Ctrl-C."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The serial port of a simulated MSP board: two wires at a baud rate, a receive ring, and a queue to send.
 
 Harakiri's own UART, whose transmit ring overwrites itself, is in uart.py.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A simulated board behind a TCP port, as INAV's own simulator and serial adapters on Wi-Fi are."""
 
 import asyncio

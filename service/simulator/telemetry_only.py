@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Flight controllers that are simulated for their telemetry only: Betaflight 4.5 and baseflight.
 
 Betaflight: src/main/msp/msp.c; baseflight: src/serial.c. Neither flies missions. In the air they circle (flight.fly).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Bytes on which Harakiri acts outside of any protocol (serialCom): into the CLI, or into a reset."""
 
 from enum import Enum, auto

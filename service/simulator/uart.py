@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """USART1 of the board: two wires at the baud rate, and a 256-byte ring behind each (drv_uart.c)."""
 
 from collections import deque

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A craft that flies straight lines at constant speed: what the navigation of a simulated board steers."""
 
 import math

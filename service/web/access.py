@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What every request must be like, and what every answer says to the browser.
 
 Reading needs no token, so another site's page must not read through the pilot's browser: by its own name, turned to our

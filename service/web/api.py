@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the page asks for: JSON over GET; and the one thing that it does, a restore.
 
 GET  /api/state                          how everything is now; asked once a second by an open page

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Two mission lists side by side: as sent and as stored, or two that were sent."""
 
 import difflib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who may connect to the status page, and for how long: a hostile browser must cost the flight controller nothing.
 
 A connection carries one request and is cut off after a few seconds, so that a peer who sends or reads slowly holds

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Answers of hundreds of items: made beside the loop that serves the links, one at a time, and not twice.
 
 A thread that computes holds the interpreter for some milliseconds. Whoever asks for one such answer after the other,

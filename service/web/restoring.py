@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A restore that goes on while nobody waits for it: a phone that loses the Wi-Fi finds its end on the page."""
 
 import asyncio

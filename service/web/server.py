@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Serves the status page on the daemon's own event loop."""
 
 import asyncio

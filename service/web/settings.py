@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where the status page is served: the `[web]` table of the configuration file."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The page's own files, held in memory: a browser makes nobody wait for the SD card."""
 
 import hashlib

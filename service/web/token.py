@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The token that a browser must show for anything that is not reading."""
 
 import hmac

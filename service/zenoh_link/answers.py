@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Queries for what is the case now: state, mission/current and mission/list."""
 
 from bridge.bridge import Bridge

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The commands below @cmd: what the command line can do, asked for by a query."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The zenoh configuration of the daemon's session: the file that is passed through, and ours where it says nothing."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Why a zenoh endpoint does not let us in: zenoh itself only says that it could not connect.
 
 So the first steps are taken once more with the standard library, which tells an expired certificate from a wrong name.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Every key of a vehicle, in one table: docs/zenoh.md shows the same one.
 
 A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/state` takes a whole fleet.

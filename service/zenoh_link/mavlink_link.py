@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink over zenoh: a link to ground stations like the others. Frames go out only while somebody reads them."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The bridge as one vehicle in zenoh: puts the parts together and hands each what is its business.
 
 A sample's way from the UART:

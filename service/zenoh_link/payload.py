@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Payloads: plain data in one of two encodings, with a version, a sequence number and a time."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who is there: our liveliness token, other bridges that use its name by mistake, and what we are joined to."""
 
 import asyncio

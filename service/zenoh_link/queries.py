@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Queries: they come in on zenoh's threads, are dealt with on the event loop, and answered on the session's thread."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Writes schemas/*.json, the published JSON Schema of each key, from the types that the payloads are made of.
 
 `make zenoh-schemas` does it; a test says when the files are not up to date.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The zenoh session, and the thread on which everything happens that may wait: opening, closing, reliable samples.
 
 zenoh itself connects and connects again, in threads of its own. The event loop never waits for any of it.

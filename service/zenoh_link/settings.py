@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How the daemon joins zenoh: the `[zenoh]` table of the configuration file."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """From zenoh's threads to the event loop."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is said at each key, as plain data: the bodies of docs/zenoh.md's payloads."""
 
 from collections.abc import Mapping

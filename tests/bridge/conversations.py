@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What ground stations do with missions: an upload and a download with the client's own repeats."""
 
 import struct

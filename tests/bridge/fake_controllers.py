@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Other things than a Harakiri that may sit on the line, as a `peer` of the world."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Whatever two ground stations, the command line, the pilot and the plugs do: no wrong list, and never a dead end."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Finding the flight controller, in simulated time: at every speed, left in mid-frame, booting, power-cycled, armed."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Noise is never taken for a flight controller, also where it is made of the very bytes that frames begin with.
 
 What is left to chance, by calculation: an MSP verdict on uniform noise needs two equal answers to IDENT, the shortest

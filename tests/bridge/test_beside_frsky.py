@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A Harakiri that is armed with tele_prot 1 answers MSP beside its FrSky telemetry, out of one send ring."""
 
 import pytest

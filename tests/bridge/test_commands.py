@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What else a ground station asks: every command acknowledged once, nothing that acts on the aircraft done."""
 
 import math

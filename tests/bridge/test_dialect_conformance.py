@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What every way of storing missions must keep to, whatever the flight controller: one contract, all dialects.
 
 Each runs through the whole bridge against the simulated flight controller that it is for. What is asked of it is what

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Reading a mission: mission-rules.md, "Read-back"."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Calibration and storage: done on the ground, once, acknowledged with what came of it, and never in the air."""
 
 import math

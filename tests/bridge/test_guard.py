@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who may write over which link: with a key, with a list of addresses, and in both ways of working."""
 
 from collections.abc import Callable, Sequence

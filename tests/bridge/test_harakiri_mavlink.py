@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Missions for a Harakiri that answers nothing but MAVLink, by its own mission messages."""
 
 import struct

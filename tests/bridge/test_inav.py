@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Missions to INAV and MultiWii NAV through the whole bridge: proof, faults, arming, clearing, progress."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Missions to the simulated INAV and MultiWii (service/simulator), which have every trap of inav.md."""
 
 from typing import Any

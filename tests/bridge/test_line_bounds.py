@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the flight controller's rings must bear: never more reply bytes outstanding than it can hold, stalled or not."""
 
 import random

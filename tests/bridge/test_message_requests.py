@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Each ground station gets what it asked for, as often as it asked, and nobody else is the worse for it."""
 
 import math

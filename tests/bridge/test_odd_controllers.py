@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Flight controllers that answer anything at all: every procedure ends, nothing raises, nothing is believed."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """An autopilot that speaks MAVLink for itself: frames pass both ways as they came, each to whom it is for."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The schedule alone: questions that are refused, never answered or lost, and what the line leaves of any wishes."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a flight controller at another speed makes of our probes: none of the runs on which Harakiri acts.
 
 `garble` samples the waveform of 8N1 bytes as the receiver does. The receiver's clock may be off by 2 %; a probe may

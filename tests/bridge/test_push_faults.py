@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A push under every fault: the flight controller has the new list and said so, or it has the old one, whole.
 
 Only a push whose COMMIT was under way may end with "read the mission back". Afterwards the line always works.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The whole bridge against the firmware's compiled core on the simulated board, in simulated time.
 
 Whatever happens, the board's flash holds the old list or the new one, whole; and then a push works.

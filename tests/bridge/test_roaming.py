@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station whose address changes under way (Wi-Fi roaming): the same ids from elsewhere, and silence there."""
 
 import random

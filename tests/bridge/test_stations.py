@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ground stations that come and go: who is spoken to, in which MAVLink version, and for how long."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The bridge is stopped while a mission is on its way: it arrives, or the old list stays; who sent it hears which."""
 
 import random

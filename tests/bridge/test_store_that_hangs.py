@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A dying SD card answers after minutes or never: the craft is still shown, and still takes its mission."""
 
 from conversations import Download, Upload, records_of, waypoints

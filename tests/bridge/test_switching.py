@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Arming changes protocol and speed (tele_prot 0..3), disarming changes them back; ground stations see one vehicle."""
 
 from itertools import pairwise

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MSP polls become a living MAVLink vehicle: what is sent is what the craft does, and the line bears it."""
 
 import math

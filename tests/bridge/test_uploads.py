@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Writing a mission, row by row of mission-rules.md: "Before the first item" and "While items come in"."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is not known is MAVLink's "unknown", and never 0; and what other firmware than Harakiri sends is understood."""
 
 import math

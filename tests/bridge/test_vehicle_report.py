@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of the vehicle, in groups: the same whichever protocol the flight controller speaks."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A whole world in simulated time: the bridge, a simulated Naze on a wire, a store, and ground stations over the air.
 
 Nothing here sleeps, opens a socket or reads a clock. What holds for everything that the bridge does is asserted at

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The configuration file: what is taken, and what is said of what cannot be."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge demo`: the first thing that anybody sees of it."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Commands that talk to a flight controller themselves, with `--fc`; and what goes wrong outside of naze-bridge."""
 
 import json

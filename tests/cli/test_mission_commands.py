@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`push`, `pull`, `clear` and `status` as a person and as a script use them, against a running daemon."""
 
 import json

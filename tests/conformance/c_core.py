@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The firmware's mission core, compiled for this machine, on a board of memory (firmware/sim/sim_board.h)."""
 
 import ctypes

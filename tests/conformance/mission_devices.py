@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controllers that must not be told apart: the firmware's C core, and what the simulated Naze runs."""
 
 from typing import Protocol

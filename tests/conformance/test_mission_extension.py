@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/msp-mission.md, held against the firmware's C core and against the simulator's model of it.
 
 The tests in the first half say what the page says, to each of the two. In the second half both get the same long random

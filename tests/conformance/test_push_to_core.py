@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon's procedures over bad lines to the firmware's own C core, in simulated time."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A machine made of files: what the checks read, with the faults that a test puts in."""
 
 import grp

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Faults made on purpose: each is found and named, with what to do about it."""
 
 import sqlite3

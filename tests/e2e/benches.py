@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Test benches: programs that belong together, started for a test and ended with it, however it ends."""
 
 import signal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A bad radio link between a UDP client and the daemon: loses, repeats, delays and so reorders datagrams."""
 
 import heapq

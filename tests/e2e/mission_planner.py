@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mission Planner as a scripted client: what it sends, what it waits for and how long (clients.md; commit a2fcd74d6).
 
 Only its behaviour on the link is here. Its timers may be scaled down (`pace`); everything else is as it is there, the

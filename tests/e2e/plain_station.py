@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station that keeps to MAVLink's mission protocol, over any socket and with any of pymavlink's dialects."""
 
 import select

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mission lists as a ground station's plan screen holds them, and what the rules say that becomes of them."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon and the simulated Naze as programs of their own, as a user starts them."""
 
 import json

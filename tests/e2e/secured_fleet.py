@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The examples for a fleet behind a router, copied to where a test can use them, and the router itself."""
 
 import shutil

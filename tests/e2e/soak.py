@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a soak does to a daemon, and who watches it meanwhile. All that is drawn is drawn from a seed."""
 
 import os

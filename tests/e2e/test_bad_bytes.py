@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Noise, nonsense and strangers on the network and on the UART: nothing comes of them."""
 
 import os

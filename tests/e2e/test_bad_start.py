@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a person gets wrong when starting the daemon, and what the machine has wrong: one clear sentence each."""
 
 import json

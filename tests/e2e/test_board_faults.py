@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller loses power, hangs, garbles, is unplugged, or is another one than hoped; the daemon is killed.
 
 The pilot is told in time, the list that was there is whole, and a second try works.

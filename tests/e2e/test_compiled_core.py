@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MAVSDK, daemon, pty, simulated UART, and behind it the very C code that goes onto the flight controller."""
 
 import random

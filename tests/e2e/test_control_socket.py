@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon's control socket: what is wrong with a request is said, and nothing ends the daemon but a signal."""
 
 import json

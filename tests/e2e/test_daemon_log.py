@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the daemon's log tells of its life."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge doctor` as a person and as a script use it, on the machine that runs this."""
 
 import json

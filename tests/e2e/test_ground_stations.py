@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ground stations by every kind of link, old ones, and several at once."""
 
 import socket

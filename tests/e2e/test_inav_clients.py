@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Real ground stations write and read 120 records through the real daemon, on a simulated INAV behind a TCP socket."""
 
 from collections.abc import Iterator

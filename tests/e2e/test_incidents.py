@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One incident can be followed through the log by its id."""
 
 from collections import defaultdict

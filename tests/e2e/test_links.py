@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Links that come, go, move and stall under a running daemon: real terminals and real sockets."""
 
 import os

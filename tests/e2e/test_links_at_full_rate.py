@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """An autopilot that speaks MAVLink at 3000 frames/s: all of it arrives, and who does not read costs nobody anything."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The real MAVProxy as a ground station."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The real MAVSDK as a ground station (what QGroundControl does, as far as missions go)."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Prometheus' text of a daemon that is at work, read by Prometheus' own parser."""
 
 import asyncio

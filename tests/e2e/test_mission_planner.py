@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mission Planner writes, reads, cancels and is refused, on clean links and on bad ones."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a running daemon records: telemetry logs, and the flight controller's port, which is then played again."""
 
 import os

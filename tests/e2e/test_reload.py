@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """SIGHUP: what is taken over in flight, what needs a restart, and a file that cannot be used."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What systemd hears of a daemon, and how soon a daemon ends in the middle of a mission."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the real MAVSDK and the real MAVProxy show of a flown circle, beside what the simulated craft really did.
 
 Between a moment on board and the truth that is asked for lie the poll, the ground station's own rate and this process:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A daemon whose link asks for a key or for an address, and pymavlink as a ground station that signs."""
 
 import socket

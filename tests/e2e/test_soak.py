@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A daemon at full rate through everything that may happen to it, for half a minute; `make soak` does it for longer."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Commands over zenoh: the rules, the lock and the reasons are everybody's, and what is wrong is said to who asked."""
 
 import json

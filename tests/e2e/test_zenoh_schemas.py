@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Everything that is published or replied is what the published schemas say, on every key and in both encodings."""
 
 import json

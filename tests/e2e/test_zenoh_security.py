@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon in a fleet where everybody proves who it is, by the examples as they stand: what strangers may do."""
 
 import datetime

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Sessions: nobody there, a router that comes late, goes and comes back; receivers that stall; names used twice."""
 
 import signal

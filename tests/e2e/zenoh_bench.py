@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A daemon in zenoh, and a session of the test's own beside it."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The router of a fleet as a process of its own: examples/zenoh_router.py."""
 
 import signal

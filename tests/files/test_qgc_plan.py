@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """QGroundControl plans: what is read, what is refused and in which words."""
 
 import json

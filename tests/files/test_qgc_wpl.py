@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """QGC WPL 110 files: what is read, what is refused and in which words."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """firmware/apply on a tree of our own making: in, out again, and what it refuses."""
 
 import hashlib

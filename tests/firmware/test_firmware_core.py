@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The mission core's own tests, built and run as `make -C firmware test` does, and a short run of its fuzzer."""
 
 import re

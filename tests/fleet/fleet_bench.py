@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A fleet of real daemons behind a real router, each a process of its own."""
 
 import json

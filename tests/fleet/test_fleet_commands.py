@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge fleet` as a person and a script use it: three daemons behind a router."""
 
 import json

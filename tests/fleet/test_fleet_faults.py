@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What goes away or hangs while the fleet is looked at or written to; nothing of it stops the others."""
 
 import json

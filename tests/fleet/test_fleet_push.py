@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The bookkeeping of a push to many vehicles: whatever comes when, each ends once and for its own reason."""
 
 from hypothesis import given

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How `naze-bridge fleet` finds its way in, and what it says if there is none."""
 
 import re

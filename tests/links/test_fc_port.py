@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller's port on a pty: gathered reading at high rates, and writing faster than a UART takes."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A flight controller behind TCP whose replies come byte by byte, each waiting for the acknowledgement of the last."""
 
 import asyncio

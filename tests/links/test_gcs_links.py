@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """UDP and TCP links by themselves, on real sockets."""
 
 import asyncio

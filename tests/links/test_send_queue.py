@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is kept and what is dropped for a TCP client that does not read."""
 
 from collections.abc import Sequence

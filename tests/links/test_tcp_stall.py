@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """TCP clients that stop reading cost nobody anything, and find what matters when they read again."""
 
 import asyncio

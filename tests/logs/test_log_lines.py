@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a program's log looks like to whoever reads it, or does not; each log is a program's own."""
 
 import json

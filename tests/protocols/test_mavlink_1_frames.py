@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink 1 as those know it who know nothing else: fixed payload sizes, no extension fields."""
 
 import pytest

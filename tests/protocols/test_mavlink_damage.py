@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A bad line: whatever is damaged in a stream of frames, the others come through, and nothing else does."""
 
 from collections import Counter

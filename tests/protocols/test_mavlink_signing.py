@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Signing against pymavlink's, both ways, and the rules for timestamps."""
 
 from datetime import UTC, datetime

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The table of message formats, held against pymavlink's dialects and against frames that pymavlink packs."""
 
 from importlib import import_module

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The mission extension's requests: no hazard byte, whatever they carry, and the board reads what was meant."""
 
 from collections.abc import Sequence

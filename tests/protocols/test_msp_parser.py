@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Finding MSP frames in any stream: whole or byte by byte, behind false and cut headers, quickly."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Telemetry replies: Harakiri's lengths are the least, other firmware's are longer, and nothing shorter is believed."""
 
 import struct

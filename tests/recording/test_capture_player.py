@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The player of captures: who asks as was asked then gets what was answered then."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Bytes on their way to a disk: in order, whole, and never more than there is room for."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is recorded, as the configuration file says it."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of telemetry logs: its bounds, and what a disk does to it."""
 
 import resource

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The recorder and its clock: a Pi learns the time when there is a network, in the middle of a recording."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Telemetry log records, held against pymavlink's reader, which also judges the CRCs."""
 
 import hashlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The capture file: what is written is read again; one that was torn, cut or appended to, as far as it goes."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mission items for the rule tests: a plain one of each kind, changed where a test says so."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The rules once more, written from mission-rules.md alone and as differently as possible: no table, no records type.
 
 What comes first of several faults is not the document's business, so a rejection is the set of codes that would do.

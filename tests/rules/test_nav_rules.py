@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a list becomes on INAV and MultiWii NAV: docs/inav.md, row by row, and what holds for every list."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What holds for every list whatever, judged by a second reading of the rules (rule_oracle.py)."""
 
 import math

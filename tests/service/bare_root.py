@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A Debian root to install into: this machine's own, seen through an overlay that is gone afterwards.
 
 It has namespaces of its own: nothing that is done in it reaches the machine, and it has no network but the loopback.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The Debian package: what is in it, and its life on a machine without a network, from the first file to the purge."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The unit: how far it is shut, and that each door that is open says why beside its line."""
 
 import shutil

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The line of each key, found in one pass whatever the file holds."""
 
 import tomllib

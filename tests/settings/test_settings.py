@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Settings from files, drop-ins, environment and flags, and what is said of those that cannot be used."""
 
 import os

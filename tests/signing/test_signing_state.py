@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Timestamps that outlive the daemon, on a machine whose clock does not."""
 
 import asyncio

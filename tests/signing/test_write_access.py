@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The table form of a `gcs` setting, and the key file: what is understood, and what is said of the rest."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A test bench: a simulated Naze, a client at its UART, and a clock that only the test moves."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """NOR flash: ones, zeros, and what a power cut leaves."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated INAV flies its mission, and MSP_NAV_STATUS tells of it as INAV's does."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated INAV's telemetry: lengths and signs of the versions, as their own simulators have them."""
 
 import struct

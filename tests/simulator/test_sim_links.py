@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated Naze on real descriptors: a socket pair, and a pty in a process of its own."""
 
 import asyncio

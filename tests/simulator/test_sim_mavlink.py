@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """When the board speaks MAVLink, what it says, and at which speed (pymavlink reads it)."""
 
 from collections import Counter

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller's side of docs/msp-mission.md, through the UART."""
 
 import struct

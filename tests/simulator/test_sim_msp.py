@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """MSP as Harakiri answers it: lengths, oddities, and a receiver that never looks back."""
 
 import struct

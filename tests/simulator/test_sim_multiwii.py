@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated MultiWii 2.4.1 with navigation: waypoints go straight into the EEPROM, one by one."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge sim --kind`: other flight controllers on a pseudo-terminal and on a socket, as programs."""
 
 import json

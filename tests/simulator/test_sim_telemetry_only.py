@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated Betaflight and baseflight: their own lengths, and no missions."""
 
 import struct

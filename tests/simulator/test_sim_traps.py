@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The byte runs on which Harakiri acts outside of any protocol (serialCom), with its counters' exact habits."""
 
 import pytest

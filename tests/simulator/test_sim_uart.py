@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The board's UART: line rate both ways, and rings that overflow as the DMA's do."""
 
 from hypothesis import given

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What goes into the store comes out again, and finding it does not get slower as missions gather."""
 
 import math

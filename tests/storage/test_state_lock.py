@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One daemon on one state directory, whatever became of the last one."""
 
 import os

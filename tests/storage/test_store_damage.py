@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A damaged file never stops the daemon: it is kept aside whole, its name is told, and a new one works."""
 
 import random

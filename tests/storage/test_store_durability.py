@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What was acknowledged is there after a kill -9, and after a power cut that tore what was being written."""
 
 import random

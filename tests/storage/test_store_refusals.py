@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where nothing can be stored, one sentence says why, and what was stored before is still there."""
 
 import sqlite3

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Debian's Chromium without a window, as a pilot's phone or laptop."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Takes the pictures in docs/pictures: `make pictures`."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Lists side by side: nothing is left out, and nothing differs without a reason."""
 
 import math

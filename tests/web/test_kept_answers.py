@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Big answers are made one at a time and once; what may still change is made anew."""
 
 import asyncio

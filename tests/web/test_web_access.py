@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The status page and strangers: who may read, who may change something, and what a bad request comes to."""
 
 import socket

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who gets in at the status page's door: bounded in number, in rate and in time."""
 
 import asyncio

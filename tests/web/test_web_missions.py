@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The status page and missions: looked at, compared, restored by the rules of every other way."""
 
 from benches import Starter

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The status page in Chromium: what a pilot sees and does, on a laptop and on a phone."""
 
 from collections.abc import Iterator

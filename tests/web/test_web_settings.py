@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The `[web]` table and the token's file: what is taken, and what is said of what cannot be."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A daemon that serves its status page, beside a simulated board."""
 
 import json

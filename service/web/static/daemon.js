@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Asking the daemon. An answer that does not come in time is an error with a sentence.
 
 const PATIENCE_MS = 8000;

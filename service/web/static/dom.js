@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Making elements. What comes from outside becomes text, never markup.
 
 export const byId = (id) => document.getElementById(id);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The list and the craft on a map without a map server: metres around the middle, north up.
 import { draw } from "./dom.js";
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The missions that came in: the last one, the list, one that is looked at, two compared, one restored.
 import { byId, make } from "./dom.js";
 import { ask, tell } from "./daemon.js";

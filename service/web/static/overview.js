@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How everything is now: what /api/state tells, as words.
 import { byId, make } from "./dom.js";
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Asks for the state once a second while somebody looks, and for the rest when the state says that it has changed.
 import { ask } from "./daemon.js";
 import { byId } from "./dom.js";

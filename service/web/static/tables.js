@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Mission lists as tables: one list, as sent beside as stored, or two lists compared.
 import { make } from "./dom.js";
 
