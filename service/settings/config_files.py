@@ -33,9 +33,20 @@ class Given:
 def read_files(config: Path, problems: list[Problem]) -> dict[str, Given]:
     """Read a configuration file and its drop-ins: values by the name of their key, tables that are there as True."""
     found: dict[str, Given] = {}
-    for path in (config, *sorted((config.parent / DROP_INS).glob("*.toml"))):
+    for path in (config, *_drop_ins(config.parent / DROP_INS, problems)):
         found |= _read_file(path, problems)
     return found
+
+
+def _drop_ins(folder: Path, problems: list[Problem]) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if path.suffix == ".toml")
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        # To leave out what cannot be read would be to run with other settings than were written.
+        problems.append(Problem(str(folder), f"this cannot be read: {error.strerror}"))
+        return []
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

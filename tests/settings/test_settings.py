@@ -205,6 +205,13 @@ def test_what_is_no_file(folder: Path) -> None:
     ]
 
 
+def test_drop_ins_that_cannot_be_listed_are_not_left_out(folder: Path) -> None:
+    (folder / "conf.d").rmdir()
+    assert load(folder, "sysid = 2").sysid == 2
+    (folder / "conf.d").write_text("")
+    assert problems(folder, "") == ["conf.d: this cannot be read: Not a directory"]
+
+
 def test_the_file_of_another_program(folder: Path) -> None:
     told = problems(folder, "\n".join(f"option{number} = 1" for number in range(5000)))
     assert len(told) == 21
