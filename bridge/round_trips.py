@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How long requests took to be answered, counted in classes. Sans-IO."""
 
 from bisect import bisect_left
