@@ -133,3 +133,13 @@ def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, command: list[st
     assert ended.exit_code == 2
     assert ended.stderr.splitlines()[-1].startswith("Error: this user has no home folder")
     assert "--state-dir" in ended.stderr
+
+
+def test_a_daemon_does_not_load_what_only_commands_use() -> None:
+    """On a Pi with 512 MB each library counts."""
+    script = (
+        "import sys, click; from service.cli import main; main.get_command(click.Context(main), 'run');"
+        "print(*sorted({'rich', 'pygments', 'zenoh', 'starlette', 'prometheus_client'} & set(sys.modules)))"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ended.stdout == "\n"
