@@ -107,7 +107,7 @@ message-table: $(VENV)/.test-ready
 	mv $(VENV)/message_table.py protocols/mavlink/
 
 cli-page: $(VENV)/.test-ready
-	$(BIN)/python -m service.cli_page > docs/cli.md
+	$(BIN)/python -m service.cli.cli_page > docs/cli.md
 
 # The sample file of all settings, and their reference page.
 config-sample: $(VENV)/.test-ready

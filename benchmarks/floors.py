@@ -13,8 +13,8 @@ from math import inf
 
 import serial
 
-from bridge.poll_schedule import POLLS, Poll
-from bridge.telemetry_table import TELEMETRY
+from bridge.fc.poll_schedule import POLLS, Poll
+from bridge.vehicle.telemetry_table import TELEMETRY
 
 
 def _echo(loop: asyncio.AbstractEventLoop) -> None:

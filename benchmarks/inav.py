@@ -20,14 +20,14 @@ from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
 from benchmarks.processes import BenchmarkError, free_udp_port, inav_on_a_socket, inav_on_a_uart
-from bridge.mission_check import check_list
-from bridge.nav_check import NavRules
-from bridge.nav_rules import inav_profile
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile
+from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.msp.frame import FRAME_OVERHEAD
 from protocols.msp.nav import WP_SIZE, NavRecord, encode_read_wp, encode_set_wp
-from service.connection import FcAddress, GcsAddress, SerialFc, TcpFc
 from service.daemon import Daemon
+from service.links.connection import FcAddress, GcsAddress, SerialFc, TcpFc
 from service.settings import Settings
 
 _COUNT = 120
@@ -124,7 +124,7 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
     daemon = Daemon(Settings(fc, [GcsAddress("udpout", "127.0.0.1", free_udp_port())]))
     running = asyncio.create_task(daemon.run())
     try:
-        while daemon.bridge.desk.dialect is None or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push
+        while daemon.bridge.missions.dialect is None or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(turn * _RUNS + run)) for run in range(_RUNS)]
     finally:
@@ -135,7 +135,7 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
 async def _push(daemon: Daemon, records: tuple[NavRecord, ...]) -> float:
     """Push one list; return the seconds from the first record's frame to the proof of the last."""
     loop = asyncio.get_running_loop()
-    dialect = daemon.bridge.desk.dialect
+    dialect = daemon.bridge.missions.dialect
     assert dialect is not None
     proven_at: list[float] = []
     done: asyncio.Future[object] = loop.create_future()

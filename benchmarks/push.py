@@ -22,14 +22,14 @@ from pathlib import Path
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import BenchmarkError, free_udp_port, simulated_naze
-from bridge.harakiri_check import HarakiriRules
-from bridge.mission_check import check_list
-from bridge.mission_dialect import PushResult
-from bridge.procedure import Procedure, Send
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.fc.conversation import Conversation, Send
+from bridge.missions.fc_mission_store import PushResult
+from bridge.missions.list_check import check_list
 from protocols.msp.mission import MissionCommand
 from protocols.wp_record import RECORD_SIZE, WpRecord
-from service.connection import GcsAddress, SerialFc
 from service.daemon import Daemon
+from service.links.connection import GcsAddress, SerialFc
 from service.settings import Settings
 
 _BAUD = 115200
@@ -60,7 +60,7 @@ async def _push_all(link: Path) -> list[float]:
     daemon = Daemon(settings)
     running = asyncio.create_task(daemon.run())
     try:
-        while daemon.bridge.desk.dialect is None:  # noqa: ASYNC110 - the daemon tells its log, and nobody else
+        while daemon.bridge.missions.dialect is None:  # noqa: ASYNC110 - the daemon tells its log, and nobody else
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(seed)) for seed in range(_RUNS)]
     finally:
@@ -77,7 +77,7 @@ def _records(seed: int) -> tuple[WpRecord, ...]:
 async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     """Push one list; return the seconds from the first CHUNK to the verified checksum."""
     loop = asyncio.get_running_loop()
-    dialect = daemon.bridge.desk.dialect
+    dialect = daemon.bridge.missions.dialect
     assert dialect is not None
     begun_at: list[float] = []
     done: asyncio.Future[tuple[PushResult[WpRecord] | None, float]] = loop.create_future()
@@ -91,8 +91,8 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
 
 
 def _noting_first_chunk(
-    push: Procedure[PushResult[WpRecord]], note: Callable[[], None]
-) -> Procedure[PushResult[WpRecord]]:
+    push: Conversation[PushResult[WpRecord]], note: Callable[[], None]
+) -> Conversation[PushResult[WpRecord]]:
     """Pass the conversation through, and call `note` when its first CHUNK comes by."""
     noted = False
     effect = next(push)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from benchmarks.figure import Figure
 from benchmarks.processes import BenchmarkError, Board, DaemonProcess, daemon, free_udp_port, logged_at, simulated_naze
-from bridge.autosense import SPEEDS, Autosense
+from bridge.fc.autosense import SPEEDS, Autosense
 
 _RUNS = 5
 _RETURNS = 8

@@ -26,15 +26,15 @@ from benchmarks.figure import Figure
 from benchmarks.idle import cpu_percent, listener, udpout
 from benchmarks.processes import BenchmarkError, daemon, simulated_naze
 from bridge.bridge import Bridge, BridgeConfig
-from bridge.journal import Level
-from bridge.station import Peer
+from bridge.gcs.station import Peer
+from bridge.model.events import Level
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
-from service.simulator.flight import Craft, fly
-from service.simulator.msp_port import MspAnswers, reply
+from simulator.flight import Craft, fly
+from simulator.msp_port import MspAnswers, reply
 
 POLLS_HZ = 100
 #: With what is polled anyway (STATUS 4, RC 2, three others 2.5 times a second) these make 100 polls a second.
@@ -97,11 +97,11 @@ def _noise() -> list[Figure]:
     chance = random.Random(_SEED)
     events: list[str] = []
 
-    def journal(_level: Level, event: str, /, **_facts: object) -> None:
+    def log_event(_level: Level, event: str, /, **_facts: object) -> None:
         events.append(event)
 
     now = 0.0
-    bridge = Bridge(BridgeConfig((115200,)), journal, now)
+    bridge = Bridge(BridgeConfig((115200,)), log_event, now)
     bridge.fc_opened(now)
     ground, controller = Peer("udp", "noise"), Controller()
     while "fc.found" not in events:

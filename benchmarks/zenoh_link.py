@@ -24,9 +24,9 @@ from benchmarks.idle import LIBRARIES, libraries_mb, listener, resident_mb, udpo
 from benchmarks.processes import BenchmarkError, daemon, running, wait_for
 from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, wish
 from benchmarks.zenoh_programs import client, configuration, router_program
-from bridge.vehicle_groups import Group
-from service.connection import parse_fc
+from bridge.model.vehicle_groups import Group
 from service.daemon import Daemon
+from service.links.connection import parse_fc
 from service.settings import Settings
 from service.zenoh_link.configuration import make_config
 from service.zenoh_link.keys import TELEMETRY, full

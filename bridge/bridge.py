@@ -5,8 +5,8 @@ The service feeds bytes, time and the store's answers in, and afterwards takes w
 A byte's way from the UART:
     fc_received -> FcSession -> MspLink -> VehicleState -> OwnVehicle -> Ground -> take_datagrams
 A mission item's way to the flight controller, and back for the proof:
-    gcs_received -> Ground -> Guard -> Inbox -> MissionUploads -> ListCheck
-        -> MissionDesk.deliver -> MissionDialect.push -> MspLink
+    gcs_received -> Ground -> Guard -> MessageRouter -> MissionUploads -> ListCheck
+        -> MissionService.deliver -> FcMissionStore.push -> MspLink
 An autopilot that speaks MAVLink for itself is not represented but passed through, both ways:
     FcSession <-> PassThrough <-> Ground
 """
@@ -17,31 +17,31 @@ from functools import partial
 from math import inf
 from typing import Any
 
-from bridge.commands import Commands
-from bridge.dialects import Surroundings, dialect_of
-from bridge.fc_actions import FcActions
-from bridge.fc_session import Autopilot, FcSession, State
-from bridge.flight_controller import FlightController, Kind
-from bridge.ground import Ground, Tap
-from bridge.guard import Guard, LinkAccess, Refused, denial
-from bridge.harakiri_relay import HarakiriRelay
-from bridge.inbox import Inbox
-from bridge.journal import Incidents, Journal
-from bridge.mission_check import check_list
-from bridge.mission_desk import Delivery, HeldMission, MissionDesk, Refusal
-from bridge.mission_dialect import StoreReport
-from bridge.mission_download import MissionDownloads
-from bridge.mission_log import ArrivedMission
-from bridge.mission_upload import MissionUploads
-from bridge.own_vehicle import OwnVehicle
-from bridge.parameters import Parameters
-from bridge.pass_through import PassThrough
-from bridge.presence import Presence
-from bridge.procedure import Procedure, StoreEffect
-from bridge.runner import Runner
-from bridge.station import Peer, Severity, Station
-from bridge.vehicle_report import VehicleReporter
-from bridge.verdict import Verdict
+from bridge.controllers.dialects import Surroundings, dialect_of
+from bridge.controllers.harakiri.relay import HarakiriRelay
+from bridge.fc.actions import FcActions
+from bridge.fc.conversation import Conversation, StoreEffect
+from bridge.fc.identity import FlightController, Kind
+from bridge.fc.runner import Runner
+from bridge.fc.session import Autopilot, FcSession, State
+from bridge.gcs.ground import Ground, Tap
+from bridge.gcs.guard import Guard, GuardRefusal, LinkAccess, denial
+from bridge.gcs.pass_through import PassThrough
+from bridge.gcs.station import Peer, Severity, Station
+from bridge.missions.fc_mission_store import StoreReport
+from bridge.missions.list_check import check_list
+from bridge.missions.mission_service import Delivery, HeldMission, MissionService, Refusal
+from bridge.model.events import EventLog, Incidents
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.verdict import Verdict
+from bridge.vehicle.commands import CommandService
+from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.vehicle.message_router import MessageRouter
+from bridge.vehicle.mission_download import MissionDownloads
+from bridge.vehicle.mission_upload import MissionUploads
+from bridge.vehicle.own_vehicle import OwnVehicle
+from bridge.vehicle.parameters import Parameters
+from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame
@@ -69,16 +69,16 @@ class BridgeConfig:
 class Bridge:
     """Puts the parts together and hands each what is its business."""
 
-    def __init__(self, config: BridgeConfig, journal: Journal, now: float, tap: Tap = lambda _frames: None) -> None:
+    def __init__(self, config: BridgeConfig, log_event: EventLog, now: float, tap: Tap = lambda _frames: None) -> None:
         self._config = config
-        self._journal = journal
+        self._log_event = log_event
         self._decoder = MavlinkDecoder()
         self._store_effects: list[StoreEffect] = []
         self._now = now
         self._was_armed = False
         self._pass_through: PassThrough | None = None
         self._relay: HarakiriRelay | None = None
-        self._presence = Presence()
+        self._announcer = LinkAnnouncer()
         self._incidents = Incidents()
 
         signers = {
@@ -86,13 +86,13 @@ class Bridge:
             for name, access in config.links.items()
             if access.signing is not None
         }
-        self.guard = Guard(config.links, journal)
-        self.ground = Ground(config.sysid, config.compid, journal, lambda: self._vehicle.newcomer(), tap, signers)
+        self.guard = Guard(config.links, log_event)
+        self.ground = Ground(config.sysid, config.compid, log_event, lambda: self._vehicle.newcomer(), tap, signers)
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(
             config.speeds,
             self.runner,
-            journal,
+            log_event,
             self._incidents,
             self._controller_changed,
             self._mavlink_received,
@@ -100,18 +100,20 @@ class Bridge:
             config.autopilot,
         )
         self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
-        self.desk = MissionDesk(lambda mission, delivery: self._mission_endings.append((mission, delivery)))
-        self._vehicle = OwnVehicle(self.session, self.desk, self.ground, now)
-        self.report = VehicleReporter(self.session, self.desk, self.ground, self._vehicle.also_want)
+        self.missions = MissionService(lambda mission, delivery: self._mission_endings.append((mission, delivery)))
+        self._vehicle = OwnVehicle(self.session, self.missions, self.ground, now)
+        self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
         home = self._vehicle.home
         self._uploads = MissionUploads(
-            self.desk, self.runner, self.ground, journal, self._incidents, home, self.ground.moved_to
+            self.missions, self.runner, self.ground, log_event, self._incidents, home, self.ground.moved_to
         )
-        self._downloads = MissionDownloads(self.desk, self.runner, self.ground, self._is_armed, home)
-        self._parameters = Parameters(self.desk, self.runner, self.ground, config.sysid)
-        actions = FcActions(self.session, self.desk, self.runner)
-        commands = Commands(self.ground, self._vehicle, actions, self._banner)
-        self._inbox = Inbox(self.ground, self._uploads, self._downloads, self._parameters, commands, self._vehicle)
+        self._downloads = MissionDownloads(self.missions, self.runner, self.ground, self._is_armed, home)
+        self._parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
+        actions = FcActions(self.session, self.missions, self.runner)
+        commands = CommandService(self.ground, self._vehicle, actions, self._banner)
+        self._router = MessageRouter(
+            self.ground, self._uploads, self._downloads, self._parameters, commands, self._vehicle
+        )
 
     # The flight controller's side.
 
@@ -145,7 +147,7 @@ class Bridge:
             return
         if armed:
             self._uploads.armed(now)
-        self._journal("info", "vehicle.armed" if armed else "vehicle.disarmed")
+        self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")
         self._was_armed = armed
 
     def take_fc_output(self) -> list[bytes]:
@@ -164,10 +166,10 @@ class Bridge:
             elif self._pass_through is not None:
                 if self._pass_through.from_station(peer, frame):
                     self.session.send_mavlink(frame.raw)
-            elif self._inbox.understands(frame.msgid):
+            elif self._router.understands(frame.msgid):
                 message = self._decoder.decode(frame)
                 if message is not None and self._is_for_us(message):
-                    self._inbox.take(Station(peer, frame.sysid, frame.compid), message, now)
+                    self._router.take(Station(peer, frame.sysid, frame.compid), message, now)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""
@@ -217,19 +219,19 @@ class Bridge:
         incident = self._incidents.begin("push")
         arrived: list[ArrivedMission] = []
 
-        def procedure() -> Procedure[Delivery | Refusal]:
-            report: StoreReport | Refusal = yield from self.desk.preflight()
+        def conversation() -> Conversation[Delivery | Refusal]:
+            report: StoreReport | Refusal = yield from self.missions.preflight()
             if isinstance(report, Refusal):
                 return report
             verdict = check_list(items, report.rules, self._vehicle.home())
             arrived.append(ArrivedMission(source, tuple(items), verdict))
-            return (yield from self.desk.deliver(arrived[0], on_progress))
+            return (yield from self.missions.deliver(arrived[0], on_progress))
 
         def done(result: Delivery | Refusal, _at: float) -> None:
-            self.desk.release(owner)
+            self.missions.release(owner)
             if arrived and isinstance(result, Delivery):
                 self.ground.say(Severity.NOTICE, f"{source}: {result.text}")
-            self._journal(
+            self._log_event(
                 "info" if result.ack is MissionResult.ACCEPTED else "warning",
                 "mission.push_ended",
                 source=source,
@@ -240,17 +242,17 @@ class Bridge:
             )
             on_done(result, arrived[0] if arrived else None)
 
-        self._journal("info", "mission.push_started", source=source, count=len(items), incident=incident)
-        refusal = self.desk.acquire(owner)
+        self._log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
+        refusal = self.missions.acquire(owner)
         if refusal is None:
-            self.runner.start(procedure(), done, now)
+            self.runner.start(conversation(), done, now)
         else:
             done(refusal, now)
 
     def pull_locally(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
         """Read what the flight controller holds."""
         self._now = now
-        self.runner.start(self.desk.read_back(), lambda held, _at: on_done(held), now)
+        self.runner.start(self.missions.read_back(), lambda held, _at: on_done(held), now)
 
     def check_locally(
         self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
@@ -258,11 +260,11 @@ class Bridge:
         """Tell what would become of a list on the present flight controller, which is not touched."""
         self._now = now
 
-        def procedure() -> Procedure[Verdict[Any] | Refusal]:
-            rules = yield from self.desk.rules()
+        def conversation() -> Conversation[Verdict[Any] | Refusal]:
+            rules = yield from self.missions.rules()
             return rules if isinstance(rules, Refusal) else check_list(items, rules, self._vehicle.home())
 
-        self.runner.start(procedure(), lambda verdict, _at: on_done(verdict), now)
+        self.runner.start(conversation(), lambda verdict, _at: on_done(verdict), now)
 
     # The end.
 
@@ -274,7 +276,7 @@ class Bridge:
     def stop_missions(self, now: float) -> None:
         """Begin no more transfers. An upload whose items are still coming in ends; a push under way goes on."""
         self._now = now
-        self.desk.close()
+        self.missions.close()
         self._uploads.stop(now)
 
     def abort_missions(self, now: float) -> None:
@@ -292,7 +294,7 @@ class Bridge:
         self._uploads.tick(now)
         for peer in self.ground.expire(now):
             self._left(peer)
-        self._say(self._presence.tick(now))
+        self._say(self._announcer.tick(now))
         if self._pass_through is None:
             self._vehicle.tick(now)
 
@@ -303,7 +305,7 @@ class Bridge:
             self.runner.next_deadline(),
             self._uploads.next_deadline(),
             self.ground.next_deadline(),
-            self._presence.next_deadline(),
+            self._announcer.next_deadline(),
             self._vehicle.next_deadline() if self._pass_through is None else None,
         )
         return min((deadline for deadline in deadlines if deadline is not None), default=inf)
@@ -313,7 +315,7 @@ class Bridge:
         if news is not None and self._pass_through is None:
             self.ground.say(*news)
 
-    def _answer_refused(self, refused: Refused, station: Station, frame: MavlinkFrame) -> None:
+    def _answer_refused(self, refused: GuardRefusal, station: Station, frame: MavlinkFrame) -> None:
         """Answer what the guard did not let in, in the name of who was asked, if that is the vehicle."""
         system, component = target_of(frame)
         if self._pass_through is None:
@@ -349,20 +351,20 @@ class Bridge:
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         around = Surroundings(self._is_armed, self._home, self._vehicle.home, self._config.takeoff_max_m)
         dialect = None if controller is None else dialect_of(controller, around)
-        self.desk.controller_changed(controller, dialect)
+        self.missions.controller_changed(controller, dialect)
         self._downloads.forget_all()
         self.report.controller_changed()
         if controller is None:
             self._relay = None
             self._uploads.link_lost(now)
-            self._presence.lost(now)
+            self._announcer.lost(now)
             return
         self._relay = HarakiriRelay(self.ground) if controller.kind is Kind.HARAKIRI_MAVLINK else None
         self._pass_through = PassThrough(self.ground) if controller.kind is Kind.MAVLINK else None
-        self._say(self._presence.found(controller))
+        self._say(self._announcer.found(controller))
         if dialect is not None:
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
-            self.runner.start(self.desk.read_back(), lambda _held, _at: None, now)
+            self.runner.start(self.missions.read_back(), lambda _held, _at: None, now)
 
     def _answered(self, command: int, now: float) -> None:
         self._vehicle.answered(command, now)

@@ -16,9 +16,9 @@ from typing import Any, TypeVar
 
 import structlog
 
-from bridge.mission_desk import Delivery, HeldMission, Refusal
-from bridge.mission_log import ArrivedMission
-from bridge.verdict import Verdict
+from bridge.missions.mission_service import Delivery, HeldMission, Refusal
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.control_socket import find_socket
@@ -116,7 +116,7 @@ class MissionJobs:
         session = bridge.session
         controller = session.controller
         vehicle = session.vehicle
-        held = bridge.desk.held
+        held = bridge.missions.held
         link = session.link
         return {
             "flight_controller": None if controller is None else controller.name,

@@ -10,21 +10,21 @@ from typing import Protocol
 
 import structlog
 
-from bridge.autosense import SPEEDS
 from bridge.bridge import Bridge, BridgeConfig
-from bridge.journal import Level
-from bridge.mission_desk import Delivery
-from bridge.mission_log import ArrivedMission
-from bridge.procedure import StoreEffect
-from bridge.station import Peer
-from bridge.vehicle_groups import Group
-from service.connection import FcAddress, GcsAddress, SerialFc
-from service.fc_port import STOPPED
-from service.gcs_links import GcsLink, LinkError, open_link
+from bridge.fc.autosense import SPEEDS
+from bridge.fc.conversation import StoreEffect
+from bridge.gcs.station import Peer
+from bridge.missions.mission_service import Delivery
+from bridge.model.events import Level
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.vehicle_groups import Group
+from service.links.connection import FcAddress, GcsAddress, SerialFc
+from service.links.fc_port import STOPPED
+from service.links.gcs_links import GcsLink, LinkError, open_link
+from service.links.signing_state import SigningState
 from service.mission_data import Json
-from service.recording import Recording
+from service.recording.recorder import Recording
 from service.settings import Settings
-from service.signing_state import SigningState
 from service.store_worker import StoreWorker
 from service.version import version
 
@@ -57,7 +57,7 @@ class Follower(Protocol):
         """There is news of these groups, which were asked for with `bridge.report.watch`."""
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        """Something was noted in the journal."""
+        """An event was logged."""
 
     def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
         """A mission that came in was dealt with."""
@@ -82,7 +82,7 @@ class Daemon:
                 autopilot=settings.autopilot,
                 links=self._signing.links,
             ),
-            self._journal,
+            self._log_event,
             self._loop.time(),
             self._recording.tap,
         )
@@ -279,7 +279,7 @@ class Daemon:
             for mission, delivery in endings:
                 follower.mission_ended(mission, delivery)
 
-    def _journal(self, level: Level, event: str, /, **facts: object) -> None:
+    def _log_event(self, level: Level, event: str, /, **facts: object) -> None:
         getattr(_log, level)(event, **facts)
         for follower in self._followers:
             follower.event(level, event, facts)

@@ -12,12 +12,12 @@ from prometheus_client import CollectorRegistry, Counter, Histogram, generate_la
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from bridge.fc_session import State
-from bridge.journal import Level
-from bridge.mission_desk import Delivery
-from bridge.mission_log import ArrivedMission
-from bridge.round_trips import BOUNDS_S, RoundTrips
-from bridge.vehicle_groups import Group
+from bridge.fc.round_trips import BOUNDS_S, RoundTrips
+from bridge.fc.session import State
+from bridge.missions.mission_service import Delivery
+from bridge.model.events import Level
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.vehicle_groups import Group
 from service.daemon import Daemon
 from service.mission_data import Json
 from service.version import version

@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from bridge.verdict import Verdict
+from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 
 Json = dict[str, Any]

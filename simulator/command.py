@@ -6,20 +6,20 @@ from pathlib import Path
 
 import click
 
-from service.simulator.compiled_core import CORE_CAPACITY, load_core
-from service.simulator.fc_kinds import KINDS
-from service.simulator.flash import ERASED
-from service.simulator.inav_boxes import BOXES
-from service.simulator.memory_file import open_memory
-from service.simulator.mission_commands import MissionCommands
-from service.simulator.mission_slots import flash_size
-from service.simulator.missions import BootMissions
-from service.simulator.msp_options import MspOptions
-from service.simulator.naze import SimulatedNaze
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
-from service.simulator.other_boards import run_other_board
-from service.simulator.playback_command import play_capture
-from service.simulator.run_board import Running, run_board
+from simulator.compiled_core import CORE_CAPACITY, load_core
+from simulator.fc_kinds import KINDS
+from simulator.flash import ERASED
+from simulator.inav_boxes import BOXES
+from simulator.memory_file import open_memory
+from simulator.mission_commands import MissionCommands
+from simulator.mission_slots import flash_size
+from simulator.missions import BootMissions
+from simulator.msp_options import MspOptions
+from simulator.naze import SimulatedNaze
+from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.other_boards import run_other_board
+from simulator.playback_command import play_capture
+from simulator.run_board import Running, run_board
 
 _BAUD = click.Choice(["1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200"])
 _RATE = click.FloatRange(0, 1)

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from protocols.wp_record import RECORD_SIZE
-from service.simulator.flash import FlashError, NorFlash, PowerCutError
-from service.simulator.mission_slots import flash_size, slot_pages
-from service.simulator.missions import Board, BootMissions
+from simulator.flash import FlashError, NorFlash, PowerCutError
+from simulator.mission_slots import flash_size, slot_pages
+from simulator.missions import Board, BootMissions
 
 #: NM_CAPACITY: how many records the core holds, whatever SimOptions would have.
 CORE_CAPACITY = 146

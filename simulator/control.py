@@ -5,7 +5,7 @@
     power on|off
     plug, unplug
     stats               one line of JSON: counters, state, and the stored records in hex
-    truth               one line of JSON: what the craft is doing at this moment (service.simulator.flight)
+    truth               one line of JSON: what the craft is doing at this moment (simulator.flight)
 
 The answer is `ok`, the JSON, or `error: ...`.
 """
@@ -17,10 +17,10 @@ from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
-from service.simulator.far_end import FarEnd
-from service.simulator.flight import Craft
-from service.simulator.options import Counters, Faults
-from service.simulator.pty_link import PlugError
+from simulator.far_end import FarEnd
+from simulator.flight import Craft
+from simulator.options import Counters, Faults
+from simulator.pty_link import PlugError
 
 _FAULTS = {name: type(value) for name, value in asdict(Faults()).items()}
 

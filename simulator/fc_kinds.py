@@ -3,15 +3,15 @@
 
 from functools import partial
 
-from service.simulator.inav import InavFirmware
-from service.simulator.inav_mission import EEPROM_SIZE
-from service.simulator.msp_board import MspBoard
-from service.simulator.msp_firmware import BootFirmware
-from service.simulator.msp_options import MspOptions
-from service.simulator.multiwii import MultiWiiFirmware
-from service.simulator.multiwii_mission import blank_eeprom
-from service.simulator.options import Faults
-from service.simulator.telemetry_only import BASEFLIGHT, BETAFLIGHT, TelemetryFirmware
+from simulator.inav import InavFirmware
+from simulator.inav_mission import EEPROM_SIZE
+from simulator.msp_board import MspBoard
+from simulator.msp_firmware import BootFirmware
+from simulator.msp_options import MspOptions
+from simulator.multiwii import MultiWiiFirmware
+from simulator.multiwii_mission import blank_eeprom
+from simulator.options import Faults
+from simulator.telemetry_only import BASEFLIGHT, BETAFLIGHT, TelemetryFirmware
 
 _FIRMWARE: dict[str, BootFirmware] = {
     "inav": InavFirmware,

@@ -11,17 +11,17 @@ from math import ceil
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.wp_record import RECORD_SIZE
-from service.simulator import frsky
-from service.simulator.flash import FlashError, NorFlash
-from service.simulator.flight import Craft, FlightState, fly
-from service.simulator.floppy import Floppy
-from service.simulator.mavlink_port import MavlinkSchedule, MavlinkSender
-from service.simulator.mission_slots import StoredConfig
-from service.simulator.missions import Board, BootMissions
-from service.simulator.msp_port import HarakiriCommand, MspAnswers, MspReceiver, reply
-from service.simulator.options import Counters, Faults, SimOptions, TelemetryProtocol
-from service.simulator.traps import Trap, TrapCounters
-from service.simulator.uart import Uart
+from simulator import frsky
+from simulator.flash import FlashError, NorFlash
+from simulator.flight import Craft, FlightState, fly
+from simulator.harakiri_mission_store import Floppy
+from simulator.mavlink_port import MavlinkSchedule, MavlinkSender
+from simulator.mission_slots import StoredConfig
+from simulator.missions import Board, BootMissions
+from simulator.msp_port import HarakiriCommand, MspAnswers, MspReceiver, reply
+from simulator.options import Counters, Faults, SimOptions, TelemetryProtocol
+from simulator.traps import Trap, TrapCounters
+from simulator.uart import Uart
 
 _AUTOSENSE_SECONDS = 4.0
 #: The option that says how long it takes.

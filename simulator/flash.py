@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """NOR flash of an STM32F103: erasing sets a page to ones, programming clears bits, power may go meanwhile."""
 
-from service.simulator.options import Faults
+from simulator.options import Faults
 
 PAGE_SIZE = 1024
 ERASED = 0xFF

@@ -3,7 +3,7 @@
 
 import struct
 
-from service.simulator.flight import FlightState
+from simulator.flight import FlightState
 
 PERIOD_SECONDS = 0.125
 _MARK = b"\x5e"

@@ -7,13 +7,13 @@ Its lengths and oddities were compared with INAV's own simulator of each version
 import struct
 from enum import IntEnum
 
-from service.simulator.flight import Craft
-from service.simulator.inav_boxes import ANGLE, ARM, BOXES, NAV_ALTHOLD, NAV_RTH, NAV_WP, box_names
-from service.simulator.inav_mission import CAPACITY, FAKE, InavMission
-from service.simulator.inav_navigation import InavNavigation
-from service.simulator.msp_firmware import Boot, PortHabits, error, reply
-from service.simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
-from service.simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
+from simulator.flight import Craft
+from simulator.inav_boxes import ANGLE, ARM, BOXES, NAV_ALTHOLD, NAV_RTH, NAV_WP, box_names
+from simulator.inav_mission import CAPACITY, FAKE, InavMission
+from simulator.inav_navigation import InavNavigation
+from simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
 
 _STEP_S = 0.05
 _STATUS_FLAGS = 32

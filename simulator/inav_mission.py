@@ -7,8 +7,8 @@ After setWaypoint, getWaypoint, loadNonVolatileWaypointList and saveNonVolatileW
 
 from dataclasses import replace
 
-from service.simulator.msp_firmware import CrashError
-from service.simulator.nav_waypoint import FLAG_LAST, WAYPOINT_SIZE, Action, NavWaypoint, unpack_waypoint, wrap16
+from simulator.msp_firmware import CrashError
+from simulator.nav_waypoint import FLAG_LAST, WAYPOINT_SIZE, Action, NavWaypoint, unpack_waypoint, wrap16
 
 CAPACITY = 120
 EEPROM_SIZE = CAPACITY * WAYPOINT_SIZE

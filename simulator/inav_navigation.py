@@ -7,11 +7,11 @@ pilot's sticks, safe distances, and the climb before a return home.
 
 from enum import Enum
 
-from service.simulator.inav_mission import CAPACITY, InavMission
-from service.simulator.msp_firmware import CrashError
-from service.simulator.nav_status import Error, Mode, NavStatus, State
-from service.simulator.nav_waypoint import FLAG_LAST, Action
-from service.simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
+from simulator.inav_mission import CAPACITY, InavMission
+from simulator.msp_firmware import CrashError
+from simulator.nav_status import Error, Mode, NavStatus, State
+from simulator.nav_waypoint import FLAG_LAST, Action
+from simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
 
 _CRUISE_MS = 3.0
 _MAX_MS = 10.0

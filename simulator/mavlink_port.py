@@ -10,7 +10,7 @@ import struct
 from enum import Enum
 
 from protocols.mavlink.codec import FrameWriter, Packed
-from service.simulator.flight import FlightState
+from simulator.flight import FlightState
 
 _SYSID = 1
 _COMPID = 200

@@ -18,9 +18,9 @@ from protocols.msp.mission import (
     unmask,
 )
 from protocols.wp_record import RECORD_SIZE, WpCommand
-from service.simulator.flash import FlashError, NorFlash
-from service.simulator.mission_slots import MissionSlots
-from service.simulator.missions import Board
+from simulator.flash import FlashError, NorFlash
+from simulator.mission_slots import MissionSlots
+from simulator.missions import Board
 
 _LIST = struct.Struct("<HI")
 _READ = struct.Struct("<HBB")
@@ -29,7 +29,7 @@ _RADIUS = struct.Struct("<HH")
 
 
 @dataclass(slots=True)
-class _Transfer:
+class _Upload:
     """A list that is being staged. `touched`: when its last request came, seconds."""
 
     identity: ListIdentity
@@ -44,7 +44,7 @@ class MissionCommands:
         self._board = board
         self._options = board.options
         self._slots = MissionSlots(flash, board.options)
-        self._transfer: _Transfer | None = None
+        self._transfer: _Upload | None = None
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """Return the reply's payload; None if the command is none of the extension's. PowerCutError."""
@@ -137,7 +137,7 @@ class MissionCommands:
             self._slots.prepare()
         except FlashError:
             return Status.FLASH
-        self._transfer = _Transfer(identity, now)
+        self._transfer = _Upload(identity, now)
         return Status.OK
 
     def _chunk(self, body: bytes | None, now: float) -> Status:

@@ -10,8 +10,8 @@ import zlib
 
 from protocols.mission_record import ListIdentity
 from protocols.wp_record import RECORD_SIZE
-from service.simulator.flash import PAGE_SIZE, NorFlash
-from service.simulator.options import SimOptions
+from simulator.flash import PAGE_SIZE, NorFlash
+from simulator.options import SimOptions
 
 _HEADER = struct.Struct("<HHIII")
 _MAGIC = 0x4C50574E

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.simulator.flash import NorFlash
-from service.simulator.options import Faults, SimOptions
+from simulator.flash import NorFlash
+from simulator.options import Faults, SimOptions
 
 
 @dataclass(slots=True)

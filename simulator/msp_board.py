@@ -8,12 +8,12 @@ import random
 from enum import Enum, auto
 from math import ceil, inf
 
-from service.simulator.flight import Craft
-from service.simulator.msp_firmware import Boot, BootFirmware, CrashError, MspFirmware
-from service.simulator.msp_options import MspOptions
-from service.simulator.msp_port import MspReceiver
-from service.simulator.options import Counters, Faults
-from service.simulator.serial_ring import SerialRing
+from simulator.flight import Craft
+from simulator.msp_firmware import Boot, BootFirmware, CrashError, MspFirmware
+from simulator.msp_options import MspOptions
+from simulator.msp_port import MspReceiver
+from simulator.options import Counters, Faults
+from simulator.serial_ring import SerialRing
 
 _CLI_PROMPT = b"\r\n# "
 _CLI_BANNER = b"\r\nEntering CLI Mode, type 'exit' to reboot" + _CLI_PROMPT

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from protocols.msp.frame import Direction, MspFrame
-from service.simulator.flight import Craft
-from service.simulator.msp_options import MspOptions
-from service.simulator.options import Counters, Faults
+from simulator.flight import Craft
+from simulator.msp_options import MspOptions
+from simulator.options import Counters, Faults
 
 _JUMBO = 255
 

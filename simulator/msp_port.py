@@ -6,7 +6,7 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from protocols.msp.frame import Direction, MspFrame
-from service.simulator.flight import Craft
+from simulator.flight import Craft
 
 _STOCK_BUFFER = 64
 _VERSION = 211

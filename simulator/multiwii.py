@@ -5,13 +5,13 @@ import struct
 from dataclasses import replace
 from enum import IntEnum
 
-from service.simulator.flight import Craft
-from service.simulator.msp_firmware import Boot, PortHabits, error, reply
-from service.simulator.multiwii_mission import MultiWiiMission
-from service.simulator.multiwii_navigation import MultiWiiNavigation
-from service.simulator.nav_status import State
-from service.simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
-from service.simulator.waypoint_craft import WaypointCraft
+from simulator.flight import Craft
+from simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.multiwii_mission import MultiWiiMission
+from simulator.multiwii_navigation import MultiWiiNavigation
+from simulator.nav_status import State
+from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.waypoint_craft import WaypointCraft
 
 _STEP_S = 0.05
 _VERSION, _QUADX, _MSP_VERSION = 241, 3, 0

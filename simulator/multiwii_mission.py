@@ -3,7 +3,7 @@
 
 import struct
 
-from service.simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 
 SLOT_SIZE = WAYPOINT_SIZE + 1
 _BLANK = NavWaypoint(action=0, flag=0)

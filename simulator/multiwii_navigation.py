@@ -4,10 +4,10 @@
 Not simulated: safe distances, the settling before a landing, and a mission that goes on where it was interrupted.
 """
 
-from service.simulator.multiwii_mission import MultiWiiMission
-from service.simulator.nav_status import Error, Mode, NavStatus, State
-from service.simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
-from service.simulator.waypoint_craft import WaypointCraft
+from simulator.multiwii_mission import MultiWiiMission
+from simulator.nav_status import Error, Mode, NavStatus, State
+from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
+from simulator.waypoint_craft import WaypointCraft
 
 _CRUISE_MS = 3.0
 _HOVER_HEIGHT_M = 10.0

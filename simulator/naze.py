@@ -10,15 +10,15 @@ from enum import Enum, auto
 from math import inf
 
 from protocols.wp_record import RECORD_SIZE
-from service.simulator.firmware import Firmware, Protocol, ResetError
-from service.simulator.flash import ERASED, NorFlash, PowerCutError
-from service.simulator.flight import Craft
-from service.simulator.mission_commands import MissionCommands
-from service.simulator.mission_slots import flash_size
-from service.simulator.missions import Board, BootMissions
-from service.simulator.options import Counters, Faults, SimOptions
-from service.simulator.traps import HazardWatch
-from service.simulator.uart import GATHER_SECONDS, Uart
+from simulator.firmware import Firmware, Protocol, ResetError
+from simulator.flash import ERASED, NorFlash, PowerCutError
+from simulator.flight import Craft
+from simulator.mission_commands import MissionCommands
+from simulator.mission_slots import flash_size
+from simulator.missions import Board, BootMissions
+from simulator.options import Counters, Faults, SimOptions
+from simulator.traps import HazardWatch
+from simulator.uart import GATHER_SECONDS, Uart
 
 
 class Power(Enum):

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import click
 
-from service.simulator.fc_kinds import make_board, new_eeprom
-from service.simulator.memory_file import open_memory
-from service.simulator.msp_options import MspOptions
-from service.simulator.options import Faults
-from service.simulator.run_board import Running, run_board
+from simulator.fc_kinds import make_board, new_eeprom
+from simulator.memory_file import open_memory
+from simulator.msp_options import MspOptions
+from simulator.options import Faults
+from simulator.run_board import Running, run_board
 
 _NAMES = {"inav": "INAV", "multiwii": "MultiWii", "betaflight": "Betaflight", "baseflight": "baseflight"}
 #: These are about Harakiri and its mission extension.

@@ -4,8 +4,8 @@
 import asyncio
 import socket
 
-from service.simulator.naze import SimulatedNaze
-from service.simulator.pump import Pump
+from simulator.naze import SimulatedNaze
+from simulator.pump import Pump
 
 
 class SimLink:

@@ -19,7 +19,7 @@ from math import inf
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.uart_capture import UartDeed, UartEvent
-from service.simulator.exchanges import Exchange, take_apart
+from simulator.exchanges import Exchange, take_apart
 
 #: The speed of a line that has none.
 _ANY_SPEED = 115200

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from protocols.uart_capture import read_capture
-from service.simulator.playback import CapturePlayer
-from service.simulator.pty_link import PlugError, PtyLink
+from simulator.playback import CapturePlayer
+from simulator.pty_link import PlugError, PtyLink
 
 #: These say what and where to play; the others are about a simulated board.
 _OPTIONS_OF_PLAYING = ("play", "link", "speed")

@@ -10,8 +10,8 @@ import termios
 import tty
 from pathlib import Path
 
-from service.simulator.far_end import FarEnd
-from service.simulator.pump import Pump
+from simulator.far_end import FarEnd
+from simulator.pump import Pump
 
 _BAUD_BY_CODE = {getattr(termios, name): int(name[1:]) for name in dir(termios) if re.fullmatch(r"B\d+", name)}
 _CODE_BY_BAUD = {baud: code for code, baud in _BAUD_BY_CODE.items()}

@@ -6,8 +6,8 @@ import contextlib
 import os
 from collections.abc import Callable
 
-from service.simulator.far_end import FarEnd
-from service.simulator.line import garble
+from simulator.far_end import FarEnd
+from simulator.line import garble
 
 _READ_SIZE = 4096
 # A fault that was switched meanwhile is noticed after this long at the latest.

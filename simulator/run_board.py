@@ -9,9 +9,9 @@ from pathlib import Path
 
 import click
 
-from service.simulator.control import Control, ControlledBoard, Plug
-from service.simulator.pty_link import PlugError, PtyLink
-from service.simulator.tcp_link import TcpLink
+from simulator.control import Control, ControlledBoard, Plug
+from simulator.pty_link import PlugError, PtyLink
+from simulator.tcp_link import SimTcpLink
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ async def run_board(board: ControlledBoard, name: str, running: Running, is_aliv
     board.power_on_booted(loop.time())
     plug: Plug
     if running.tcp:
-        plug = TcpLink(board, running.tcp, loop, is_alive)
+        plug = SimTcpLink(board, running.tcp, loop, is_alive)
         place = "{}:{}".format(*running.tcp)
     else:
         assert running.link is not None

@@ -6,7 +6,7 @@ Harakiri's own UART, whose transmit ring overwrites itself, is in uart.py.
 
 from collections import deque
 
-from service.simulator.options import Counters
+from simulator.options import Counters
 
 _BITS_PER_BYTE = 10
 # Times are seconds as floats: a byte that ends exactly now has ended.

@@ -6,14 +6,14 @@ import socket
 from collections import deque
 from collections.abc import Callable
 
-from service.simulator.far_end import FarEnd
-from service.simulator.pty_link import PlugError
-from service.simulator.pump import Pump
+from simulator.far_end import FarEnd
+from simulator.pty_link import PlugError
+from simulator.pump import Pump
 
 _LOOK_SECONDS = 0.1
 
 
-class TcpLink:
+class SimTcpLink:
     """One client is served at a time; who comes meanwhile is connected and hears nothing until its turn.
 
     The port is there while `is_alive` says that the board is.

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
-from service.simulator.flight import Craft, FlightState, fly
-from service.simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.flight import Craft, FlightState, fly
+from simulator.msp_firmware import Boot, PortHabits, error, reply
 
 _ARM = "ARM"
 _SENSORS = 0b1111

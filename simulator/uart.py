@@ -3,7 +3,7 @@
 
 from collections import deque
 
-from service.simulator.options import Counters
+from simulator.options import Counters
 
 RING_SIZE = 256
 _BITS_PER_BYTE = 10

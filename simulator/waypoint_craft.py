@@ -3,7 +3,7 @@
 
 import math
 
-from service.simulator.flight import FIELD_LAT_E7, FIELD_LON_E7, FlightState
+from simulator.flight import FIELD_LAT_E7, FIELD_LON_E7, FlightState
 
 _METRES_PER_DEGREE = 111_320.0
 _METRES_PER_DEGREE_EAST = _METRES_PER_DEGREE * math.cos(math.radians(FIELD_LAT_E7 / 1e7))

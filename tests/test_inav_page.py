@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bridge.finding import DROPPED
-from bridge.mission_check import check_list
-from bridge.nav_check import NavRules
-from bridge.nav_rules import inav_profile, multiwii_profile
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile, multiwii_profile
+from bridge.missions.list_check import check_list
+from bridge.model.finding import DROPPED
 from protocols.mission_item import Command, MissionItem
 from protocols.msp.nav import NavAction
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.telemetry_table import NO_STREAM, TELEMETRY, Row
+from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from protocols.mavlink.dialect import messages as m
 
 PAGE = (Path(__file__).parents[1] / "docs" / "telemetry.md").read_text()

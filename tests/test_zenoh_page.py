@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from service.zenoh_link.keys import KEYS, VERSION, Key
+from service.zenoh_link.keys import KEYS, VERSION, ZenohKey
 from service.zenoh_link.schema_files import FOLDER
 
 PAGE = (Path(__file__).parents[1] / "docs" / "zenoh.md").read_text()
@@ -26,7 +26,7 @@ def test_the_table_has_every_key_and_its_version() -> None:
 
 
 @pytest.mark.parametrize("key", [key for key in KEYS if key.schema], ids=lambda key: key.suffix)
-def test_each_field_is_on_the_page(key: Key) -> None:
+def test_each_field_is_on_the_page(key: ZenohKey) -> None:
     assert key.schema is not None
     schema = json.loads((FOLDER / f"{key.schema}.json").read_text())
     section = SECTIONS[SECTION_OF.get(key.schema, key.schema)] + SECTIONS["Payloads"]

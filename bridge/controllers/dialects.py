@@ -4,14 +4,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bridge.flight_controller import FlightController, Kind
-from bridge.harakiri import HarakiriMissions
-from bridge.harakiri_mavlink import HarakiriMavlinkMissions
-from bridge.inav import InavMissions
-from bridge.mission_dialect import AnyDialect
-from bridge.multiwii_nav import MultiwiiMissions
-from bridge.nav_missions import NavCraft
-from bridge.nav_rules import inav_profile, multiwii_profile
+from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
+from bridge.controllers.harakiri.mission_store import HarakiriMissions
+from bridge.controllers.inav.mission_store import InavMissions
+from bridge.controllers.multiwii.mission_store import MultiwiiMissions
+from bridge.controllers.nav.mission_store import NavCraft
+from bridge.controllers.nav.rules import inav_profile, multiwii_profile
+from bridge.fc.identity import FlightController, Kind
+from bridge.missions.fc_mission_store import AnyFcMissionStore
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,20 +28,20 @@ class Surroundings:
     takeoff_max_m: int
 
 
-def _harakiri(controller: FlightController, around: Surroundings) -> AnyDialect:
+def _harakiri(controller: FlightController, around: Surroundings) -> AnyFcMissionStore:
     assert controller.info is not None
     return HarakiriMissions(controller.info, around.takeoff_max_m)
 
 
-def _harakiri_mavlink(_controller: FlightController, around: Surroundings) -> AnyDialect:
+def _harakiri_mavlink(_controller: FlightController, around: Surroundings) -> AnyFcMissionStore:
     return HarakiriMavlinkMissions(around.is_armed, around.takeoff_max_m)
 
 
-def _inav(controller: FlightController, around: Surroundings) -> AnyDialect:
+def _inav(controller: FlightController, around: Surroundings) -> AnyFcMissionStore:
     return InavMissions(inav_profile(controller.capacity), _craft(controller, around))
 
 
-def _multiwii(controller: FlightController, around: Surroundings) -> AnyDialect:
+def _multiwii(controller: FlightController, around: Surroundings) -> AnyFcMissionStore:
     return MultiwiiMissions(multiwii_profile(controller.capacity), _craft(controller, around))
 
 
@@ -50,7 +50,7 @@ def _craft(controller: FlightController, around: Surroundings) -> NavCraft:
     return NavCraft(1 << controller.arm_bit, around.is_armed, around.home, around.position)
 
 
-_DIALECTS: Mapping[Kind, Callable[[FlightController, Surroundings], AnyDialect]] = {
+_DIALECTS: Mapping[Kind, Callable[[FlightController, Surroundings], AnyFcMissionStore]] = {
     Kind.HARAKIRI_MISSIONS: _harakiri,
     Kind.HARAKIRI_MAVLINK: _harakiri_mavlink,
     Kind.INAV: _inav,
@@ -58,7 +58,7 @@ _DIALECTS: Mapping[Kind, Callable[[FlightController, Surroundings], AnyDialect]]
 }
 
 
-def dialect_of(controller: FlightController, around: Surroundings) -> AnyDialect | None:
+def dialect_of(controller: FlightController, around: Surroundings) -> AnyFcMissionStore | None:
     """Return how missions are put on this flight controller; None if it stores none."""
     make = _DIALECTS.get(controller.kind)
     return None if make is None else make(controller, around)

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from bridge.fc_session import FcSession
-from bridge.mission_desk import MissionDesk
-from bridge.procedure import Procedure, ask
-from bridge.runner import Runner
+from bridge.fc.conversation import Conversation, ask
+from bridge.fc.runner import Runner
+from bridge.fc.session import FcSession
+from bridge.missions.mission_service import MissionService
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, request
 from protocols.msp.telemetry import Sensor, StatusReport, decode_status
@@ -22,7 +22,7 @@ _STATUS_CHECKS = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Action:
+class FcAction:
     """`needs` must be on board. `freezes`: a Harakiri does nothing else until it is done, and then restarts."""
 
     command: MspAction
@@ -30,12 +30,12 @@ class Action:
     freezes: bool
 
 
-CALIBRATE_ACCELEROMETER = Action(MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, freezes=True)
-CALIBRATE_COMPASS = Action(MspAction.MAG_CALIBRATION, Sensor.COMPASS, freezes=True)
-SAVE_SETTINGS = Action(MspAction.EEPROM_WRITE, Sensor(0), freezes=False)
+CALIBRATE_ACCELEROMETER = FcAction(MspAction.ACC_CALIBRATION, Sensor.ACCELEROMETER, freezes=True)
+CALIBRATE_COMPASS = FcAction(MspAction.MAG_CALIBRATION, Sensor.COMPASS, freezes=True)
+SAVE_SETTINGS = FcAction(MspAction.EEPROM_WRITE, Sensor(0), freezes=False)
 
 
-class Outcome(Enum):
+class ActionResult(Enum):
     """What came of an action, as the pilot is told (at most 50 characters)."""
 
     DONE = "Done"
@@ -51,55 +51,55 @@ class Outcome(Enum):
 class FcActions:
     """Does one action at a time, and never beside a mission transfer."""
 
-    def __init__(self, session: FcSession, desk: MissionDesk, runner: Runner) -> None:
+    def __init__(self, session: FcSession, missions: MissionService, runner: Runner) -> None:
         self._session = session
-        self._desk = desk
+        self._missions = missions
         self._runner = runner
-        self._present: Action | None = None
+        self._present: FcAction | None = None
 
     @property
-    def present(self) -> Action | None:
+    def present(self) -> FcAction | None:
         """What is being done."""
         return self._present
 
-    def start(self, action: Action, on_done: Callable[[Outcome], None], now: float) -> None:
+    def start(self, action: FcAction, on_done: Callable[[ActionResult], None], now: float) -> None:
         """Do it; `on_done` is told what came of it, perhaps at once."""
         controller = self._session.controller
         if controller is None or controller.arm_bit is None:
             # Nothing is done to a craft of which it cannot be told whether it flies.
-            on_done(Outcome.NO_LINK)
+            on_done(ActionResult.NO_LINK)
             return
-        if self._runner.is_busy or self._desk.acquire(self) is not None:
-            on_done(Outcome.OCCUPIED)
+        if self._runner.is_busy or self._missions.acquire(self) is not None:
+            on_done(ActionResult.OCCUPIED)
             return
         self._present = action
         arm_mask = 1 << controller.arm_bit
 
-        def done(outcome: Outcome | None, _at: float) -> None:
+        def done(outcome: ActionResult | None, _at: float) -> None:
             self._present = None
-            self._desk.release(self)
-            if outcome is Outcome.DONE and action.freezes and controller.is_harakiri:
-                outcome = Outcome.FREEZES
-            on_done(outcome or Outcome.NO_ANSWER)
+            self._missions.release(self)
+            if outcome is ActionResult.DONE and action.freezes and controller.is_harakiri:
+                outcome = ActionResult.FREEZES
+            on_done(outcome or ActionResult.NO_ANSWER)
 
         self._runner.start(_act(action, arm_mask), done, now)
 
 
-def _act(action: Action, arm_mask: int) -> Procedure[Outcome]:
+def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:
     for _ in range(_STATUS_CHECKS):
         status = yield from _ask_status()
         if status is None:
-            return Outcome.NO_ANSWER
+            return ActionResult.NO_ANSWER
         if status.box_flags & arm_mask:
-            return Outcome.ARMED
+            return ActionResult.ARMED
         if action.needs & ~status.sensors:
-            return Outcome.NO_SENSOR
+            return ActionResult.NO_SENSOR
     reply = yield from ask(request(action.command), action.command, 0, tries=1, exclusive=True)
     if reply is None:
-        return Outcome.NO_ANSWER
-    return Outcome.DONE if reply.direction is Direction.REPLY else Outcome.REFUSED
+        return ActionResult.NO_ANSWER
+    return ActionResult.DONE if reply.direction is Direction.REPLY else ActionResult.REFUSED
 
 
-def _ask_status() -> Procedure[StatusReport | None]:
+def _ask_status() -> Conversation[StatusReport | None]:
     reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD)
     return None if reply is None else decode_status(reply.payload)

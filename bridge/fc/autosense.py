@@ -15,8 +15,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from bridge.msp_link import RESYNC, RESYNC_REPLY_SIZE
-from bridge.reply_debt import ReplyDebt
+from bridge.fc.msp_link import RESYNC, RESYNC_REPLY_SIZE
+from bridge.fc.pending_replies import PendingReplies
 from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.commands import Msp
@@ -107,13 +107,13 @@ class Autosense:
         known: int | None,
         now: float,
         first: Sequence[int | None] = (),
-        debt: ReplyDebt | None = None,
+        pending: PendingReplies | None = None,
     ) -> None:
         self._order = visit_order(known, speeds, first)
         self.speed = next(self._order)
         self.phase = Phase.LISTEN
         self.found: Found | None = None
-        self.debt = debt or ReplyDebt()
+        self.pending = pending or PendingReplies()
         self._output: list[bytes] = []
         self._visit = self._new_visit(now)
 
@@ -166,8 +166,8 @@ class Autosense:
 
     def _probe(self, now: float) -> float:
         """Ask, if there is room for the answer; return how long to wait for it."""
-        room = self.debt.room(self.speed, now)
-        waiting = self.debt.questions(self.speed, now)
+        room = self.pending.room(self.speed, now)
+        waiting = self.pending.questions(self.speed, now)
         interval_s = _PROBE_INTERVAL_S * max(waiting / _QUICK_PROBES, 1)
         # Each second probe also fills a parser that was left in mid-frame.
         if self._visit.probes % 2 and room >= RESYNC_REPLY_SIZE:
@@ -179,7 +179,7 @@ class Autosense:
     def _ask(self, frame: bytes, reply_size: int, now: float) -> float:
         """Send; return how long the question and its answer are on the wire."""
         self._visit.probes += 1
-        self.debt.add(self.speed, reply_size, now)
+        self.pending.add(self.speed, reply_size, now)
         self._output.append(frame)
         return self._on_wire_s(frame)
 
@@ -190,7 +190,7 @@ class Autosense:
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
         visit = self._visit
         if frame.direction is not Direction.REQUEST:
-            self.debt.heard(self.speed, len(frame.payload) + FRAME_OVERHEAD, now)
+            self.pending.heard(self.speed, len(frame.payload) + FRAME_OVERHEAD, now)
         if self.found or frame.command != Msp.IDENT or frame.direction is Direction.REQUEST:
             return
         if visit.answer == frame:
@@ -199,14 +199,14 @@ class Autosense:
         visit.answer = frame
         self.phase = Phase.CONFIRM
         # Without room for one more, the answers that are owed will do.
-        has_room = self.debt.room(self.speed, now) >= _ANSWER_SIZE
+        has_room = self.pending.room(self.speed, now) >= _ANSWER_SIZE
         visit.phase_ends = now + (self._ask(PROBE, _ANSWER_SIZE, now) if has_room else 0.0) + _CONFIRM_S
         visit.ends = max(visit.ends, visit.phase_ends)
 
     def _mavlink_frame(self, frame: MavlinkFrame, now: float) -> None:
         visit = self._visit
         before, visit.last_mavlink = visit.last_mavlink, frame
-        self.debt.heard(self.speed, 0, now)
+        self.pending.heard(self.speed, 0, now)
         if self.found or visit.heartbeat is not None:
             return
         follows = (

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Procedures: conversations with the flight controller and the store, written top to bottom without any I/O.
+"""Conversations: conversations with the flight controller and the store, written top to bottom without any I/O.
 
-A procedure is a generator. It yields one effect at a time and is sent the effect's answer; `bridge.runner.Runner`
+A conversation is a generator. It yields one effect at a time and is sent the effect's answer; `bridge.fc.runner.Runner`
 carries the effects out. When the link to the flight controller goes down, LinkLost is raised at the `yield`; when the
 bridge can wait no longer for the end, its kind Stopped.
 """
@@ -10,7 +10,7 @@ from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bridge.mission_log import ArrivedMission, Conclusion
+from bridge.model.mission_log import ArrivedMission, Conclusion
 from protocols.mavlink.codec import Packed
 from protocols.mission_record import ListIdentity
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
@@ -94,15 +94,15 @@ StoreEffect = Save | Conclude | Recall
 _MAX_ASKS = 5
 
 T = TypeVar("T")
-Procedure = Generator[Effect, Any, T]
+Conversation = Generator[Effect, Any, T]
 
 
-def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = False) -> Procedure[None]:
+def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = False) -> Conversation[None]:
     """Send a request whose reply has `reply_payload` payload bytes."""
     yield Send(frame, command, reply_payload + FRAME_OVERHEAD, exclusive)
 
 
-def receive(*commands: int) -> Procedure[MspFrame | None]:
+def receive(*commands: int) -> Conversation[MspFrame | None]:
     """Wait for a reply to one of `commands`; None on time-out."""
     answer: MspFrame | None = yield Receive(frozenset(commands))
     return answer
@@ -110,7 +110,7 @@ def receive(*commands: int) -> Procedure[MspFrame | None]:
 
 def ask(
     frame: bytes, command: int, reply_payload: int, *, tries: int = 3, exclusive: bool = False
-) -> Procedure[MspFrame | None]:
+) -> Conversation[MspFrame | None]:
     """Send a request and wait for its reply, repeating it; None if no try was answered."""
     for _ in range(tries):
         yield from send(frame, command, reply_payload, exclusive=exclusive)
@@ -120,7 +120,7 @@ def ask(
     return None
 
 
-def ask_surely(frame: bytes, command: int, reply_payload: int) -> Procedure[MspFrame | None]:
+def ask_surely(frame: bytes, command: int, reply_payload: int) -> Conversation[MspFrame | None]:
     """Ask until two answers in a row are equal; None if they never are, or if one stays out.
 
     The checksum of 8 bits lets a pair of flipped bits through: at one wrong bit in a thousand one INFO reply in 500,
@@ -135,24 +135,24 @@ def ask_surely(frame: bytes, command: int, reply_payload: int) -> Procedure[MspF
     return None
 
 
-def pause(seconds: float) -> Procedure[None]:
+def pause(seconds: float) -> Conversation[None]:
     """Wait."""
     yield Pause(seconds)
 
 
-def save(mission: ArrivedMission) -> Procedure[int | None]:
+def save(mission: ArrivedMission) -> Conversation[int | None]:
     """Store a mission that came in; its number, or None if the store failed."""
     number: int | None = yield Save(mission)
     return number
 
 
-def conclude(number: int, conclusion: Conclusion) -> Procedure[bool]:
+def conclude(number: int, conclusion: Conclusion) -> Conversation[bool]:
     """Store what became of a mission; whether that worked."""
     done: bool | None = yield Conclude(number, conclusion)
     return bool(done)
 
 
-def recall(identity: ListIdentity) -> Procedure[Mapping[int, int]]:
+def recall(identity: ListIdentity) -> Conversation[Mapping[int, int]]:
     """Return the commands, by record number, with which records that do not tell were sent; empty if unknown."""
     commands: Mapping[int, int] | None = yield Recall(identity)
     return commands or {}

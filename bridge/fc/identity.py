@@ -4,8 +4,8 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from bridge.box_ids import box_names
-from bridge.procedure import Procedure, ask_surely
+from bridge.controllers.box_ids import box_names
+from bridge.fc.conversation import Conversation, ask_surely
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.mission import INFO_SIZE, Info, MissionCommand, decode_info
@@ -76,7 +76,7 @@ class _Silence(Exception):
     """A question stayed unanswered: what is not known is not guessed."""
 
 
-def identify_msp() -> Procedure[FlightController | None]:
+def identify_msp() -> Conversation[FlightController | None]:
     """Ask an MSP flight controller who it is; None if a question stayed unanswered."""
     try:
         return (yield from _identify())
@@ -84,7 +84,7 @@ def identify_msp() -> Procedure[FlightController | None]:
         return None
 
 
-def _identify() -> Procedure[FlightController]:
+def _identify() -> Conversation[FlightController]:
     ident = decode_ident((yield from _question(Msp.IDENT, 7)).payload)
     if ident is None:
         return (yield from _identify_variant())
@@ -108,7 +108,7 @@ def _identify() -> Procedure[FlightController]:
     return controller
 
 
-def _identify_variant() -> Procedure[FlightController]:
+def _identify_variant() -> Conversation[FlightController]:
     """Ask one that knows no IDENT: Cleanflight's heirs."""
     variant = yield from _question(Msp.FC_VARIANT, _VARIANT_SIZE)
     is_told = variant.direction is Direction.REPLY
@@ -126,7 +126,7 @@ def _identify_variant() -> Procedure[FlightController]:
     return controller
 
 
-def _question(command: int, reply_payload: int) -> Procedure[MspFrame]:
+def _question(command: int, reply_payload: int) -> Conversation[MspFrame]:
     """Ask, and take an error frame for an answer too: it says that the command is not known."""
     reply = yield from ask_surely(request(command), command, reply_payload)
     if reply is None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A port on which MAVLink is spoken: what comes in, and when it is over. Sans-IO."""
 
-from bridge.autosense import PROBE, is_plausible_heartbeat
-from bridge.mavlink_sender import HarakiriSender
+from bridge.fc.autosense import PROBE, is_plausible_heartbeat
+from bridge.fc.mavlink_sender import HarakiriSender
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspParser

@@ -5,10 +5,10 @@ Harakiri's send ring has no overflow check (bridge.msp_link). Whoever is silent 
 it is asked at its own speed may still be answered: with what was asked before, they must fit the ring.
 """
 
-from bridge.msp_link import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES
+from bridge.fc.msp_link import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES
 
 
-class ReplyDebt:
+class PendingReplies:
     """Reply bytes that are owed, by the speed at which they were asked for: at another one nothing is understood."""
 
     def __init__(self) -> None:

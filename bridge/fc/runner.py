@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Carries out procedures, one at a time: two conversations about missions never mix on the wire."""
+"""Carries out conversations, one at a time: two conversations about missions never mix on the wire."""
 
 from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from bridge.mavlink_line import MavlinkLine
-from bridge.msp_link import MspLink
-from bridge.procedure import (
+from bridge.fc.conversation import (
     Await,
+    Conversation,
     LinkLost,
     Pause,
-    Procedure,
     Receive,
     Send,
     Stopped,
     StoreEffect,
     Transmit,
 )
+from bridge.fc.mavlink_line import MavlinkLine
+from bridge.fc.msp_link import MspLink
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
 
@@ -27,7 +27,7 @@ _STORE_PATIENCE_S = 3.0
 
 
 class Runner:
-    """Runs procedures in the order in which they were started. Time is passed in.
+    """Runs conversations in the order in which they were started. Time is passed in.
 
     `on_store` is called with each effect that is meant for the store; its answer comes back by `store_answered`.
     """
@@ -36,20 +36,20 @@ class Runner:
         self._on_store = on_store
         self._link: MspLink | None = None
         self._mavlink: MavlinkLine | None = None
-        self._queue: deque[tuple[Procedure[Any], Callable[[Any, float], None]]] = deque()
-        self._current: tuple[Procedure[Any], Callable[[Any, float], None]] | None = None
+        self._queue: deque[tuple[Conversation[Any], Callable[[Any, float], None]]] = deque()
+        self._current: tuple[Conversation[Any], Callable[[Any, float], None]] | None = None
         self._awaited: Receive | Await | Pause | StoreEffect | None = None
         self._deadline: float | None = None
         self._busy = False
 
     @property
     def is_busy(self) -> bool:
-        """Whether a procedure is under way."""
+        """Whether a conversation is under way."""
         return self._current is not None
 
-    def start(self, procedure: Procedure[Any], on_done: Callable[[Any, float], None], now: float) -> None:
-        """Queue a procedure; `on_done` gets its result (None if LinkLost ended it) and the time."""
-        self._queue.append((procedure, on_done))
+    def start(self, conversation: Conversation[Any], on_done: Callable[[Any, float], None], now: float) -> None:
+        """Queue a conversation; `on_done` gets its result (None if LinkLost ended it) and the time."""
+        self._queue.append((conversation, on_done))
         self._begin_next(now)
 
     def link_up(self, link: MspLink) -> None:
@@ -61,19 +61,19 @@ class Runner:
         self._mavlink = line
 
     def link_down(self, now: float) -> None:
-        """Tell the running procedure that its partner is gone."""
+        """Tell the running conversation that its partner is gone."""
         self._link = None
         self._mavlink = None
         if isinstance(self._awaited, Receive | Await | Pause):
             self._advance(LinkLost("the flight controller's port is gone"), now)
 
     def stop(self, now: float) -> None:
-        """Tell the running procedure to come to its end now; it may still speak to the flight controller."""
+        """Tell the running conversation to come to its end now; it may still speak to the flight controller."""
         if isinstance(self._awaited, Receive | Await | Pause):
             self._advance(Stopped("the bridge is stopping"), now)
 
     def received(self, frame: MspFrame, now: float) -> None:
-        """Take a reply from the flight controller; the running procedure gets it if it waits for it."""
+        """Take a reply from the flight controller; the running conversation gets it if it waits for it."""
         if isinstance(self._awaited, Receive) and frame.command in self._awaited.commands:
             self._advance(frame, now)
 
@@ -110,19 +110,19 @@ class Runner:
             self._run(None, now)
 
     def _advance(self, answer: object, now: float) -> None:
-        """Go on with the current procedure, and with the next ones when it ends."""
+        """Go on with the current conversation, and with the next ones when it ends."""
         self._run(answer, now)
         self._begin_next(now)
 
     def _run(self, answer: object, now: float) -> None:
-        """Run the current procedure up to its next wait."""
+        """Run the current conversation up to its next wait."""
         assert self._current is not None
-        procedure, on_done = self._current
+        conversation, on_done = self._current
         self._awaited = None
         self._deadline = None
         try:
             while True:
-                effect = procedure.throw(answer) if isinstance(answer, LinkLost) else procedure.send(answer)
+                effect = conversation.throw(answer) if isinstance(answer, LinkLost) else conversation.send(answer)
                 answer = None
                 if isinstance(effect, Send | Receive) and self._link is None:
                     answer = LinkLost("there is no link to the flight controller")

@@ -4,16 +4,16 @@
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from bridge.autosense import Autosense, Found, Spoken
-from bridge.flight_controller import FlightController, Kind, identify_msp
-from bridge.frsky_line import FrskyLine
-from bridge.journal import Incidents, Journal
-from bridge.mavlink_line import MavlinkLine
-from bridge.msp_link import MspLink
-from bridge.poll_schedule import PollSchedule
-from bridge.reply_debt import ReplyDebt
-from bridge.runner import Runner
-from bridge.vehicle_state import VehicleState
+from bridge.fc.autosense import Autosense, Found, Spoken
+from bridge.fc.frsky_line import FrskyLine
+from bridge.fc.identity import FlightController, Kind, identify_msp
+from bridge.fc.mavlink_line import MavlinkLine
+from bridge.fc.msp_link import MspLink
+from bridge.fc.pending_replies import PendingReplies
+from bridge.fc.poll_schedule import PollSchedule
+from bridge.fc.runner import Runner
+from bridge.model.events import EventLog, Incidents
+from bridge.model.vehicle_state import VehicleState
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspFrame
@@ -67,7 +67,7 @@ class FcSession:
         self,
         speeds: Sequence[int | None],
         runner: Runner,
-        journal: Journal,
+        log_event: EventLog,
         incidents: Incidents,
         on_change: Callable[[FlightController | None, float], None],
         on_mavlink: Callable[[list[MavlinkFrame]], None],
@@ -76,7 +76,7 @@ class FcSession:
     ) -> None:
         self._speeds = speeds
         self._runner = runner
-        self._journal = journal
+        self._log_event = log_event
         self._incidents = incidents
         #: From the port's opening or a loss until somebody is found.
         self._incident = ""
@@ -122,7 +122,7 @@ class FcSession:
         self._drop(now)
         self._search = None
         if why is not None:
-            self._journal("warning", "fc.port_lost", why=why, incident=self._follow_incident())
+            self._log_event("warning", "fc.port_lost", why=why, incident=self._follow_incident())
 
     def take_output(self) -> list[bytes]:
         """Return what is to be written to the port at the present `speed`."""
@@ -216,14 +216,14 @@ class FcSession:
     def _begin_search(self, now: float, why: str, first: Sequence[int] = ()) -> None:
         self._enter(State.SEARCHING)
         was_known = self.controller is not None
-        debt = ReplyDebt()
+        pending = PendingReplies()
         if self.link is not None:
             for sent_at, size in self.link.unanswered():
-                debt.add(self.speed, size, sent_at)
+                pending.add(self.speed, size, sent_at)
         self._drop(now)
         if was_known:
-            self._journal("warning", "fc.lost", why=why, speed_baud=self.speed, incident=self._follow_incident())
-        self._search = Autosense(self._speeds, self._known_speed, now, first, debt)
+            self._log_event("warning", "fc.lost", why=why, speed_baud=self.speed, incident=self._follow_incident())
+        self._search = Autosense(self._speeds, self._known_speed, now, first, pending)
         self.speed = self._search.speed
 
     def _follow_incident(self) -> str:
@@ -252,8 +252,8 @@ class FcSession:
         if found is None:
             return
         self._output += self._search.take_output()
-        debt, self._search = self._search.debt, None
-        self._journal(
+        pending, self._search = self._search.pending, None
+        self._log_event(
             "debug",
             "fc.sensed",
             protocol=found.spoken.value,
@@ -266,7 +266,7 @@ class FcSession:
             self._known_speed = found.speed
         if found.spoken is Spoken.MSP:
             self._enter(State.IDENTIFYING)
-            self.link = MspLink(found.speed, now, debt.size(found.speed, now))
+            self.link = MspLink(found.speed, now, pending.size(found.speed, now))
             self._runner.link_up(self.link)
             self._runner.start(identify_msp(), lambda who, at: self._identified(who, found, at), now)
         elif found.spoken is Spoken.MAVLINK:
@@ -305,7 +305,7 @@ class FcSession:
         self.controller = controller
         if found.spoken is Spoken.MSP:
             self._met_harakiri = controller.kind in (Kind.HARAKIRI, Kind.HARAKIRI_MISSIONS)
-        self._journal(
+        self._log_event(
             "info",
             "fc.found",
             protocol=found.spoken.value,

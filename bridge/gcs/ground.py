@@ -4,10 +4,10 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from bridge.journal import Journal
-from bridge.recent_texts import RecentTexts
-from bridge.station import Peer, Severity, Station
-from bridge.stations import Stations
+from bridge.gcs.recent_texts import RecentTexts
+from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.stations import Stations
+from bridge.model.events import EventLog
 from protocols.mavlink.codec import FrameWriter, Packed, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
@@ -30,14 +30,14 @@ class Ground:
         self,
         sysid: int,
         compid: int,
-        journal: Journal,
+        log_event: EventLog,
         on_newcomer: Callable[[], None],
         tap: Tap,
         signers: Mapping[str, Signer],
     ) -> None:
         self._sysid = sysid
         self._compid = compid
-        self._journal = journal
+        self._log_event = log_event
         self._on_newcomer = on_newcomer
         self.tap = tap
         self._signers = signers
@@ -111,7 +111,7 @@ class Ground:
         silent = self._stations.expire(now)
         for peer in silent:
             self._forget(peer)
-            self._journal("info", "gcs.silent", peer=str(peer))
+            self._log_event("info", "gcs.silent", peer=str(peer))
         return silent
 
     def next_deadline(self) -> float | None:
@@ -149,7 +149,7 @@ class Ground:
             if not self._stations.add(station, frame.version, now):
                 return False
             self._everyone = None
-            self._journal("info", "gcs.found", station=str(station))
+            self._log_event("info", "gcs.found", station=str(station))
             self._on_newcomer()
         self.frames_received[peer.link, frame.msgid] += 1
         self.tap([frame.raw])
@@ -202,7 +202,7 @@ class Ground:
 
     def say(self, severity: Severity, text: str) -> None:
         """Show a text on every ground station, in pieces that fit STATUSTEXT; the same refusal not again for 10 s."""
-        self._journal("debug", "gcs.text", text=text)
+        self._log_event("debug", "gcs.text", text=text)
         peers = self.everyone()
         if severity is Severity.ERROR:
             peers = self._texts.new_to(peers, text, self._now)

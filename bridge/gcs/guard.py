@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from bridge.commands import CommandResult
-from bridge.journal import Journal
-from bridge.station import Peer, Station
+from bridge.gcs.station import Peer, Station
+from bridge.model.events import EventLog
+from bridge.vehicle.commands import CommandResult
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
@@ -79,7 +79,7 @@ class LinkAccess:
 _OPEN = LinkAccess()
 
 
-class Refused(NamedTuple):
+class GuardRefusal(NamedTuple):
     """Why a frame is not let in; `is_first`: for this reason, of this peer. `is_told`: whether the sender may know."""
 
     why: str
@@ -90,15 +90,15 @@ class Refused(NamedTuple):
 class Guard:
     """Lets in what may come in, counts the rest, and tells of it once for each peer and reason."""
 
-    def __init__(self, links: Mapping[str, LinkAccess], journal: Journal) -> None:
+    def __init__(self, links: Mapping[str, LinkAccess], log_event: EventLog) -> None:
         self._links = links
-        self._journal = journal
+        self._log_event = log_event
         self._proven: set[Peer] = set()
         self._told: dict[Peer, set[str]] = {}
         #: How often something was refused: (link, why).
         self.refused: Counter[tuple[str, str]] = Counter()
 
-    def refusal(self, peer: Peer, frame: MavlinkFrame) -> Refused | None:
+    def refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
         """Say why a frame is not let in; None: it is."""
         why = self._reason(peer, frame)
         if why is None:
@@ -109,10 +109,10 @@ class Guard:
         if is_first:
             told.add(why)
             station = Station(peer, frame.sysid, frame.compid)
-            self._journal("warning", "gcs.refused", station=str(station), message=_name(frame), why=why)
+            self._log_event("warning", "gcs.refused", station=str(station), message=_name(frame), why=why)
         # Whoever has shown the key is not told of wrong signatures: this is the network's second copy of what he sent,
         # or somebody who sends in his name so that a refusal may end his upload.
-        return Refused(why, is_first, is_told=peer not in self._proven or why in (_ADDRESS, _SETUP))
+        return GuardRefusal(why, is_first, is_told=peer not in self._proven or why in (_ADDRESS, _SETUP))
 
     def forget(self, peer: Peer) -> None:
         """A ground station is gone."""

@@ -4,7 +4,7 @@
 from collections.abc import Iterable, Mapping
 from math import inf
 
-from bridge.station import Peer
+from bridge.gcs.station import Peer
 
 #: A message that is due within this part of its interval goes out now: what carries it comes at a pace of its own.
 _EARLY = 0.25

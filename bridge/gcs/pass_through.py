@@ -8,8 +8,8 @@ not heard yet goes to the autopilot.
 
 from collections.abc import Sequence
 
-from bridge.ground import Ground
-from bridge.station import Peer
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.target import target_of, without_target

@@ -3,7 +3,7 @@
 
 from collections.abc import Iterable
 
-from bridge.station import Peer
+from bridge.gcs.station import Peer
 
 _QUIET_S = 10.0
 #: More are not remembered: at worst a text is repeated.

@@ -4,7 +4,7 @@
 from dataclasses import dataclass, field
 from math import inf
 
-from bridge.station import Peer, Station
+from bridge.gcs.station import Peer, Station
 
 #: A UDP peer that is silent for so long has left; its TCP kind is ended by its connection.
 EXPIRY_S = 60.0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How a mission list is judged, whatever the flight controller: item by item, by the rules that its dialect brings.
 
-Rules for one kind of flight controller are a `MissionRules` and its `ListCheck`: `bridge.harakiri_check` is one.
+One controller's rules are a `MissionRules` and its `ListCheck`; `bridge.controllers.harakiri.check` is an example.
 """
 
 import math
@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
-from bridge.finding import Finding, Rejection, reject
-from bridge.verdict import CLEARED_LIST, Verdict, rejected
+from bridge.model.finding import Finding, Rejection, reject
+from bridge.model.verdict import CLEARED_LIST, Verdict, rejected
 from protocols.mission_item import Frame, MissionItem, MissionResult
 
 MAX_LAT_E7 = 90 * 10**7

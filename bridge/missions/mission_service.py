@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bridge.flight_controller import FlightController, Kind
-from bridge.mission_check import MissionRules
-from bridge.mission_dialect import LIST_IS_GONE, AnyDialect, PushFailure, StoreReport, StoreState
-from bridge.mission_log import ArrivedMission, Conclusion, Outcome
-from bridge.procedure import LinkLost, Procedure, Stopped, conclude, pause, recall, save
-from bridge.verdict import Result
+from bridge.fc.conversation import Conversation, LinkLost, Stopped, conclude, pause, recall, save
+from bridge.fc.identity import FlightController, Kind
+from bridge.missions.fc_mission_store import LIST_IS_GONE, AnyFcMissionStore, PushFailure, StoreReport, StoreState
+from bridge.missions.list_check import MissionRules
+from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
+from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
 
@@ -60,7 +60,7 @@ _STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again la
 _OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
-class MissionDesk:
+class MissionService:
     """Holds the lock of the one transfer, the dialect of the present flight controller, and the list it holds.
 
     `on_ending` is told of each mission that was dealt with.
@@ -68,20 +68,20 @@ class MissionDesk:
 
     def __init__(self, on_ending: Callable[[ArrivedMission, Delivery], None]) -> None:
         self._on_ending = on_ending
-        self._dialect: AnyDialect | None = None
+        self._dialect: AnyFcMissionStore | None = None
         self._refusal = _NO_LINK
         self._owner: object | None = None
         self._closed = False
         self.held: HeldMission | None = None
 
-    def controller_changed(self, controller: FlightController | None, dialect: AnyDialect | None) -> None:
+    def controller_changed(self, controller: FlightController | None, dialect: AnyFcMissionStore | None) -> None:
         """Work with another flight controller, or with none."""
         self._dialect = dialect
         self._refusal = _NO_LINK if controller is None else _REASONS.get(controller.kind, _NO_LINK)
         self.held = None
 
     @property
-    def dialect(self) -> AnyDialect | None:
+    def dialect(self) -> AnyFcMissionStore | None:
         """How the present flight controller stores missions; None if it does not."""
         return self._dialect
 
@@ -109,7 +109,7 @@ class MissionDesk:
         if self._owner == owner:
             self._owner = None
 
-    def preflight(self) -> Procedure[StoreReport | Refusal]:
+    def preflight(self) -> Conversation[StoreReport | Refusal]:
         """Ask the flight controller whether it would take a list now."""
         waited_s = 0.0
         try:
@@ -132,7 +132,7 @@ class MissionDesk:
         except LinkLost:
             return _NO_LINK
 
-    def rules(self) -> Procedure[MissionRules | Refusal]:
+    def rules(self) -> Conversation[MissionRules | Refusal]:
         """Return by which rules the present flight controller's lists are judged, armed or not."""
         if self._dialect is None:
             return self._refusal
@@ -142,13 +142,13 @@ class MissionDesk:
             return _NO_LINK
         return _NO_LINK if report is None else report.rules
 
-    def deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Procedure[Delivery]:
+    def deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Conversation[Delivery]:
         """Store the mission, bring it to the flight controller if the rules let it, store how that ended."""
         delivery = yield from self._deliver(arrived, progress)
         self._on_ending(arrived, delivery)
         return delivery
 
-    def _deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Procedure[Delivery]:
+    def _deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Conversation[Delivery]:
         number = yield from save(arrived)
         verdict = arrived.verdict
         if verdict.result is Result.REJECTED:
@@ -189,7 +189,7 @@ class MissionDesk:
             text += ", places within 0.4 m"
         return (yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text))
 
-    def read_back(self) -> Procedure[HeldMission | Refusal]:
+    def read_back(self) -> Conversation[HeldMission | Refusal]:
         """Return what the flight controller holds; a copy answers only while it has the same checksum."""
         dialect = self._dialect
         if dialect is None:
@@ -219,10 +219,10 @@ class MissionDesk:
             self.held = held
         return held
 
-    def _refreshed(self, dialect: AnyDialect, held: HeldMission) -> HeldMission:
+    def _refreshed(self, dialect: AnyFcMissionStore, held: HeldMission) -> HeldMission:
         return replace(held, items=dialect.refreshed(held.items))
 
-    def _conclude(self, number: int | None, outcome: Outcome, ack: MissionResult, text: str) -> Procedure[Delivery]:
+    def _conclude(self, number: int | None, outcome: Outcome, ack: MissionResult, text: str) -> Conversation[Delivery]:
         if number is not None and not (yield from conclude(number, Conclusion(outcome, text))):
             number = None
         return Delivery(ack, text, number)

@@ -6,7 +6,7 @@ from typing import Literal, Protocol
 Level = Literal["debug", "info", "warning", "error"]
 
 
-class Journal(Protocol):
+class EventLog(Protocol):
     """Takes one event: a name, and its facts by key (units in the key's name)."""
 
     def __call__(self, level: Level, event: str, /, **facts: object) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from bridge.verdict import Verdict
+from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 
 

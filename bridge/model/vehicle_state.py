@@ -4,9 +4,9 @@
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from bridge.flight_controller import FlightController
-from bridge.flight_mode import FlightMode, flight_mode
-from bridge.ground_track import GroundTrack, Velocity
+from bridge.fc.identity import FlightController
+from bridge.model.flight_mode import FlightMode, flight_mode
+from bridge.model.ground_track import GroundTrack, Velocity
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.nav import NavStatus, decode_nav_status

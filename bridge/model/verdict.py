@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Any, Generic, TypeVar
 
-from bridge.finding import Finding, Rejection
+from bridge.model.finding import Finding, Rejection
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import MissionRecord
 

@@ -8,16 +8,16 @@ import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 
-from bridge.fc_actions import (
+from bridge.fc.actions import (
     CALIBRATE_ACCELEROMETER,
     CALIBRATE_COMPASS,
     SAVE_SETTINGS,
-    Action,
+    ActionResult,
+    FcAction,
     FcActions,
-    Outcome,
 )
-from bridge.own_vehicle import OwnVehicle
-from bridge.station import Post, Severity, Station
+from bridge.gcs.station import Post, Severity, Station
+from bridge.vehicle.own_vehicle import OwnVehicle
 from protocols.mavlink.dialect import messages
 
 
@@ -71,18 +71,18 @@ _REFUSED = {
     messages.MAV_CMD_DO_REPEAT_SERVO: _MOTORS,
 }
 _OUTCOMES = {
-    Outcome.DONE: CommandResult.ACCEPTED,
-    Outcome.FREEZES: CommandResult.ACCEPTED,
-    Outcome.ARMED: CommandResult.DENIED,
-    Outcome.NO_LINK: CommandResult.DENIED,
-    Outcome.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
-    Outcome.NO_SENSOR: CommandResult.DENIED,
-    Outcome.NO_ANSWER: CommandResult.FAILED,
-    Outcome.REFUSED: CommandResult.UNSUPPORTED,
+    ActionResult.DONE: CommandResult.ACCEPTED,
+    ActionResult.FREEZES: CommandResult.ACCEPTED,
+    ActionResult.ARMED: CommandResult.DENIED,
+    ActionResult.NO_LINK: CommandResult.DENIED,
+    ActionResult.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
+    ActionResult.NO_SENSOR: CommandResult.DENIED,
+    ActionResult.NO_ANSWER: CommandResult.FAILED,
+    ActionResult.REFUSED: CommandResult.UNSUPPORTED,
 }
 
 
-class Commands:
+class CommandService:
     """Carries commands out and acknowledges them."""
 
     def __init__(self, post: Post, vehicle: OwnVehicle, actions: FcActions, banner: Callable[[], str]) -> None:
@@ -112,7 +112,7 @@ class Commands:
             messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid),
         )
 
-    def _acted(self, station: Station, command: int, outcome: Outcome) -> None:
+    def _acted(self, station: Station, command: int, outcome: ActionResult) -> None:
         result = _OUTCOMES[outcome]
         self._post.say(Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR, outcome.value)
         self._acknowledge(station, command, result)
@@ -173,7 +173,7 @@ def _msgid(param: float) -> int:
     return int(param) if 0 <= param <= _MAX_MSGID else -1
 
 
-def _action(command: int, params: Sequence[float]) -> Action | None:
+def _action(command: int, params: Sequence[float]) -> FcAction | None:
     """Return what is to be done to the flight controller; None: it is another command, or asks for what it cannot do.
 
     MAV_CMD_PREFLIGHT_CALIBRATION: one thing at a time; the compass by param2, the accelerometers by param5 (1, or 4 for

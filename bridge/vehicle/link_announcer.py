@@ -5,14 +5,14 @@ A craft that arms may change protocol and speed, and is searched for a second or
 reads warnings out loud.
 """
 
-from bridge.flight_controller import FlightController, Kind
-from bridge.station import Severity
+from bridge.fc.identity import FlightController, Kind
+from bridge.gcs.station import Severity
 
 #: Switching takes less.
 _GRACE_S = 3.0
 
 
-class Presence:
+class LinkAnnouncer:
     """Decides what is news. Each method returns a text to show, or None."""
 
     def __init__(self) -> None:

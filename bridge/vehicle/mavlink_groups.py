@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bridge.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
+from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m

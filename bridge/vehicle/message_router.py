@@ -4,13 +4,13 @@
 from collections.abc import Callable
 from math import inf
 
-from bridge import vehicle_messages
-from bridge.commands import Commands
-from bridge.mission_download import MissionDownloads
-from bridge.mission_upload import MISSION_TYPE_MISSION, MissionUploads
-from bridge.own_vehicle import OwnVehicle
-from bridge.parameters import Parameters
-from bridge.station import Post, Severity, Station
+from bridge.gcs.station import Post, Severity, Station
+from bridge.vehicle import vehicle_messages
+from bridge.vehicle.commands import CommandService
+from bridge.vehicle.mission_download import MissionDownloads
+from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION, MissionUploads
+from bridge.vehicle.own_vehicle import OwnVehicle
+from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.ftp import refuse
@@ -23,7 +23,7 @@ _GUIDED = (2, 3)
 _Handler = Callable[[Station, Message, float], None]
 
 
-class Inbox:
+class MessageRouter:
     """Hands each message that the bridge understands to the part that answers it."""
 
     def __init__(
@@ -32,7 +32,7 @@ class Inbox:
         uploads: MissionUploads,
         downloads: MissionDownloads,
         parameters: Parameters,
-        commands: Commands,
+        commands: CommandService,
         vehicle: OwnVehicle,
     ) -> None:
         self._post = post

@@ -4,10 +4,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridge.mission_desk import ARMED, HeldMission, MissionDesk, Refusal
-from bridge.mission_upload import MISSION_TYPE_MISSION
-from bridge.runner import Runner
-from bridge.station import Post, Severity, Station
+from bridge.fc.runner import Runner
+from bridge.gcs.station import Post, Severity, Station
+from bridge.missions.mission_service import ARMED, HeldMission, MissionService, Refusal
+from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
@@ -43,13 +43,13 @@ class MissionDownloads:
 
     def __init__(
         self,
-        desk: MissionDesk,
+        missions: MissionService,
         runner: Runner,
         post: Post,
         is_armed: Callable[[], bool | None],
         home: Callable[[], tuple[int, int] | None],
     ) -> None:
-        self._desk = desk
+        self._missions = missions
         self._runner = runner
         self._post = post
         self._is_armed = is_armed
@@ -96,7 +96,7 @@ class MissionDownloads:
             self._questions[question] = None
         if not self._is_reading:
             self._is_reading = True
-            self._runner.start(self._desk.read_back(), self._read, now)
+            self._runner.start(self._missions.read_back(), self._read, now)
 
     def _read(self, held: HeldMission | Refusal, now: float) -> None:
         self._is_reading = False

@@ -10,17 +10,17 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from bridge.finding import Finding
-from bridge.item_request import ItemRequest
-from bridge.journal import Incidents, Journal
-from bridge.mission_check import ListCheck, check_count
-from bridge.mission_desk import ARMED, Delivery, MissionDesk, Refusal
-from bridge.mission_dialect import StoreReport
-from bridge.mission_log import ArrivedMission
-from bridge.recent_answers import RecentAnswers
-from bridge.runner import Runner
-from bridge.station import Peer, Post, Severity, Station
-from bridge.verdict import CLEARED_LIST, Result, Verdict
+from bridge.fc.runner import Runner
+from bridge.gcs.station import Peer, Post, Severity, Station
+from bridge.missions.fc_mission_store import StoreReport
+from bridge.missions.list_check import ListCheck, check_count
+from bridge.missions.mission_service import ARMED, Delivery, MissionService, Refusal
+from bridge.model.events import EventLog, Incidents
+from bridge.model.finding import Finding
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.verdict import CLEARED_LIST, Result, Verdict
+from bridge.vehicle.item_request import ItemRequest
+from bridge.vehicle.recent_answers import RecentAnswers
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
@@ -56,18 +56,18 @@ class MissionUploads:
 
     def __init__(
         self,
-        desk: MissionDesk,
+        missions: MissionService,
         runner: Runner,
         post: Post,
-        journal: Journal,
+        log_event: EventLog,
         incidents: Incidents,
         fallback_home: Callable[[], tuple[int, int] | None],
         moved_to: Callable[[Station, float], list[Station]],
     ) -> None:
-        self._desk = desk
+        self._missions = missions
         self._runner = runner
         self._post = post
-        self._journal = journal
+        self._log_event = log_event
         self._incidents = incidents
         self._fallback_home = fallback_home
         self._moved_to = moved_to
@@ -110,7 +110,7 @@ class MissionUploads:
             self._end(now)
         self._answers.forget(station)
         transfer = _Transfer(self._incidents.begin("upload"), station, count)
-        refusal = self._desk.acquire(station)
+        refusal = self._missions.acquire(station)
         if refusal is not None:
             self._refuse(transfer, refusal, now)
             return
@@ -121,7 +121,7 @@ class MissionUploads:
         if not self._is_asking:
             # One question serves all transfers that are begun before it is answered.
             self._is_asking = True
-            self._runner.start(self._desk.preflight(), self._asked, now)
+            self._runner.start(self._missions.preflight(), self._asked, now)
 
     def clear_all(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL."""
@@ -258,7 +258,7 @@ class MissionUploads:
         transfer.check = answer.rules.begin(transfer.count, self._fallback_home())
         transfer.phase = Phase.RECEIVING
         transfer.progress_at = now
-        self._journal(
+        self._log_event(
             "info",
             "mission.upload_started",
             station=str(transfer.station),
@@ -288,15 +288,15 @@ class MissionUploads:
             return
         if self._answers.was_said_to(station, now) or station not in self._moved_to(transfer.station, now):
             return
-        self._journal(
+        self._log_event(
             "info",
             "mission.station_moved",
             before=str(transfer.station),
             after=str(station),
             incident=transfer.incident,
         )
-        self._desk.release(transfer.station)
-        self._desk.acquire(station)
+        self._missions.release(transfer.station)
+        self._missions.acquire(station)
         transfer.station = station
 
     def _late_item(self, station: Station, seq: int, now: float) -> None:
@@ -316,7 +316,7 @@ class MissionUploads:
         self._tell(verdict.findings[:-1] if verdict.result is Result.REJECTED else verdict.findings)
         arrived = ArrivedMission(str(transfer.station), items, verdict)
         self._runner.start(
-            self._desk.deliver(arrived, _ignore),
+            self._missions.deliver(arrived, _ignore),
             lambda delivery, at: self._delivered(transfer, delivery, at),
             now,
         )
@@ -331,7 +331,7 @@ class MissionUploads:
         if delivery.number is None:
             self._post.say(Severity.WARNING, "The mission could not be stored on the Pi")
         self._answer(transfer.station, transfer.count, delivery.ack, now)
-        self._journal(
+        self._log_event(
             "info" if accepted else "warning",
             "mission.upload_ended",
             station=str(transfer.station),
@@ -354,14 +354,14 @@ class MissionUploads:
             finding = Finding(None, "list", len(items), None, refusal.text)
             verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
             arrived = ArrivedMission(str(transfer.station), items, verdict)
-            self._runner.start(self._desk.deliver(arrived, _ignore), lambda _delivery, _at: None, now)
+            self._runner.start(self._missions.deliver(arrived, _ignore), lambda _delivery, _at: None, now)
         self._end(now)
         self._refuse(transfer, refusal, now)
 
     def _refuse(self, transfer: _Transfer, refusal: Refusal, now: float) -> None:
         self._post.say(Severity.ERROR, refusal.text)
         self._answer(transfer.station, transfer.count, refusal.ack, now)
-        self._journal(
+        self._log_event(
             "warning",
             "mission.refused",
             station=str(transfer.station),
@@ -384,7 +384,7 @@ class MissionUploads:
     def _end(self, now: float) -> None:
         """Forget the transfer and free the desk."""
         if self._transfer is not None:
-            self._desk.release(self._transfer.station)
+            self._missions.release(self._transfer.station)
             self._transfer = None
         if self._queued is not None:
             (station, count), self._queued = self._queued, None

@@ -3,8 +3,8 @@
 
 from functools import cache
 
-from bridge.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
-from bridge.vehicle_state import Fix, VehicleState
+from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
+from bridge.model.vehicle_state import Fix, VehicleState
 from protocols.msp.commands import Msp
 from protocols.msp.telemetry import Sensor
 

@@ -9,15 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import inf
 
-from bridge import vehicle_messages
-from bridge.fc_session import FcSession
-from bridge.flight_mode import FlightMode
-from bridge.ground import Ground
-from bridge.message_rates import MessageRates
-from bridge.mission_desk import MissionDesk
-from bridge.mission_progress import MissionProgress
-from bridge.station import Peer, Station
-from bridge.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY, Row
+from bridge.fc.session import FcSession
+from bridge.gcs.ground import Ground
+from bridge.gcs.message_rates import MessageRates
+from bridge.gcs.station import Peer, Station
+from bridge.missions.mission_service import MissionService
+from bridge.model.flight_mode import FlightMode
+from bridge.model.mission_progress import MissionProgress
+from bridge.vehicle import vehicle_messages
+from bridge.vehicle.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY, Row
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
@@ -39,9 +39,9 @@ for _row in TELEMETRY:
 class OwnVehicle:
     """Sends what is known of the vehicle, each ground station what and as often as it wishes."""
 
-    def __init__(self, session: FcSession, desk: MissionDesk, ground: Ground, now: float) -> None:
+    def __init__(self, session: FcSession, missions: MissionService, ground: Ground, now: float) -> None:
         self._session = session
-        self._desk = desk
+        self._missions = missions
         self._ground = ground
         self._started_at = self._now = now
         self._tick_due = now
@@ -163,15 +163,15 @@ class OwnVehicle:
         return heartbeat
 
     def _mission_current(self) -> Message:
-        held = self._desk.held
-        seq = self._desk.seq_of(self._progress.number)
+        held = self._missions.held
+        seq = self._missions.seq_of(self._progress.number)
         return vehicle_messages.mission_current(0 if held is None else len(held.items), seq, self._progress.progress)
 
     def _follow_mission(self) -> None:
         """Tell at once what was reached; where it flies to next comes every second."""
         nav = self._session.vehicle.nav
         reached = None if nav is None else self._progress.take(nav)
-        seq = self._desk.seq_of(reached or 0)
+        seq = self._missions.seq_of(reached or 0)
         if seq:
             self._ground.broadcast(vehicle_messages.mission_item_reached(seq))
 

@@ -3,9 +3,9 @@
 
 import math
 
-from bridge.mission_desk import MissionDesk
-from bridge.runner import Runner
-from bridge.station import Post, Severity, Station
+from bridge.fc.runner import Runner
+from bridge.gcs.station import Post, Severity, Station
+from bridge.missions.mission_service import MissionService
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.mission import MAX_RADIUS_CM
 
@@ -18,8 +18,8 @@ SYSID = "SYSID_THISMAV"
 class Parameters:
     """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET. Values are REAL32."""
 
-    def __init__(self, desk: MissionDesk, runner: Runner, post: Post, sysid: int) -> None:
-        self._desk = desk
+    def __init__(self, missions: MissionService, runner: Runner, post: Post, sysid: int) -> None:
+        self._missions = missions
         self._runner = runner
         self._post = post
         self._sysid = sysid
@@ -39,7 +39,7 @@ class Parameters:
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered by the value that is in force then, as the protocol wants."""
-        dialect = self._desk.dialect
+        dialect = self._missions.dialect
         if name != WP_RADIUS or dialect is None or dialect.wp_radius_cm is None:
             self._send(station, name)
             return
@@ -70,7 +70,7 @@ class Parameters:
 
     def _values(self) -> dict[str, float]:
         values = {SYSID: float(self._sysid)}
-        dialect = self._desk.dialect
+        dialect = self._missions.dialect
         if dialect is not None and dialect.wp_radius_cm is not None:
             values[WP_RADIUS] = float(dialect.wp_radius_cm)
         return values

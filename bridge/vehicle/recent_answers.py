@@ -4,7 +4,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridge.station import Station
+from bridge.gcs.station import Station
 from protocols.mission_item import MissionResult
 
 #: Mission Planner sends its last item for 5 s.

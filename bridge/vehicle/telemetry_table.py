@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
-from bridge import vehicle_messages as make
-from bridge.vehicle_state import VehicleState
+from bridge.model.vehicle_state import VehicleState
+from bridge.vehicle import vehicle_messages as make
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.commands import Msp

@@ -6,9 +6,9 @@ What is not known is MAVLink's "unknown"; a message whose fields have no such va
 
 import math
 
-from bridge.flight_mode import FlightMode
-from bridge.mission_progress import Progress
-from bridge.vehicle_state import VehicleState
+from bridge.model.flight_mode import FlightMode
+from bridge.model.mission_progress import Progress
+from bridge.model.vehicle_state import VehicleState
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 

@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from bridge.fc_session import FcSession, State
-from bridge.flight_controller import Kind
-from bridge.ground import Ground
-from bridge.mavlink_groups import MavlinkGroups
-from bridge.mission_desk import MissionDesk
-from bridge.msp_groups import POLLED_FOR, TOLD_BY, MspGroups
-from bridge.vehicle_groups import Group, Link, MissionIdentity, VehicleReport
+from bridge.fc.identity import Kind
+from bridge.fc.session import FcSession, State
+from bridge.gcs.ground import Ground
+from bridge.missions.mission_service import MissionService
+from bridge.model.vehicle_groups import Group, Link, MissionIdentity, VehicleReport
+from bridge.vehicle.mavlink_groups import MavlinkGroups
+from bridge.vehicle.msp_groups import POLLED_FOR, TOLD_BY, MspGroups
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.commands import Msp
 
@@ -24,10 +24,10 @@ class VehicleReporter:
     """Tells groups when it is asked to. `want`: sets how often the flight controller is to be asked what, seconds."""
 
     def __init__(
-        self, session: FcSession, desk: MissionDesk, ground: Ground, want: Callable[[dict[Msp, float]], None]
+        self, session: FcSession, missions: MissionService, ground: Ground, want: Callable[[dict[Msp, float]], None]
     ) -> None:
         self._session = session
-        self._desk = desk
+        self._missions = missions
         self._ground = ground
         self._want = want
         self._fresh: set[Group] = set()
@@ -87,7 +87,7 @@ class VehicleReporter:
 
     def whole(self) -> VehicleReport:
         """Return everything."""
-        held = self._desk.held
+        held = self._missions.held
         mission = None if held is None else MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}")
         return VehicleReport(**{group.value: self.group(group) for group in Group}, mission=mission)
 

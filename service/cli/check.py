@@ -8,18 +8,18 @@ from typing import Any
 
 import click
 
-from bridge.finding import DROPPED
-from bridge.harakiri_check import HarakiriRules
-from bridge.mission_check import MissionRules, check_list
-from bridge.nav_check import NavRules
-from bridge.nav_rules import NAV_CAPACITY, inav_profile, multiwii_profile
-from bridge.verdict import Result, Verdict
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import NAV_CAPACITY, inav_profile, multiwii_profile
+from bridge.missions.list_check import MissionRules, check_list
+from bridge.model.finding import DROPPED
+from bridge.model.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem
+from service.cli.mission_source import load_mission
+from service.cli.mission_table import mission_table
+from service.cli.printing import print_json, print_table
 from service.mission_data import verdict_data
-from service.mission_source import load_mission
-from service.mission_table import mission_table
-from service.printing import print_json, print_table
 
 _DEFAULT = HarakiriRules()
 #: Rules by kind of flight controller, from its capacity (None: the usual one) and its hit radius, cm.

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import click
 
-from service.cli import main
+from service.cli.main import main
 
 _WIDTH = 100
 _HEAD = """\

@@ -11,12 +11,12 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from service.connection import AddressError, FcAddress, parse_fc
-from service.control import ControlError, MissionJobs, ask_daemon
+from service.api import ControlError, MissionJobs, ask_daemon
+from service.cli.printing import fail
 from service.daemon import Daemon
+from service.links.connection import AddressError, FcAddress, parse_fc
 from service.log_setup import set_up_logging
 from service.mission_data import Json
-from service.printing import fail
 from service.settings import Settings, SettingsError
 from storage.store_error import StoreError
 

@@ -15,18 +15,18 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from bridge.finding import Finding
+from bridge.model.finding import Finding
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult
-from service.control import ControlError, ask_daemon
+from service.api import ControlError, ask_daemon
+from service.cli.mission_source import load_mission
+from service.cli.mission_table import mission_table
+from service.cli.printing import fail, print_table
 from service.mission_client import ClientError, connect
 from service.mission_data import Json, mission_items
-from service.mission_source import load_mission
-from service.mission_table import mission_table
-from service.printing import fail, print_table
 
 #: A link to examples/ in the repository, a file in what is installed.
-_EXAMPLE = Path(__file__).with_name("naze-field.waypoints")
+_EXAMPLE = Path(__file__).parent / "naze-field.waypoints"
 _PATIENCE_S = 15.0
 
 

@@ -11,17 +11,17 @@ import click
 
 #: Subcommand -> where it lives. A daemon on a Pi need not load what only `check` or `demo` use.
 _COMMANDS = {
-    "run": "service.run:run",
-    "check": "service.check:check",
-    "push": "service.mission_commands:push",
-    "pull": "service.mission_commands:pull",
-    "clear": "service.mission_commands:clear",
-    "status": "service.mission_commands:status",
-    "missions": "service.stored_missions:missions",
+    "run": "service.cli.run:run",
+    "check": "service.cli.check:check",
+    "push": "service.cli.mission_commands:push",
+    "pull": "service.cli.mission_commands:pull",
+    "clear": "service.cli.mission_commands:clear",
+    "status": "service.cli.mission_commands:status",
+    "missions": "service.cli.stored_missions:missions",
     "fleet": "service.fleet.command:fleet",
     "doctor": "service.doctor.command:doctor",
-    "sim": "service.simulator.command:sim",
-    "demo": "service.demo:demo",
+    "sim": "simulator.command:sim",
+    "demo": "service.cli.demo:demo",
 }
 
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

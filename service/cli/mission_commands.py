@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from bridge.finding import Finding
+from bridge.model.finding import Finding
 from protocols.mission_file import MissionFileError, write_qgc_wpl
-from service.asking import STATUS, ask, ask_with_progress, bridge_options
+from service.cli.daemon_client import STATUS, ask, ask_with_progress, bridge_options
+from service.cli.mission_source import load_mission, save_mission
+from service.cli.mission_table import mission_table
+from service.cli.printing import fail, print_json, print_table
 from service.mission_data import Json, mission_items
-from service.mission_source import load_mission, save_mission
-from service.mission_table import mission_table
-from service.printing import fail, print_json, print_table
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _UNREADABLE = 2

@@ -8,9 +8,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from bridge.finding import DROPPED, Finding
+from bridge.model.finding import DROPPED, Finding
 from protocols.mission_item import MissionItem
-from service.command_name import command_name
+from service.cli.command_name import command_name
 
 _CHANGED = "yellow"
 _DROPPED = "red"

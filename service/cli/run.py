@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from service.control import ControlError, ControlServer
+from service.api import ControlError, ControlServer
 from service.control_socket import socket_of_daemon
 from service.daemon import Daemon
-from service.gcs_links import LinkError
 from service.lifecycle import run_until_signal
+from service.links.gcs_links import LinkError
 from service.log_setup import set_up_logging
 from service.notify import Notifier
+from service.recording.uart_recorder import UartFileError
 from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
-from service.uart_recorder import UartFileError
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 from storage.state_lock import StateLock

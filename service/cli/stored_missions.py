@@ -9,14 +9,14 @@ import click
 from rich.table import Table
 from rich.text import Text
 
-from bridge.finding import Finding
+from bridge.model.finding import Finding
 from protocols.mission_file import write_qgc_wpl
-from service.asking import ask, ask_with_progress, daemon_options
-from service.control import MOST
-from service.mission_commands import show_delivery
+from service.api import MOST
+from service.cli.daemon_client import ask, ask_with_progress, daemon_options
+from service.cli.mission_commands import show_delivery
+from service.cli.mission_table import mission_table
+from service.cli.printing import print_json, print_table
 from service.mission_data import Json, mission_items
-from service.mission_table import mission_table
-from service.printing import print_json, print_table
 
 _NUMBER = click.IntRange(1, MOST)
 

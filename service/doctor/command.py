@@ -9,13 +9,13 @@ from pathlib import Path
 
 import click
 
-from service.asking import STATUS, ask_directly
-from service.control import ControlError, ask_daemon
+from service.api import ControlError, ask_daemon
+from service.cli.daemon_client import STATUS, ask_directly
+from service.cli.printing import print_json
 from service.doctor.checked import Checked, Grade
 from service.doctor.examination import examine
 from service.doctor.host import Host
 from service.mission_data import Json
-from service.printing import print_json
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
 from storage.store_error import StoreError

@@ -3,10 +3,10 @@
 
 from collections.abc import Callable
 
-from bridge.fc_session import State
-from service.connection import FcAddress
-from service.control import ControlError
+from bridge.fc.session import State
+from service.api import ControlError
 from service.doctor.checked import Checked, note, ok, problem
+from service.links.connection import FcAddress
 from service.mission_data import Json
 
 _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"

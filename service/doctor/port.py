@@ -6,9 +6,9 @@ import re
 import stat
 from pathlib import Path
 
-from service.connection import FcAddress, SerialFc
 from service.doctor.checked import Checked, note, ok, problem
 from service.doctor.host import Host, Process
+from service.links.connection import FcAddress, SerialFc
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"

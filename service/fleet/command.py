@@ -15,6 +15,8 @@ from rich.live import Live
 from rich.text import Text
 
 from protocols.mission_file import MissionFileError, read_mission_file, write_qgc_wpl
+from service.cli.mission_source import mission_bytes, save_mission
+from service.cli.printing import fail, print_json, print_table
 from service.fleet.fleet_table import complaints, fleet_table
 from service.fleet.pull import Held, pull
 from service.fleet.push import FleetPush, push
@@ -22,8 +24,6 @@ from service.fleet.push_table import progress_bars, push_data, push_summary, pus
 from service.fleet.roll_call import alive, chosen, roll_call
 from service.fleet.session import DEFAULT_ENDPOINT, FleetAddress, FleetError, is_connected, open_session
 from service.fleet.watch import Watch, watching
-from service.mission_source import mission_bytes, save_mission
-from service.printing import fail, print_json, print_table
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError, check_name
 
 _UNREADABLE = 2
@@ -185,7 +185,7 @@ def _show(held: Held, *, with_items: bool, to_error: bool) -> None:
     click.echo(f"{held.vehicle}: {held.count} records, checksum {held.checksum}", err=to_error)
     if with_items and held.items:
         # Here, because nothing else in the fleet's commands needs the names of MAVLink's commands.
-        from service.mission_table import mission_table
+        from service.cli.mission_table import mission_table
 
         print_table(mission_table(held.items, held.items, ()))
 

@@ -12,7 +12,7 @@ import zenoh
 
 from service.fleet.payload import decode, part, text, whole
 from service.fleet.session import ask, send_query
-from service.fleet.vehicle import Bridge, bridge_of
+from service.fleet.vehicle import BridgeState, bridge_of
 from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
 
@@ -28,7 +28,7 @@ _TOO_LATE = f"the end of the push was not known after {_PATIENCE_S:.0f} s; {_LOO
 
 
 @dataclass(slots=True)
-class Progress:
+class PushState:
     """How one vehicle stands. `records` of `total` are on its flight controller; `error` is why it failed."""
 
     vehicle: str
@@ -52,13 +52,13 @@ class Progress:
 class FleetPush:
     """Every vehicle's progress, by name."""
 
-    vehicles: dict[str, Progress] = field(default_factory=dict)
+    vehicles: dict[str, PushState] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, names: Iterable[str], bridges: Iterable[Bridge]) -> "FleetPush":
+    def of(cls, names: Iterable[str], bridges: Iterable[BridgeState]) -> "FleetPush":
         """Make one for vehicles by name; a name that several bridges use fails at once."""
         found = [bridge.vehicle for bridge in bridges]
-        return cls({name: Progress(name, error=_TWO if found.count(name) > 1 else None) for name in names})
+        return cls({name: PushState(name, error=_TWO if found.count(name) > 1 else None) for name in names})
 
     @property
     def waiting(self) -> list[str]:
@@ -66,7 +66,7 @@ class FleetPush:
         return [name for name, progress in self.vehicles.items() if not progress.is_done]
 
     @property
-    def failed(self) -> list[Progress]:
+    def failed(self) -> list[PushState]:
         """Those that do not hold the mission."""
         return [progress for progress in self.vehicles.values() if progress.has_failed]
 

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from service.fleet.payload import text
-from service.fleet.push import FleetPush, Progress
+from service.fleet.push import FleetPush, PushState
 from service.mission_data import Json
 
 
@@ -61,7 +61,7 @@ def push_summary(fleet: FleetPush) -> str:
     return f"{count - failed} of {count} vehicles hold the mission, verified" + (f"; {failed} failed" if failed else "")
 
 
-def _words(progress: Progress) -> str:
+def _words(progress: PushState) -> str:
     if progress.error is not None:
         return progress.error
     assert progress.result is not None

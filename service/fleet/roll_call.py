@@ -5,7 +5,7 @@ import zenoh
 
 from service.fleet.payload import decode_reply
 from service.fleet.session import FleetError, ask
-from service.fleet.vehicle import Bridge, Vehicle, as_fleet, bridge_of, vehicle_of
+from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, vehicle_of
 from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, full
 
@@ -13,7 +13,7 @@ from service.zenoh_link.keys import ALIVE, STATE, full
 _PATIENCE_S = 2.0
 
 
-def alive(session: zenoh.Session, prefix: str) -> set[Bridge]:
+def alive(session: zenoh.Session, prefix: str) -> set[BridgeState]:
     """Return the bridges whose liveliness tokens are there."""
     replies = session.liveliness().get(full(prefix, "*", f"{ALIVE}/*"), timeout=_PATIENCE_S)
     samples = [reply.ok for reply in replies if reply.ok is not None]
@@ -23,7 +23,7 @@ def alive(session: zenoh.Session, prefix: str) -> set[Bridge]:
 def roll_call(session: zenoh.Session, prefix: str) -> list[Vehicle]:
     """Return the fleet by name. Takes as long as the slowest bridge, two seconds at most."""
     bridges = alive(session, prefix)
-    states: dict[Bridge, Json] = {}
+    states: dict[BridgeState, Json] = {}
     # None to hear, nothing to wait for.
     if bridges:
         for reply in ask(session, full(prefix, "*", STATE.suffix), timeout_s=_PATIENCE_S):
@@ -35,7 +35,7 @@ def roll_call(session: zenoh.Session, prefix: str) -> list[Vehicle]:
     return as_fleet(vehicle_of(bridge, states.get(bridge)) for bridge in bridges)
 
 
-def chosen(bridges: set[Bridge], names: tuple[str, ...], prefix: str) -> list[str]:
+def chosen(bridges: set[BridgeState], names: tuple[str, ...], prefix: str) -> list[str]:
     """Return the names of the vehicles that are meant, all if none is named; FleetError if one is not there."""
     there = sorted({bridge.vehicle for bridge in bridges})
     if not there:
@@ -50,8 +50,8 @@ def _are(names: list[str]) -> str:
     return f"is {names[0]}" if len(names) == 1 else f"are {', '.join(names)}"
 
 
-def _replier(reply: zenoh.Reply) -> Bridge | None:
+def _replier(reply: zenoh.Reply) -> BridgeState | None:
     """Return whose reply it is: its key names the vehicle, its sender the session."""
     if reply.ok is None or reply.replier_id is None:
         return None
-    return Bridge(str(reply.ok.key_expr).split("/")[1], str(reply.replier_id.zid))
+    return BridgeState(str(reply.ok.key_expr).split("/")[1], str(reply.replier_id.zid))

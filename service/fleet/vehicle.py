@@ -12,7 +12,7 @@ from service.zenoh_link.settings import ZenohSettingsError, check_name
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Bridge:
+class BridgeState:
     """Who says that he is alive: a vehicle's name, and zenoh's id of the session, which no two bridges share."""
 
     vehicle: str
@@ -42,7 +42,7 @@ class Vehicle:
     mission_checksum: str | None = None
 
 
-def bridge_of(key: str, prefix: str) -> Bridge | None:
+def bridge_of(key: str, prefix: str) -> BridgeState | None:
     """Return whose liveliness token a key is; None if it is none that a bridge of ours has."""
     match key.split("/"):
         case [first, name, middle, session_id] if first == prefix and middle == ALIVE:
@@ -50,11 +50,11 @@ def bridge_of(key: str, prefix: str) -> Bridge | None:
                 check_name("vehicle", name)
             except ZenohSettingsError:
                 return None
-            return Bridge(name, session_id)
+            return BridgeState(name, session_id)
     return None
 
 
-def vehicle_of(bridge: Bridge, state: Json | None) -> Vehicle:
+def vehicle_of(bridge: BridgeState, state: Json | None) -> Vehicle:
     """Make a vehicle of the payload of its `state`; None: it told nothing."""
     if state is None:
         return Vehicle(bridge.vehicle, bridge.session_id)

@@ -10,7 +10,7 @@ import zenoh
 
 from service.fleet.payload import decode
 from service.fleet.session import send_query
-from service.fleet.vehicle import Bridge, Vehicle, as_fleet, bridge_of, vehicle_of
+from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, vehicle_of
 from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, full
 
@@ -24,7 +24,7 @@ class Watch:
         self._prefix = prefix
         self._clock = clock
         self._lock = threading.Lock()
-        self._bridges: set[Bridge] = set()
+        self._bridges: set[BridgeState] = set()
         self._states: dict[str, tuple[Json, float]] = {}
 
     def token(self, sample: zenoh.Sample) -> None:

@@ -11,8 +11,8 @@ from typing import Protocol
 
 import serial
 
-from service.connection import UNKNOWN_HOST_HINT, FcAddress, SerialFc, TcpFc, family_of
-from service.port_holder import explain_port_error, find_console
+from service.links.connection import UNKNOWN_HOST_HINT, FcAddress, SerialFc, TcpFc, family_of
+from service.links.port_holder import explain_port_error, find_console
 
 _TCP_PATIENCE_S = 3.0
 
@@ -38,8 +38,8 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
     if isinstance(address, TcpFc):
         return lambda: _open_tcp(address.host, address.port)
     # Only here, because a daemon on a real flight controller need not carry a simulated one in its memory.
-    from service.simulator.naze import SimulatedNaze
-    from service.simulator.pipe_link import SimLink
+    from simulator.naze import SimulatedNaze
+    from simulator.pipe_link import SimLink
 
     # One board for all openings: its list outlives a lost port, as the real one's does.
     return SimLink(SimulatedNaze(), asyncio.get_running_loop()).start

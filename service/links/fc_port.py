@@ -9,8 +9,8 @@ from collections.abc import Callable
 import serial
 import structlog
 
-from service.connection import FcAddress
-from service.fc_device import Device, PortError, acknowledge, device_opener
+from service.links.connection import FcAddress
+from service.links.fc_device import Device, PortError, acknowledge, device_opener
 
 #: What `on_close` is told when the port is closed because it is needed no more.
 STOPPED = "the daemon stops"

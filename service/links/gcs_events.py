@@ -3,7 +3,7 @@
 
 from typing import Protocol
 
-from bridge.station import Peer
+from bridge.gcs.station import Peer
 
 
 class GcsEvents(Protocol):

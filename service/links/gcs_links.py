@@ -4,11 +4,11 @@
 import errno
 from typing import Protocol
 
-from bridge.station import Peer
-from service.connection import UNKNOWN_HOST_HINT, GcsAddress
-from service.gcs_events import GcsEvents
-from service.tcp_link import TcpLink
-from service.udp_link import UdpLink
+from bridge.gcs.station import Peer
+from service.links.connection import UNKNOWN_HOST_HINT, GcsAddress
+from service.links.gcs_events import GcsEvents
+from service.links.tcp_link import TcpLink
+from service.links.udp_link import UdpLink
 
 _HINTS = {
     errno.EADDRINUSE: "stop the program that has it, or name another port",

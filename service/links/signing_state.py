@@ -15,7 +15,7 @@ from pathlib import Path
 
 import structlog
 
-from bridge.guard import LinkAccess
+from bridge.gcs.guard import LinkAccess
 from protocols.mavlink.signing import TOLERANCE, Signing, Timestamps
 from service.settings import Settings
 from storage.atomic_file import replace_file

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import structlog
 
-from bridge.station import Peer
-from service.connection import GcsAddress, family_of
-from service.gcs_events import GcsEvents
-from service.send_queue import SendQueue
+from bridge.gcs.station import Peer
+from service.links.connection import GcsAddress, family_of
+from service.links.gcs_events import GcsEvents
+from service.links.send_queue import SendQueue
 
 _READ_SIZE = 2048
 #: What a stalled client may leave unread; then telemetry for it is dropped, the oldest first.

@@ -6,9 +6,9 @@ import socket
 
 import structlog
 
-from bridge.station import Peer
-from service.connection import UNKNOWN_HOST_HINT, GcsAddress, family_of
-from service.gcs_events import GcsEvents
+from bridge.gcs.station import Peer
+from service.links.connection import UNKNOWN_HOST_HINT, GcsAddress, family_of
+from service.links.gcs_events import GcsEvents
 
 _DATAGRAM_SIZE = 2048
 #: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from pathlib import Path
 
-from bridge.station import Peer
+from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
-from service.connection import AddressError, GcsAddress, parse_gcs
+from service.links.connection import AddressError, GcsAddress, parse_gcs
 
 Network = IPv4Network | IPv6Network
 

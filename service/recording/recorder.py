@@ -3,12 +3,12 @@
 
 from collections.abc import Callable, Sequence
 
-from bridge.ground import Tap
-from service.connection import FcAddress
-from service.fc_port import FcPort
+from bridge.gcs.ground import Tap
+from service.links.connection import FcAddress
+from service.links.fc_port import FcPort
+from service.recording.tlog_recorder import TlogRecorder
+from service.recording.uart_recorder import RecordedPort, UartRecorder
 from service.settings import Settings
-from service.tlog_recorder import TlogRecorder
-from service.uart_recorder import RecordedPort, UartRecorder
 
 #: Within the state directory.
 TLOG_FOLDER = "logs"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from protocols.mavlink.dialect import messages
 from protocols.tlog import heartbeat_type, tlog_record
-from service.disk_writer import DiskWriter
+from service.recording.disk_writer import DiskWriter
+from service.recording.tlog_folder import TlogFolder
 from service.settings import TlogLimits
-from service.tlog_folder import TlogFolder
 
 #: The clock was set: a Pi has none of its own, and hears of the time when there is a network.
 _CLOCK_STEP_US = 10_000_000

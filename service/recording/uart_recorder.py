@@ -10,9 +10,9 @@ from pathlib import Path
 import structlog
 
 from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, is_capture
-from service.connection import FcAddress
-from service.disk_writer import DiskWriter
-from service.fc_port import FcPort
+from service.links.connection import FcAddress
+from service.links.fc_port import FcPort
+from service.recording.disk_writer import DiskWriter
 
 #: Of the file: hours of telemetry, or three quarters of an hour of a full line at 115200 baud.
 _MAX_SIZE = 64 << 20

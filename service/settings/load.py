@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from service.connection import FcAddress, GcsAddress, SerialFc, parse_gcs
+from service.links.connection import FcAddress, GcsAddress, SerialFc, parse_gcs
+from service.links.write_access import WriteAccess
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import Unfit
 from service.settings.ports import port_conflicts
@@ -14,7 +15,6 @@ from service.settings.problem import Problem, SettingsError
 from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 from service.settings.table import KEYS
 from service.web.settings import WebSettings
-from service.write_access import WriteAccess
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 
 #: Names the configuration file itself.

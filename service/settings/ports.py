@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from itertools import combinations
 
-from service.connection import FcAddress, GcsAddress, TcpFc
+from service.links.connection import FcAddress, GcsAddress, TcpFc
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings
 

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridge.fc_session import Autopilot
-from service.connection import FcAddress, GcsAddress
+from bridge.fc.session import Autopilot
+from service.links.connection import FcAddress, GcsAddress
+from service.links.write_access import WriteAccess
 from service.web.settings import WebSettings
-from service.write_access import WriteAccess
 from service.zenoh_link.settings import ZenohSettings
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"

@@ -3,8 +3,9 @@
 
 from pathlib import Path
 
-from bridge.fc_session import Autopilot
-from service.connection import parse_fc
+from bridge.fc.session import Autopilot
+from service.links.connection import parse_fc
+from service.links.write_access import parse_link
 from service.settings.key import Choice, FileName, Key, Several, Text, Unfit, Whole, YesNo
 from service.settings.settings import (
     DEFAULT_GCS,
@@ -14,7 +15,6 @@ from service.settings.settings import (
     TlogLimits,
 )
 from service.web.settings import DEFAULT_LISTEN, parse_listen
-from service.write_access import parse_link
 from service.zenoh_link.settings import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, check_name
 
 LOG_LEVELS = ("debug", "info", "warning", "error")

@@ -18,10 +18,10 @@ from http import HTTPStatus
 from starlette.requests import Request
 from starlette.responses import Response
 
-from bridge.mission_desk import HeldMission
-from bridge.mission_log import Outcome
+from bridge.missions.mission_service import HeldMission
+from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionItem
-from service.control import MOST, ControlError, MissionJobs
+from service.api import MOST, ControlError, MissionJobs
 from service.daemon import Daemon
 from service.metrics import CONTENT_TYPE, Metrics
 from service.mission_data import Json, mission_items, to_json
@@ -83,7 +83,7 @@ class Api:
 
     async def _held(self, _request: Request) -> Response:
         """Tell what was last read: a stranger who asks keeps the flight controller's line free."""
-        held = self._daemon.bridge.desk.held
+        held = self._daemon.bridge.missions.held
         if held is None:
             return _json({"count": None, "checksum": None, "items": []})
         if self._held_text is None or self._held_text[0] is not held:

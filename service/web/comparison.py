@@ -5,9 +5,9 @@ import difflib
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from bridge.finding import DROPPED, REJECTED, Finding
+from bridge.model.finding import DROPPED, REJECTED, Finding
 from protocols.mission_item import MissionItem
-from service.command_name import command_name
+from service.cli.command_name import command_name
 from service.mission_data import Json, mission_items
 
 #: No flight controller holds more; a longer list was refused, and its end tells nothing new.

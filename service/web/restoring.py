@@ -4,7 +4,7 @@
 import asyncio
 from http import HTTPStatus
 
-from service.control import ControlError, MissionJobs
+from service.api import ControlError, MissionJobs
 from service.mission_data import Json
 from service.web.access import Refused
 from storage.store_error import StoreError

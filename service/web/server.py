@@ -16,7 +16,7 @@ from uvicorn.server import ServerState
 from service.daemon import Daemon
 from service.web.access import SafeHeaders, guarded, not_found
 from service.web.api import Api
-from service.web.door import BoundedConnection, Door
+from service.web.connection_limit import BoundedConnection, Door
 from service.web.settings import WebSettings
 from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError

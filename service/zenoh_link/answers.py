@@ -2,7 +2,7 @@
 """Queries for what is the case now: state, mission/current and mission/list."""
 
 from bridge.bridge import Bridge
-from service.control import MissionJobs
+from service.api import MissionJobs
 from service.mission_data import Json
 from service.zenoh_link import keys
 from service.zenoh_link.payload import Payloads, strict
@@ -21,7 +21,7 @@ class Answers:
         self._data = data
         self._jobs = jobs
         self._payloads = payloads
-        self.answerers: dict[keys.Key, Answerer] = {
+        self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.STATE: self._state,
             keys.MISSION_CURRENT: self._mission_current,
             keys.MISSION_LIST: self._mission_list,
@@ -31,7 +31,7 @@ class Answers:
         self._tell(question, keys.STATE, self._data.state())
 
     async def _mission_current(self, question: Question) -> None:
-        self._tell(question, keys.MISSION_CURRENT, mission_current(self._bridge.desk.held))
+        self._tell(question, keys.MISSION_CURRENT, mission_current(self._bridge.missions.held))
 
     async def _mission_list(self, question: Question) -> None:
         limit = question.parameter("limit") or str(_USUAL_LIMIT)
@@ -40,7 +40,7 @@ class Answers:
         found = (await self._jobs.list_missions(int(limit)))["missions"]
         self._tell(question, keys.MISSION_LIST, {"missions": [_with_units(mission) for mission in found]})
 
-    def _tell(self, question: Question, key: keys.Key, body: Json) -> None:
+    def _tell(self, question: Question, key: keys.ZenohKey, body: Json) -> None:
         question.tell(self._payloads.answer(key, body), self._payloads.encoding)
 
 

@@ -8,7 +8,7 @@ import zenoh
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.control import MOST, MissionJobs
+from service.api import MOST, MissionJobs
 from service.mission_data import Json, to_json
 from service.zenoh_link import keys
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
@@ -20,12 +20,12 @@ _MAX_BYTES = 1 << 20
 _MAX_ITEMS = 1000
 
 
-class Commands:
+class CommandQueries:
     """Carries them out as MissionJobs does for everybody."""
 
     def __init__(self, jobs: MissionJobs) -> None:
         self._jobs = jobs
-        self.answerers: dict[keys.Key, Answerer] = {
+        self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.UPLOAD: self._upload,
             keys.CHECK: self._check,
             keys.CLEAR: self._clear,

@@ -7,7 +7,7 @@ A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*
 from dataclasses import dataclass
 from enum import Enum
 
-from bridge.vehicle_groups import Group
+from bridge.model.vehicle_groups import Group
 
 #: The version of keys and payloads. One that a reader of this version would misread gets another.
 VERSION = 1
@@ -15,7 +15,7 @@ VERSION = 1
 COMMANDS = f"@cmd/v{VERSION}"
 
 
-class Delivery(Enum):
+class SampleDelivery(Enum):
     """What becomes of a sample that cannot go at once: it is dropped, or waits on the session's thread."""
 
     DROP = "dropped rather than waited for"
@@ -24,28 +24,28 @@ class Delivery(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class ZenohKey:
     """One key. `schema`: file name below schemas/, without its ending; None: the payload is raw MAVLink."""
 
     suffix: str
     schema: str | None
-    delivery: Delivery
+    delivery: SampleDelivery
 
 
-TELEMETRY = {group: Key(f"telemetry/{group.value}", group.value, Delivery.DROP) for group in Group}
-STATE = Key("state", "state", Delivery.DROP)
-EVENT = Key("event", "event", Delivery.RELIABLE)
-MISSION_CURRENT = Key("mission/current", "mission_current", Delivery.RELIABLE)
-MISSION_LIST = Key("mission/list", "mission_list", Delivery.REPLY)
-MISSION_REPORT = Key("mission/report", "mission_report", Delivery.RELIABLE)
-MAVLINK_OUT = Key("mavlink/out", None, Delivery.DROP)
-MAVLINK_IN = Key("mavlink/in", None, Delivery.RELIABLE)
+TELEMETRY = {group: ZenohKey(f"telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}
+STATE = ZenohKey("state", "state", SampleDelivery.DROP)
+EVENT = ZenohKey("event", "event", SampleDelivery.RELIABLE)
+MISSION_CURRENT = ZenohKey("mission/current", "mission_current", SampleDelivery.RELIABLE)
+MISSION_LIST = ZenohKey("mission/list", "mission_list", SampleDelivery.REPLY)
+MISSION_REPORT = ZenohKey("mission/report", "mission_report", SampleDelivery.RELIABLE)
+MAVLINK_OUT = ZenohKey("mavlink/out", None, SampleDelivery.DROP)
+MAVLINK_IN = ZenohKey("mavlink/in", None, SampleDelivery.RELIABLE)
 
-UPLOAD = Key(f"{COMMANDS}/mission/upload", "command_reply", Delivery.REPLY)
-CHECK = Key(f"{COMMANDS}/mission/check", "command_reply", Delivery.REPLY)
-CLEAR = Key(f"{COMMANDS}/mission/clear", "command_reply", Delivery.REPLY)
-RESTORE = Key(f"{COMMANDS}/mission/restore", "command_reply", Delivery.REPLY)
-STATUS = Key(f"{COMMANDS}/status", "command_reply", Delivery.REPLY)
+UPLOAD = ZenohKey(f"{COMMANDS}/mission/upload", "command_reply", SampleDelivery.REPLY)
+CHECK = ZenohKey(f"{COMMANDS}/mission/check", "command_reply", SampleDelivery.REPLY)
+CLEAR = ZenohKey(f"{COMMANDS}/mission/clear", "command_reply", SampleDelivery.REPLY)
+RESTORE = ZenohKey(f"{COMMANDS}/mission/restore", "command_reply", SampleDelivery.REPLY)
+STATUS = ZenohKey(f"{COMMANDS}/status", "command_reply", SampleDelivery.REPLY)
 COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS)
 
 KEYS = (

@@ -5,15 +5,15 @@ import asyncio
 
 import zenoh
 
-from bridge.journal import Journal
+from bridge.model.events import EventLog
 from service.mission_data import Json
 from service.zenoh_link.threads import post
 
 
-class Presence:
+class Liveliness:
     """Shows that the bridge is there. `others`: sessions of other bridges with the same vehicle name."""
 
-    def __init__(self, vehicle: str, note: Journal) -> None:
+    def __init__(self, vehicle: str, note: EventLog) -> None:
         self._vehicle = vehicle
         self._note = note
         self._loop = asyncio.get_running_loop()

@@ -5,8 +5,8 @@ import asyncio
 
 import zenoh
 
-from bridge.station import Peer
-from service.gcs_events import GcsEvents
+from bridge.gcs.station import Peer
+from service.links.gcs_events import GcsEvents
 from service.zenoh_link.keys import MAVLINK_OUT
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.threads import post

@@ -4,8 +4,8 @@
 A sample's way from the UART:
     Daemon.flush -> Node.telemetry -> Publisher.put -> zenoh
 What may wait goes over the session's thread:
-    Daemon._journal -> Node.event -> SessionThread -> zenoh
-    zenoh -> Queries -> Answers or Commands -> MissionJobs -> Question -> SessionThread -> zenoh
+    Daemon._log_event -> Node.event -> SessionThread -> zenoh
+    zenoh -> Queries -> Answers or CommandQueries -> MissionJobs -> Question -> SessionThread -> zenoh
 """
 
 import asyncio
@@ -16,23 +16,22 @@ from functools import partial
 import structlog
 import zenoh
 
-from bridge.journal import Level
-from bridge.mission_desk import Delivery, HeldMission
-from bridge.mission_log import ArrivedMission
-from bridge.vehicle_groups import Group
-from service.control import MissionJobs
+from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.model.events import Level
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.vehicle_groups import Group
+from service.api import MissionJobs
 from service.daemon import Daemon
 from service.mission_data import Json
 from service.zenoh_link import keys, vehicle_data
 from service.zenoh_link.answers import Answers
-from service.zenoh_link.commands import Commands
+from service.zenoh_link.commands import CommandQueries
 from service.zenoh_link.configuration import connect_endpoints, make_config, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
-from service.zenoh_link.keys import Delivery as Way
-from service.zenoh_link.keys import Key
+from service.zenoh_link.keys import SampleDelivery, ZenohKey
+from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.payload import Payloads
-from service.zenoh_link.presence import Presence
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
 from service.zenoh_link.session import SessionThread
@@ -60,13 +59,13 @@ class Node:
         self._payloads = Payloads(settings.encoding)
         self._publisher = Publisher(self._payloads, self._readers_changed)
         self._mavlink = MavlinkLink(self._publisher, daemon)
-        self._presence = Presence(settings.vehicle, self._note)
+        self._presence = Liveliness(settings.vehicle, self._note)
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others)
         self._queries = Queries(self._thread)
         jobs = MissionJobs(daemon)
         self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads).answerers
         if settings.commands:
-            self._answerers |= Commands(jobs).answerers
+            self._answerers |= CommandQueries(jobs).answerers
         self._held: HeldMission | None = None
         self._ask_why_at = self._loop.time() + _PATIENCE_S
         self._why_alone = ""
@@ -113,7 +112,7 @@ class Node:
 
     def _declare(self, session: zenoh.Session) -> None:
         for key in keys.KEYS:
-            if key.delivery is not Way.REPLY and key is not keys.MAVLINK_IN:
+            if key.delivery is not SampleDelivery.REPLY and key is not keys.MAVLINK_IN:
                 self._publisher.declare(session, key, self._name(key.suffix))
         for key, answerer in self._answerers.items():
             self._queries.declare(session, self._name(key.suffix), answerer)
@@ -130,7 +129,7 @@ class Node:
         getattr(_log, level)(event, **facts)
         self.event(level, event, facts)
 
-    def _readers_changed(self, key: Key, is_read: bool) -> None:
+    def _readers_changed(self, key: ZenohKey, is_read: bool) -> None:
         _log.debug("zenoh.readers", key=key.suffix, is_read=is_read)
         if key is keys.MAVLINK_OUT:
             self._mavlink.read(is_read=is_read)
@@ -144,7 +143,7 @@ class Node:
         if self._publisher.has_readers(key):
             self._publisher.put(key, self._data.group(group))
 
-    def _send_surely(self, key: Key, body: Callable[[], Json]) -> None:
+    def _send_surely(self, key: ZenohKey, body: Callable[[], Json]) -> None:
         """Publish on the session's thread, where the body is made, too: a report of a long list takes its time."""
         if self._publisher.has_readers(key):
             head = self._payloads.head(key)
@@ -181,7 +180,7 @@ class Node:
         self._publish(Group.LINK)
         if self._publisher.has_readers(keys.STATE):
             self._publisher.put(keys.STATE, self._data.state())
-        held = self._daemon.bridge.desk.held
+        held = self._daemon.bridge.missions.held
         if held is not self._held:
             self._held = held
             self._send_surely(keys.MISSION_CURRENT, partial(vehicle_data.mission_current, held))

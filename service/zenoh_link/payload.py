@@ -14,7 +14,7 @@ import cbor2
 import zenoh
 
 from service.mission_data import Json
-from service.zenoh_link.keys import VERSION, Key
+from service.zenoh_link.keys import VERSION, ZenohKey
 from service.zenoh_link.settings import PayloadEncoding
 
 _write_any = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
@@ -33,13 +33,13 @@ class Payloads:
         self.encode: Callable[[Json], bytes] = _to_json if encoding is PayloadEncoding.JSON else cbor2.dumps
         self._next: dict[str, int] = {}
 
-    def head(self, key: Key) -> Json:
+    def head(self, key: ZenohKey) -> Json:
         """Begin the next payload of a key."""
         seq = self._next.get(key.suffix, 0)
         self._next[key.suffix] = seq + 1
         return {"v": VERSION, "seq": seq, "time_s": time.time()}
 
-    def answer(self, key: Key, body: Json) -> bytes:
+    def answer(self, key: ZenohKey, body: Json) -> bytes:
         """Make the answer to a query: it has the number of the last sample."""
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
         return self.encode({"v": VERSION, "seq": seq, "time_s": time.time(), **body})

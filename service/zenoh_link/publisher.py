@@ -10,7 +10,7 @@ from collections.abc import Callable
 import zenoh
 
 from service.mission_data import Json
-from service.zenoh_link.keys import Delivery, Key
+from service.zenoh_link.keys import SampleDelivery, ZenohKey
 from service.zenoh_link.payload import Payloads
 from service.zenoh_link.threads import post
 
@@ -18,7 +18,7 @@ from service.zenoh_link.threads import post
 class Publisher:
     """Knows which keys somebody reads; what nobody reads is not even made."""
 
-    def __init__(self, payloads: Payloads, on_readers: Callable[[Key, bool], None]) -> None:
+    def __init__(self, payloads: Payloads, on_readers: Callable[[ZenohKey, bool], None]) -> None:
         self._payloads = payloads
         self._on_readers = on_readers
         self._loop = asyncio.get_running_loop()
@@ -28,9 +28,9 @@ class Publisher:
         #: How many samples zenoh refused.
         self.failed = 0
 
-    def declare(self, session: zenoh.Session, key: Key, name: str) -> None:
+    def declare(self, session: zenoh.Session, key: ZenohKey, name: str) -> None:
         """Declare a key's publisher; `name`: the key in full. Called on the session's thread."""
-        reliable = key.delivery is Delivery.RELIABLE
+        reliable = key.delivery is SampleDelivery.RELIABLE
         publisher = session.declare_publisher(
             name,
             encoding=zenoh.Encoding.APPLICATION_OCTET_STREAM if key.schema is None else self._payloads.encoding,
@@ -46,22 +46,22 @@ class Publisher:
         # It is called at once if somebody reads already.
         self._listeners.append(publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False)))
 
-    def has_readers(self, key: Key) -> bool:
+    def has_readers(self, key: ZenohKey) -> bool:
         """Tell whether anybody reads a key."""
         return key.suffix in self._read
 
-    def put(self, key: Key, body: Json) -> None:
+    def put(self, key: ZenohKey, body: Json) -> None:
         """Publish plain data."""
         self.put_raw(key, self._payloads.encode(self._payloads.head(key) | body))
 
-    def put_raw(self, key: Key, data: bytes) -> None:
+    def put_raw(self, key: ZenohKey, data: bytes) -> None:
         """Publish bytes."""
         try:
             self._publishers[key.suffix].put(data)
         except zenoh.ZError:
             self.failed += 1
 
-    def _changed(self, key: Key, is_read: bool) -> None:
+    def _changed(self, key: ZenohKey, is_read: bool) -> None:
         if is_read == (key.suffix in self._read):
             return
         if is_read:

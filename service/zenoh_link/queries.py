@@ -9,7 +9,7 @@ from functools import partial
 import structlog
 import zenoh
 
-from service.control import ControlError
+from service.api import ControlError
 from service.mission_data import Json, to_json
 from service.zenoh_link.session import SessionThread
 from service.zenoh_link.threads import post

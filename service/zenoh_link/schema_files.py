@@ -10,9 +10,9 @@ from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from bridge import vehicle_groups as groups
-from bridge.finding import Finding
-from bridge.vehicle_groups import Group, VehicleReport
+from bridge.model import vehicle_groups as groups
+from bridge.model.finding import Finding
+from bridge.model.vehicle_groups import Group, VehicleReport
 from protocols.mission_item import MissionItem
 from service.mission_data import Json
 from service.zenoh_link.keys import VERSION

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from bridge.bridge import Bridge
-from bridge.journal import Level
-from bridge.mission_desk import Delivery, HeldMission
-from bridge.mission_log import ArrivedMission
-from bridge.vehicle_groups import Group
+from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.model.events import Level
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.vehicle_groups import Group
 from service.mission_data import Json
 from service.zenoh_link.payload import plain, strict
 
@@ -46,7 +46,7 @@ def mission_current(held: HeldMission | None) -> Json:
 
 
 def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
-    """Return an event of the journal."""
+    """Return the payload of one event."""
     return {"level": level, "event": name, "facts": {key: _fact(value) for key, value in facts.items()}}
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from world import GroundStation
 
-from bridge.harakiri_check import HarakiriRules
-from bridge.mission_check import check_list
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.list_check import check_list
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult, degrees_to_e7

@@ -19,11 +19,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from world import GroundStation, World, flash_holding
 
-from bridge.fc_session import State
+from bridge.fc.session import State
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.wp_record import WpRecord
-from service.simulator.options import SimOptions
+from simulator.options import SimOptions
 
 OLD_RECORDS = records_of(waypoints(20, seed=77))
 OLD_FLASH = flash_holding(OLD_RECORDS)

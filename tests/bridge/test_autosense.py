@@ -16,12 +16,12 @@ from fake_controllers import (
 )
 from world import World
 
-from bridge.autosense import SPEEDS
-from bridge.fc_session import State
-from bridge.flight_controller import Kind
+from bridge.fc.autosense import SPEEDS
+from bridge.fc.identity import Kind
+from bridge.fc.session import State
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
 BOXES = b"ANGLE;HORIZON;BARO;MAG;CAMSTAB;ARM;GPS HOME;GPS HOLD;"
@@ -196,7 +196,7 @@ def test_armed_it_may_turn_to_mavlink_and_back(protocol: TelemetryProtocol, baud
         world.run(0.5)
         assert thinks_armed(world) is False
         world.run(3)
-    told = [event.name for event in world.journal if event.name.startswith("vehicle.")]
+    told = [event.name for event in world.log_event if event.name.startswith("vehicle.")]
     assert told == ["vehicle.armed", "vehicle.disarmed"] * 2
     world.assert_line_was_clean()
 

@@ -11,7 +11,7 @@ import random
 
 import pytest
 
-from bridge.autosense import SPEEDS, Autosense, Phase
+from bridge.fc.autosense import SPEEDS, Autosense, Phase
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, request
 

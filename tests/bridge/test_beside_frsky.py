@@ -7,7 +7,7 @@ from world import GroundStation, World
 
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
-from service.simulator.options import SimOptions, TelemetryProtocol
+from simulator.options import SimOptions, TelemetryProtocol
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.031, 0.062, 0.093])

@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from world import GroundStation, World
 
-from bridge.fc_session import State
-from bridge.mission_log import Outcome
+from bridge.fc.session import State
+from bridge.model.mission_log import Outcome
 from protocols.mavlink.dialect import messages
 from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionResult
 from protocols.uart_capture import UartEvent, read_capture
-from service.simulator.playback import CapturePlayer
+from simulator.playback import CapturePlayer
 
 CAPTURES = Path(__file__).parents[1] / "captures"
 MISSION = Path(__file__).parents[2] / "examples" / "naze-field.waypoints"

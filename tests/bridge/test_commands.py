@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 from world import GroundStation, World
 
-from bridge.telemetry_table import TELEMETRY
+from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
-from service.simulator.options import Faults
+from simulator.options import Faults
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -348,6 +348,6 @@ def test_a_late_answer_to_one_value_is_not_taken_for_another() -> None:
         world.run(3)
         told = values(station.said())[-1][1]
         assert told == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1]
-        info = world.bridge.desk.dialect
+        info = world.bridge.missions.dialect
         assert info is not None
         assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == told

@@ -14,17 +14,17 @@ import pytest
 from conversations import Download, Upload, clear_message, waypoints
 from world import GroundStation, World
 
-from bridge.autosense import SPEEDS
-from bridge.dialects import _DIALECTS
-from bridge.flight_controller import Kind
-from bridge.mission_check import check_list
-from bridge.mission_desk import Delivery, HeldMission
-from bridge.mission_dialect import LIST_IS_GONE, PushFailure
-from bridge.mission_log import Outcome
-from bridge.verdict import Result
+from bridge.controllers.dialects import _DIALECTS
+from bridge.fc.autosense import SPEEDS
+from bridge.fc.identity import Kind
+from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
+from bridge.missions.list_check import check_list
+from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.model.mission_log import Outcome
+from bridge.model.verdict import Result
 from protocols.mission_item import Command, MissionItem, MissionResult
-from service.simulator.fc_kinds import make_board
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.fc_kinds import make_board
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 #: A push on MultiWii takes 70 ms a record, on a Harakiri in MAVLink mode seconds for its flash.
@@ -181,7 +181,7 @@ def test_rejected_lists_change_nothing_and_say_why(craft: Craft) -> None:
 def test_the_rules_judge_item_by_item_as_they_judge_the_whole(craft: Craft) -> None:
     found: list[Any] = []
     craft.world.bridge.runner.start(
-        craft.world.bridge.desk.rules(), lambda rules, _: found.append(rules), craft.world.now
+        craft.world.bridge.missions.rules(), lambda rules, _: found.append(rules), craft.world.now
     )
     craft.world.wait_until(lambda _: bool(found), 10)
     (rules,) = found

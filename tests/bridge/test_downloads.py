@@ -17,13 +17,13 @@ from conversations import (
 from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from world import Air, GroundStation, World, flash_holding
 
-from bridge.flight_controller import Kind
-from bridge.mission_desk import HeldMission, Refusal
+from bridge.fc.identity import Kind
+from bridge.missions.mission_service import HeldMission, Refusal
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)

@@ -8,11 +8,11 @@ import pytest
 from conversations import waypoints
 from world import GroundStation, World
 
-from bridge.commands import _REFUSED
-from bridge.fc_actions import Outcome
+from bridge.fc.actions import ActionResult
+from bridge.vehicle.commands import _REFUSED
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.frame import MspParser
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS = range(6)
@@ -66,7 +66,7 @@ def test_on_the_ground_it_is_done_once(
     assert results(station) == [ACCEPTED]
     assert done(world) == [action]
     (text,) = station.texts()
-    assert text == (Outcome.DONE if command == STORAGE else Outcome.FREEZES).value
+    assert text == (ActionResult.DONE if command == STORAGE else ActionResult.FREEZES).value
     world.run(20)
     # A calibrated board restarts, and is found again.
     assert world.naze.counters.resets == (action == 205)
@@ -93,7 +93,7 @@ def test_armed_nothing_is_done(command: int, params: tuple[float, ...], action: 
     station.send(long(command, params))
     world.run(0.5)
     assert results(station) == [DENIED]
-    assert station.texts() == [Outcome.ARMED.value]
+    assert station.texts() == [ActionResult.ARMED.value]
     assert done(world) == []
 
 
@@ -119,7 +119,7 @@ def test_without_a_flight_controller_it_is_denied() -> None:
         world.run(0.1)
     assert results(station) == [DENIED] * len(ALL)
     # The same refusal is not said over and over.
-    assert station.texts() == [Outcome.NO_LINK.value]
+    assert station.texts() == [ActionResult.NO_LINK.value]
 
 
 def test_a_board_that_falls_silent_has_failed_and_is_not_told_again() -> None:
@@ -139,7 +139,7 @@ def test_a_board_that_falls_silent_has_failed_and_is_not_told_again() -> None:
     world.run(3)
     assert hung
     assert results(station) == [FAILED]
-    assert station.texts()[0] == Outcome.NO_ANSWER.value
+    assert station.texts()[0] == ActionResult.NO_ANSWER.value
     world.faults.hang = False
     world.run(30)
     assert done(world) == [205]
@@ -173,7 +173,7 @@ def test_never_beside_a_mission() -> None:
     station.send(long(*SAVE[:2]))
     world.run(0.05)
     assert results(station) == [TEMPORARILY_REJECTED]
-    assert station.texts() == [Outcome.OCCUPIED.value]
+    assert station.texts() == [ActionResult.OCCUPIED.value]
     world.wait_until(lambda _: bool(outcome), 5)
     assert outcome[0][0].text.startswith("Mission verified")
     assert done(world) == []
@@ -191,12 +191,12 @@ def test_a_mission_waits_for_it_to_end() -> None:
 
 
 def test_a_sensor_that_is_not_there_is_not_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.simulator.msp_port._SENSORS", 0b1011)
+    monkeypatch.setattr("simulator.msp_port._SENSORS", 0b1011)
     world, station = a_world()
     station.send(long(*COMPASS[:2]))
     world.run(0.3)
     assert results(station) == [DENIED]
-    assert station.texts() == [Outcome.NO_SENSOR.value]
+    assert station.texts() == [ActionResult.NO_SENSOR.value]
     assert done(world) == []
 
 
@@ -238,7 +238,7 @@ def test_nothing_else_that_can_be_commanded_reaches_the_flight_controller() -> N
 
 
 def test_every_text_fits_a_statustext() -> None:
-    texts = [*_REFUSED.values(), *(outcome.value for outcome in Outcome)]
+    texts = [*_REFUSED.values(), *(outcome.value for outcome in ActionResult)]
     assert max(map(len, texts)) <= 50
     assert all(text.isascii() for text in texts)
 

@@ -10,8 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from test_pass_through import Autopilot
 from world import Air, GroundStation, World
 
-from bridge.flight_controller import Kind
-from bridge.guard import LinkAccess
+from bridge.fc.identity import Kind
+from bridge.gcs.guard import LinkAccess
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA, Message
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Timestamps, key_from_passphrase, ticks
@@ -412,7 +412,7 @@ def test_setup_signing_goes_nowhere_whoever_sends_it(access: LinkAccess) -> None
     assert sum(refusals(world).values()) == 2
     assert "Refused: set the key in naze-bridge's settings" in station.texts()
     heard = b"".join(b"".join(each.frames_heard) for each in world.stations.values())
-    for place in (heard, b"".join(taped), repr(world.journal).encode(), repr(world.bridge._config).encode()):
+    for place in (heard, b"".join(taped), repr(world.log_event).encode(), repr(world.bridge._config).encode()):
         assert KEY not in place
         assert KEY.hex().encode() not in place
         assert repr(KEY).encode() not in place

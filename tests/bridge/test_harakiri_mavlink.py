@@ -8,13 +8,13 @@ import pytest
 from conversations import Download, Upload, waypoints
 from world import GroundStation, World
 
-from bridge.flight_controller import Kind
-from bridge.harakiri_check import HarakiriRules
-from bridge.harakiri_mavlink import as_stored
-from bridge.mission_check import check_list
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.mavlink_missions import as_stored
+from bridge.fc.identity import Kind
+from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.wp_record import WpRecord
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 A = MissionResult
 

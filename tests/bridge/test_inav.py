@@ -9,11 +9,11 @@ from conversations import Download, Upload, clear_message, count_message, waypoi
 from fake_inav import FakeInav, FakeMultiwii, lossy
 from world import Air, GroundStation, World
 
-from bridge.flight_controller import Kind
-from bridge.mission_check import check_list
-from bridge.mission_log import Outcome
-from bridge.nav_check import NavRules
-from bridge.nav_rules import inav_profile
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile
+from bridge.fc.identity import Kind
+from bridge.missions.list_check import check_list
+from bridge.model.mission_log import Outcome
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
@@ -174,7 +174,7 @@ def test_armed_in_the_middle_the_last_record_is_never_sent() -> None:
     assert not inav.is_valid
     assert len(inav.records) < 59
     assert any("armed meanwhile" in text for text in station.texts())
-    assert world.bridge.desk.held is None
+    assert world.bridge.missions.held is None
 
 
 def test_a_save_that_fails_is_told() -> None:
@@ -197,7 +197,7 @@ def test_cleared_is_a_single_way_home_and_reads_as_nothing() -> None:
         assert download.run() == []
         assert download.count == 0
         other, other_station = found(inav)
-        assert other.bridge.desk.held is not None
+        assert other.bridge.missions.held is not None
         assert Download(other_station).run() == []
 
 

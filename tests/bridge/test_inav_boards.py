@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions to the simulated INAV and MultiWii (service/simulator), which have every trap of inav.md."""
+"""Missions to the simulated INAV and MultiWii (simulator), which have every trap of inav.md."""
 
 from typing import Any
 
@@ -10,18 +10,18 @@ from hypothesis import strategies as st
 from test_inav import packed, plan
 from world import GroundStation, World
 
-from bridge.flight_controller import Kind
-from bridge.mission_check import check_list
-from bridge.nav_check import NavRules
-from bridge.nav_rules import inav_profile, multiwii_profile
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile, multiwii_profile
+from bridge.fc.identity import Kind
+from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
-from service.simulator.fc_kinds import make_board
-from service.simulator.inav_boxes import BOXES
-from service.simulator.msp_board import MspBoard
-from service.simulator.msp_options import MspOptions
-from service.simulator.options import Faults
+from simulator.fc_kinds import make_board
+from simulator.inav_boxes import BOXES
+from simulator.msp_board import MspBoard
+from simulator.msp_options import MspOptions
+from simulator.options import Faults
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))

@@ -8,11 +8,11 @@ import pytest
 from conversations import Download, records_of, waypoints
 from world import GroundStation, World, flash_holding
 
-from bridge.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
-from bridge.procedure import Send
+from bridge.fc.conversation import Send
+from bridge.fc.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
-from service.simulator.options import Faults, SimOptions
+from simulator.options import Faults, SimOptions
 
 FULL_RECORDS = records_of(waypoints(146, 3))
 FULL_FLASH = flash_holding(FULL_RECORDS)
@@ -38,7 +38,7 @@ def test_a_read_that_meets_the_writing_of_the_configuration(stall_ms: float) -> 
         options = SimOptions(config_write_ms=stall_ms, config_write_delay_ms=draw.random() * 300)
         world = World(options, speeds=(115200,), flash=FULL_FLASH)
         world.wait_ready()
-        world.bridge.desk.held = None
+        world.bridge.missions.held = None
         station = GroundStation(world)
         station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0 + seed, 9))
         world.run(draw.random() * 0.3)
@@ -56,7 +56,7 @@ def test_all_at_once_at_every_speed(baud: int) -> None:
     outcome = world.push(waypoints(60))
     for number in range(40):
         world.after(number * 0.1, lambda: station.send(messages.MAVLink_mission_request_list_message(1, 1, 0)))
-        world.after(number * 0.1, lambda: setattr(world.bridge.desk, "held", None))
+        world.after(number * 0.1, lambda: setattr(world.bridge.missions, "held", None))
     world.wait_until(lambda _: bool(outcome), 60)
     world.run(30)
     assert station.said("MISSION_COUNT")

@@ -6,8 +6,8 @@ import math
 import pytest
 from world import GroundStation, World
 
-from bridge.stations import EXPIRY_S
-from bridge.telemetry_table import TELEMETRY, Row
+from bridge.gcs.stations import EXPIRY_S
+from bridge.vehicle.telemetry_table import TELEMETRY, Row
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flight controllers that answer anything at all: every procedure ends, nothing raises, nothing is believed."""
+"""Flight controllers that answer anything at all: every conversation ends, nothing raises, nothing is believed."""
 
 import random
 
@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from world import GroundStation, World
 
-from bridge.flight_controller import Kind
+from bridge.fc.identity import Kind
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify

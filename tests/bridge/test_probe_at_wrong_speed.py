@@ -11,12 +11,12 @@ import itertools
 import pytest
 from world import World
 
-from bridge.autosense import PROBE, SPEEDS
-from bridge.msp_link import RESYNC
+from bridge.fc.autosense import PROBE, SPEEDS
+from bridge.fc.msp_link import RESYNC
 from protocols.msp.hazards import HAZARDS, RUN_LENGTH, is_clean
-from service.simulator.line import garble
-from service.simulator.options import SimOptions
-from service.simulator.traps import HazardWatch
+from simulator.line import garble
+from simulator.options import SimOptions
+from simulator.traps import HazardWatch
 
 SENT = sorted(set(SPEEDS))
 #: What a CLI takes for `serial_baudrate`, and what other boards use.

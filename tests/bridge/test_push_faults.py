@@ -12,13 +12,13 @@ import pytest
 from conversations import records_of, waypoints
 from world import World, flash_holding
 
-from bridge.mission_desk import ARMED, Delivery, HeldMission, Refusal
-from bridge.mission_dialect import PushFailure
+from bridge.missions.fc_mission_store import PushFailure
+from bridge.missions.mission_service import ARMED, Delivery, HeldMission, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from service.simulator.naze import Power
-from service.simulator.options import Faults, SimOptions
+from simulator.naze import Power
+from simulator.options import Faults, SimOptions
 
 OLD = waypoints(20, seed=77)
 NEW = waypoints(146, seed=5)
@@ -139,7 +139,7 @@ def test_a_pull_over_a_bad_line_is_right_or_refused() -> None:
         outcome = world.push(NEW)
         world.wait_until(lambda _, outcome=outcome: bool(outcome), 5)  # type: ignore[misc]
         world.faults.bit_error_rate = 1e-3
-        world.bridge.desk.held = None
+        world.bridge.missions.held = None
         answers: list[HeldMission | Refusal] = []
         world.bridge.pull_locally(answers.append, world.now)
         world.wait_until(lambda _, answers=answers: bool(answers), 60)  # type: ignore[misc]

@@ -14,11 +14,11 @@ from conversations import records_of, waypoints
 from world import World
 
 from protocols.mission_item import MissionItem, MissionResult
-from service.simulator.compiled_core import load_core
-from service.simulator.flash import ERASED
-from service.simulator.mission_slots import flash_size
-from service.simulator.naze import Power, SimulatedNaze
-from service.simulator.options import Faults, SimOptions
+from simulator.compiled_core import load_core
+from simulator.flash import ERASED
+from simulator.mission_slots import flash_size
+from simulator.naze import Power, SimulatedNaze
+from simulator.options import Faults, SimOptions
 
 OLD, NEW = waypoints(20, seed=77), waypoints(146, seed=5)
 OLD_RECORDS, NEW_RECORDS = records_of(OLD), records_of(NEW)

@@ -7,7 +7,7 @@ import pytest
 from conversations import Download, Upload, count_message, item_message, records_of, waypoints
 from world import Air, GroundStation, World
 
-from bridge.stations import EXPIRY_S, MOVED_S
+from bridge.gcs.stations import EXPIRY_S, MOVED_S
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
 

@@ -8,9 +8,9 @@ from conversations import Upload, waypoints
 from fastcrc.crc16 import mcrf4xx
 from world import GroundStation, World
 
-from bridge.ground import split_text
-from bridge.station import Peer
-from bridge.stations import EXPIRY_S, MAX_PEERS
+from bridge.gcs.ground import split_text
+from bridge.gcs.station import Peer
+from bridge.gcs.stations import EXPIRY_S, MAX_PEERS
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mission_item import MissionResult
 
@@ -244,7 +244,7 @@ def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
     world = start()
     station = GroundStation(world)
     draw = random.Random(seed)
-    understood = [msgid for msgid in CRC_EXTRA if world.bridge._inbox.understands(msgid)]
+    understood = [msgid for msgid in CRC_EXTRA if world.bridge._router.understands(msgid)]
     assert len(understood) > 15
     for number in range(1500):
         msgid = draw.choice(understood)

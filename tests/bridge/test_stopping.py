@@ -7,13 +7,13 @@ import pytest
 from conversations import Upload, count_message, records_of, waypoints
 from world import Air, GroundStation, World, flash_holding
 
-from bridge.mission_desk import Refusal
-from bridge.mission_dialect import PushFailure
-from bridge.mission_log import Outcome
+from bridge.missions.fc_mission_store import PushFailure
+from bridge.missions.mission_service import Refusal
+from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
-from service.simulator.options import Faults, SimOptions
+from simulator.options import Faults, SimOptions
 
 OLD, NEW = waypoints(20, seed=77), waypoints(146, seed=5)
 

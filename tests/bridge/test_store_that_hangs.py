@@ -4,7 +4,7 @@
 from conversations import Download, Upload, records_of, waypoints
 from world import GroundStation, World, flash_holding
 
-from bridge.mission_log import Outcome
+from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionResult
 
 NEVER = 1e9

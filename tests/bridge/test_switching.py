@@ -7,10 +7,10 @@ import pytest
 from conversations import Upload, records_of, waypoints
 from world import GroundStation, World
 
-from bridge.flight_controller import Kind
+from bridge.fc.identity import Kind
 from protocols.mission_item import MissionResult
-from service.simulator.naze import SimulatedNaze
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.naze import SimulatedNaze
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 READABLE = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600]
 

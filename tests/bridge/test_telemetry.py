@@ -10,13 +10,13 @@ import pytest
 from conversations import waypoints
 from world import GroundStation, World
 
-from bridge.poll_schedule import POLLS
-from bridge.telemetry_table import TELEMETRY
+from bridge.fc.poll_schedule import POLLS
+from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
-from service.simulator.flight import FlightState
-from service.simulator.options import Faults, SimOptions
+from simulator.flight import FlightState
+from simulator.options import Faults, SimOptions
 
 m = messages
 ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)

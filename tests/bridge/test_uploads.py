@@ -19,11 +19,11 @@ from conversations import (
 from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from world import Air, GroundStation, World, flash_holding
 
-from bridge.mission_log import Outcome
-from bridge.mission_upload import Phase
+from bridge.model.mission_log import Outcome
+from bridge.vehicle.mission_upload import Phase
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionItem, MissionResult
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)
@@ -751,7 +751,7 @@ def test_a_machine_that_wakes_late_loses_nothing(late_s: float) -> None:
 
 
 def test_a_station_that_hammers_fills_nothing() -> None:
-    """The world asserts that the queue of procedures stays short; nothing else may grow without bound either."""
+    """The world asserts that the queue of conversations stays short; nothing else may grow without bound either."""
     world, station = holding()
     for number in range(3000):
         station.send(count_message(5 + number % 90))

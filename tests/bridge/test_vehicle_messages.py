@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from bridge import vehicle_messages as make
-from bridge.flight_controller import FlightController, Kind
-from bridge.telemetry_table import TELEMETRY
-from bridge.vehicle_state import VehicleState
+from bridge.fc.identity import FlightController, Kind
+from bridge.model.vehicle_state import VehicleState
+from bridge.vehicle import vehicle_messages as make
+from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame

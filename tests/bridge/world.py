@@ -3,7 +3,7 @@
 
 Nothing here sleeps, opens a socket or reads a clock. What holds for everything that the bridge does is asserted at
 every step: whole frames without hazard bytes to the flight controller, deadlines that lie ahead, a bounded queue of
-procedures.
+conversations.
 """
 
 import heapq
@@ -13,16 +13,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bridge.autosense import SPEEDS
 from bridge.bridge import Bridge, BridgeConfig
-from bridge.fc_session import State
-from bridge.flight_controller import Kind
-from bridge.guard import LinkAccess
-from bridge.journal import Level
-from bridge.mission_log import ArrivedMission, Conclusion, Outcome
-from bridge.pass_through import MAX_DATAGRAM_SIZE
-from bridge.procedure import Conclude, Recall, Save, StoreEffect
-from bridge.station import Peer
+from bridge.fc.autosense import SPEEDS
+from bridge.fc.conversation import Conclude, Recall, Save, StoreEffect
+from bridge.fc.identity import Kind
+from bridge.fc.session import State
+from bridge.gcs.guard import LinkAccess
+from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
+from bridge.gcs.station import Peer
+from bridge.model.events import Level
+from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
@@ -30,20 +30,20 @@ from protocols.mission_record import identify
 from protocols.msp.frame import MspParser
 from protocols.msp.hazards import is_clean
 from protocols.wp_record import WpRecord, unpack_records
-from service.simulator.flash import ERASED, NorFlash
-from service.simulator.line import garble
-from service.simulator.mission_slots import MissionSlots, flash_size
-from service.simulator.naze import SimulatedNaze
-from service.simulator.options import Faults, SimOptions
+from simulator.flash import ERASED, NorFlash
+from simulator.line import garble
+from simulator.mission_slots import MissionSlots, flash_size
+from simulator.naze import SimulatedNaze
+from simulator.options import Faults, SimOptions
 
-#: More procedures than this never wait: a ground station that hammers the bridge must not fill its memory.
+#: More conversations than this never wait: a ground station that hammers the bridge must not fill its memory.
 MAX_QUEUED = 12
 _MAX_TICKS_AT_ONCE = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What the bridge's journal was told, and when."""
+    """What the bridge logged, and when."""
 
     at: float
     level: Level
@@ -120,7 +120,7 @@ class World:
             options, self.faults, None if flash is None else memoryview(bytearray(flash))
         )
         self.store = MemoryStore()
-        self.journal: list[Event] = []
+        self.log_event: list[Event] = []
         self.stations: dict[Peer, GroundStation] = {}
         #: What goes over the wire to the flight controller, as the bridge wrote it: time, speed, bytes.
         self.written: list[tuple[float, int | None, bytes]] = []
@@ -221,7 +221,7 @@ class World:
         return tuple(unpack_records(self.naze.stored))
 
     def events(self, name: str) -> list[Event]:
-        return [event for event in self.journal if event.name == name]
+        return [event for event in self.log_event if event.name == name]
 
     def assert_line_was_clean(self) -> None:
         """No trap, no ring lapped. Holds wherever the line itself is sound."""
@@ -297,7 +297,7 @@ class World:
         self.after(self.store.delay_s, answer)
 
     def _note(self, level: Level, event: str, /, **facts: object) -> None:
-        self.journal.append(Event(self.now, level, event, facts))
+        self.log_event.append(Event(self.now, level, event, facts))
 
 
 def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None) -> bytes:

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import MissionItem
 from protocols.wp_record import unpack_record
-from service.check import check
+from service.cli.check import check
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FIELD, PLAN, LONG = (EXAMPLES / name for name in ("naze-field.waypoints", "naze-field.plan", "long-146.waypoints"))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from programs import run_naze_bridge
 
-from service.connection import GcsAddress, SerialFc, SimulatedFc
+from service.links.connection import GcsAddress, SerialFc, SimulatedFc
 from service.settings import load_settings
 
 

@@ -18,7 +18,7 @@ from plan import judge, plain_plan, records_of
 from programs import Board, run_naze_bridge
 
 from protocols.mission_file import write_qgc_wpl
-from service.cli import main
+from service.cli.main import main
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

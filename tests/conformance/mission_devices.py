@@ -5,12 +5,12 @@ from typing import Protocol
 
 from c_core import PowerCut, library
 
-from service.simulator.compiled_core import load_core
-from service.simulator.flash import ERASED, NorFlash, PowerCutError
-from service.simulator.mission_commands import MissionCommands
-from service.simulator.mission_slots import StoredConfig, flash_size
-from service.simulator.missions import Board, BootMissions
-from service.simulator.options import Faults, SimOptions
+from simulator.compiled_core import load_core
+from simulator.flash import ERASED, NorFlash, PowerCutError
+from simulator.mission_commands import MissionCommands
+from simulator.mission_slots import StoredConfig, flash_size
+from simulator.missions import Board, BootMissions
+from simulator.options import Faults, SimOptions
 
 
 class Device(Protocol):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's procedures over bad lines to the firmware's own C core, in simulated time."""
+"""The daemon's conversations over bad lines to the firmware's own C core, in simulated time."""
 
 import random
 from collections.abc import Callable
@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from c_core import CCore, PowerCut
 
-from bridge.harakiri import HarakiriMissions
-from bridge.mission_dialect import PushResult
-from bridge.msp_link import MspLink
-from bridge.procedure import Procedure, StoreEffect
-from bridge.runner import Runner
+from bridge.controllers.harakiri.mission_store import HarakiriMissions
+from bridge.fc.conversation import Conversation, StoreEffect
+from bridge.fc.msp_link import MspLink
+from bridge.fc.runner import Runner
+from bridge.missions.fc_mission_store import PushResult
 from protocols.mission_record import pack_records
 from protocols.msp.mission import MissionCommand, decode_info
 from protocols.wp_record import WpRecord
@@ -83,17 +83,17 @@ class Line:
         self._board_ms = 0
         self._up_at = 0.0
 
-    def run(self, procedure: Procedure[Any]) -> Any:
-        """Run a procedure to its end."""
+    def run(self, conversation: Conversation[Any]) -> Any:
+        """Run a conversation to its end."""
         results: list[Any] = []
-        self._runner.start(procedure, lambda result, _: results.append(result), self.now)
+        self._runner.start(conversation, lambda result, _: results.append(result), self.now)
         for _ in range(200_000):
             for frame in self._link.take_output():
                 self._carry(frame, to_board=True)
             if results:
                 return results[0]
             self._step()
-        raise AssertionError("the procedure does not end")
+        raise AssertionError("the conversation does not end")
 
     def push(self, records: tuple[WpRecord, ...]) -> PushResult[WpRecord]:
         result = self.run(self._missions.push(records, lambda _: None))

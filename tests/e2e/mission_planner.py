@@ -68,7 +68,7 @@ class MissionPlanner:
         self._sees_mavlink_2 = False
         self._codec = messages.MAVLink(None, srcSystem=SYSID, srcComponent=COMPID)
         self._codec.robust_parsing = True
-        self._inbox: deque[Message] = deque()
+        self._router: deque[Message] = deque()
         self._heartbeat_due = time.monotonic()
         self.vehicle: tuple[int, int] | None = None
         self.capabilities = 0
@@ -113,8 +113,8 @@ class MissionPlanner:
         """Yield what comes to the loop that waits, until `seconds` of its own time are over."""
         deadline = time.monotonic() + seconds * self._pace
         while True:
-            while self._inbox:
-                yield self._inbox.popleft()
+            while self._router:
+                yield self._router.popleft()
             if not self._receive(deadline):
                 return
 
@@ -156,7 +156,7 @@ class MissionPlanner:
             case "MISSION_ACK" if self._is_for_me(message):
                 self._answer = MissionResult(message.type)
         if self._random.random() >= self._appetite:
-            self._inbox.append(message)
+            self._router.append(message)
 
     def _is_for_me(self, message: Message) -> bool:
         sender = (message.get_srcSystem(), message.get_srcComponent())

@@ -5,9 +5,9 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bridge.harakiri_check import HarakiriRules
-from bridge.mission_check import check_list
-from bridge.verdict import Verdict
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.list_check import check_list
+from bridge.model.verdict import Verdict
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, degrees_to_e7
 from protocols.mission_record import pack_records

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from plan import PlanRow
 
-from service.control import ControlError, ask_daemon
+from service.api import ControlError, ask_daemon
 
 #: Seconds after which something that must come at all counts as not coming.
 PATIENCE = 20.0
@@ -90,7 +90,7 @@ class Program:
 
 
 class Board(Program):
-    """`naze-bridge sim`. `line` obeys its control socket (service/simulator/control.py).
+    """`naze-bridge sim`. `line` obeys its control socket (simulator/control.py).
 
     `fc` is what a daemon's --fc takes. With `tcp` that is a socket instead of a pseudo-terminal.
     """

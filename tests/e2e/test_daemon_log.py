@@ -15,9 +15,9 @@ from programs import NAZE_BRIDGE, REPOSITORY, free_port, until
 from structlog.testing import capture_logs
 
 from service import daemon as daemon_module
-from service.connection import SerialFc
-from service.control import ControlError, ask_daemon
+from service.api import ControlError, ask_daemon
 from service.daemon import Daemon
+from service.links.connection import SerialFc
 from service.settings import Settings
 
 LOSSES = {"fc.lost", "fc.port_lost"}

@@ -13,10 +13,10 @@ from plan import HOME, PlanRow, stored_fields, waypoint
 from programs import until
 from test_mavsdk import fields, raw_items, refusal_of, vehicle_at
 
-from bridge.mission_check import check_list
-from bridge.nav_check import NavRules
-from bridge.nav_rules import inav_profile
-from bridge.verdict import Verdict
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile
+from bridge.missions.list_check import check_list
+from bridge.model.verdict import Verdict
 from protocols.mission_item import Command, Frame
 from protocols.msp.nav import NavRecord
 

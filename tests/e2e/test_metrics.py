@@ -10,8 +10,8 @@ from programs import free_port, until
 from prometheus_client.parser import text_string_to_metric_families
 
 from protocols.mission_item import MissionResult
-from service.connection import parse_fc, parse_gcs
 from service.daemon import Daemon
+from service.links.connection import parse_fc, parse_gcs
 from service.metrics import Metrics
 from service.settings import Settings
 

@@ -10,7 +10,7 @@ from mission_planner import MissionPlanner, UploadFailed
 from plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, single, waypoint
 from programs import until
 
-from bridge.verdict import Result
+from bridge.model.verdict import Result
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, MissionResult
 

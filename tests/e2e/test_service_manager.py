@@ -19,9 +19,9 @@ from programs import PATIENCE, free_port, run_naze_bridge, until
 from programs import Daemon as DaemonProgram
 
 from protocols.mission_item import MissionResult
-from service.connection import parse_fc, parse_gcs
 from service.daemon import Daemon
 from service.lifecycle import run_until_signal
+from service.links.connection import parse_fc, parse_gcs
 from service.notify import Notifier
 from service.settings import Settings
 

@@ -13,7 +13,7 @@ from plan import plain_plan
 from programs import until
 from zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
 
-from service.zenoh_link.keys import COMMANDS, KEYS, Delivery
+from service.zenoh_link.keys import COMMANDS, KEYS, SampleDelivery
 from service.zenoh_link.schema_files import FOLDER, schemas, text
 
 MISSION = (Path(__file__).parents[2] / "examples" / "naze-field.waypoints").read_bytes()
@@ -82,5 +82,5 @@ def test_all_that_is_said_is_as_published(start: Starter, encoding: str) -> None
         until(lambda: reader.of("mission/report"), "a report")
         encodings = {"json": zenoh.Encoding.APPLICATION_JSON, "cbor": zenoh.Encoding.APPLICATION_CBOR}
         found = check_all(reader, encodings[encoding])
-    published = {each.suffix for each in KEYS if each.delivery is not Delivery.REPLY} - {"mavlink/in"}
+    published = {each.suffix for each in KEYS if each.delivery is not SampleDelivery.REPLY} - {"mavlink/in"}
     assert found == published

@@ -5,14 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.fleet.push import FleetPush
-from service.fleet.vehicle import Bridge
+from service.fleet.vehicle import BridgeState
 
 ACCEPTED = {"result": {"ack": "MAV_MISSION_ACCEPTED", "text": "Mission verified: 3 records", "findings": []}}
 NAMES = ("a", "b", "c")
 
 
 def push_to(*names: str) -> FleetPush:
-    return FleetPush.of(names, [Bridge(name, f"{number}") for number, name in enumerate(names)])
+    return FleetPush.of(names, [BridgeState(name, f"{number}") for number, name in enumerate(names)])
 
 
 def test_one_that_fails_leaves_the_others_alone() -> None:
@@ -47,7 +47,7 @@ def test_silence_has_three_reasons() -> None:
 
 
 def test_a_name_that_two_bridges_use_gets_nothing() -> None:
-    fleet = FleetPush.of(["a", "b"], [Bridge("a", "1"), Bridge("a", "2"), Bridge("b", "3")])
+    fleet = FleetPush.of(["a", "b"], [BridgeState("a", "1"), BridgeState("a", "2"), BridgeState("b", "3")])
     assert fleet.waiting == ["b"]
     assert "several bridges" in str(fleet.vehicles["a"].error)
 

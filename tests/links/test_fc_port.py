@@ -12,8 +12,8 @@ import pytest
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
-from service.connection import SerialFc
-from service.fc_port import FcPort
+from service.links.connection import SerialFc
+from service.links.fc_port import FcPort
 
 PATIENCE_S = 20.0
 _writer = FrameWriter(1, 1)

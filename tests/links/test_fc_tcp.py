@@ -7,8 +7,8 @@ import socket
 import struct
 import termios
 
-from service.connection import TcpFc
-from service.fc_port import FcPort
+from service.links.connection import TcpFc
+from service.links.fc_port import FcPort
 
 PATIENCE_S = 20.0
 

@@ -8,13 +8,13 @@ from contextlib import ExitStack
 
 import pytest
 
-from bridge.station import Peer
+from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
-from service import tcp_link, udp_link
-from service.connection import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs
-from service.fc_device import device_opener
-from service.gcs_links import GcsLink, open_link
+from service.links import tcp_link, udp_link
+from service.links.connection import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs
+from service.links.fc_device import device_opener
+from service.links.gcs_links import GcsLink, open_link
 
 FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
-from service.send_queue import SendQueue
+from service.links.send_queue import SendQueue
 
 LIMIT = 600
 

@@ -8,13 +8,13 @@ import socket
 
 import pytest
 
-from bridge.station import Peer
+from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from service import tcp_link
-from service.connection import GcsAddress
-from service.tcp_link import TcpLink
+from service.links import tcp_link
+from service.links.connection import GcsAddress
+from service.links.tcp_link import TcpLink
 
 
 class Listener:

@@ -22,7 +22,7 @@ from protocols.msp.mission import (
     unmask,
 )
 from protocols.wp_record import RECORD_SIZE, WpRecord, unpack_record, unpack_records
-from service.simulator.msp_port import MspReceiver
+from simulator.msp_port import MspReceiver
 
 #: Bytes of which a third are hazards: what a mission would have to be made of to be hard to send.
 hard_bytes = st.one_of(st.sampled_from(sorted(HAZARDS)), st.integers(0, 255))

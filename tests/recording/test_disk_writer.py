@@ -5,7 +5,7 @@ import threading
 
 from structlog.testing import capture_logs
 
-from service.disk_writer import DiskWriter
+from service.recording.disk_writer import DiskWriter
 
 ROOM = 1 << 20
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from structlog.testing import capture_logs
 
+from service.recording.tlog_folder import LEFT_FREE, TlogFolder
 from service.settings import TlogLimits
-from service.tlog_folder import LEFT_FREE, TlogFolder
 
 NOON = datetime(2026, 11, 21, 12, 0, 0, tzinfo=UTC)
 RECORD_SIZE = 100

@@ -9,8 +9,8 @@ import pytest
 
 from protocols.mavlink.dialect import messages
 from protocols.tlog import read_tlog
+from service.recording.tlog_recorder import TlogRecorder
 from service.settings import TlogLimits
-from service.tlog_recorder import TlogRecorder
 
 HOUR_NS = 3600 * 10**9
 PATIENCE_S = 20.0

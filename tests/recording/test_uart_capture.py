@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from structlog.testing import capture_logs
 
 from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, read_capture
-from service.uart_recorder import UartFileError, UartRecorder
+from service.recording.uart_recorder import UartFileError, UartRecorder
 
 HEADER = capture_header("2026-11-21T06:33:06Z")
 SPEEDS = st.sampled_from([None, 1200, 57600, 115200])

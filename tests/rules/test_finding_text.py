@@ -6,9 +6,9 @@ import math
 import pytest
 from rule_items import LAND, ROI, SET_ROI, SPEED, TAKEOFF, TIME, WAYPOINT, item, mission
 
-from bridge.finding import DROPPED, Finding
-from bridge.harakiri_check import HarakiriRules
-from bridge.mission_check import check_list
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.list_check import check_list
+from bridge.model.finding import DROPPED, Finding
 
 
 @pytest.mark.parametrize(

@@ -27,10 +27,10 @@ from rule_items import (
     mission,
 )
 
-from bridge.finding import CLEARED, DROPPED, REJECTED
-from bridge.harakiri_check import HarakiriCheck, HarakiriRules
-from bridge.mission_check import check_count, check_list
-from bridge.verdict import Result, Verdict
+from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
+from bridge.missions.list_check import check_count, check_list
+from bridge.model.finding import CLEARED, DROPPED, REJECTED
+from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.wp_record import WpCommand, WpRecord
 

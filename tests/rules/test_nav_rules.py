@@ -10,12 +10,12 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from test_rule_properties import degrees, numbers
 
-from bridge.finding import DROPPED, REJECTED
-from bridge.mission_check import check_count, check_list
-from bridge.nav_check import NavRules
-from bridge.nav_items import home_item, items_from_records
-from bridge.nav_rules import ENDLESS_S, inav_profile, multiwii_profile
-from bridge.verdict import Result, Verdict
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.items import home_item, items_from_records
+from bridge.controllers.nav.rules import ENDLESS_S, inav_profile, multiwii_profile
+from bridge.missions.list_check import check_count, check_list
+from bridge.model.finding import DROPPED, REJECTED
+from bridge.model.verdict import Result, Verdict
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_from_float_message
 from protocols.mission_item import Command, MissionItem, MissionResult

@@ -8,11 +8,11 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from rule_oracle import expected
 
-from bridge.finding import DROPPED, REJECTED
-from bridge.harakiri_check import HarakiriCheck, HarakiriRules
-from bridge.harakiri_records import items_from_records
-from bridge.mission_check import check_list
-from bridge.verdict import Result
+from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
+from bridge.controllers.harakiri.records import items_from_records
+from bridge.missions.list_check import check_list
+from bridge.model.finding import DROPPED, REJECTED
+from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
 from protocols.wp_record import WpRecord, unpack_record
 

@@ -13,10 +13,10 @@ from structlog.testing import capture_logs
 
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, key_from_passphrase, ticks
-from service.connection import GcsAddress, SimulatedFc
+from service.links.connection import GcsAddress, SimulatedFc
+from service.links.signing_state import FILE_NAME, SigningState
+from service.links.write_access import WriteAccess
 from service.settings import Settings
-from service.signing_state import FILE_NAME, SigningState
-from service.write_access import WriteAccess
 
 KEY = key_from_passphrase("a passphrase")
 NOON = 1_795_262_400.0
@@ -110,7 +110,7 @@ async def test_a_ground_station_that_is_far_ahead_is_followed_and_not_forgotten(
 async def test_it_is_written_once_a_minute_and_not_at_all_while_nothing_is_signed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.signing_state._LOOK_S", 0.001)
+    monkeypatch.setattr("service.links.signing_state._LOOK_S", 0.001)
     pi = Pi(tmp_path)
     state = pi.boot()
     await until_written(pi, 1)

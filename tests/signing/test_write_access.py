@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from bridge.station import Peer
+from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
-from service.connection import AddressError
+from service.links.connection import AddressError
+from service.links.write_access import WriteAccess, read_key
 from service.settings import SettingsError, load_settings
-from service.write_access import WriteAccess, read_key
 
 WORDS = "correct horse"
 LINK = "udpin:0.0.0.0:14550"

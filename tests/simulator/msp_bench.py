@@ -7,10 +7,10 @@ from operator import xor
 from typing import NamedTuple
 
 from protocols.msp.frame import request
-from service.simulator.fc_kinds import make_board
-from service.simulator.msp_options import MspOptions
-from service.simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint, unpack_waypoint
-from service.simulator.options import Faults
+from simulator.fc_kinds import make_board
+from simulator.msp_options import MspOptions
+from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint, unpack_waypoint
+from simulator.options import Faults
 
 SET_WP, WP, GETINFO, SAVE, LOAD = 209, 118, 20, 19, 18
 

@@ -18,8 +18,8 @@ from protocols.msp.mission import (
     encode_read,
 )
 from protocols.wp_record import WpRecord
-from service.simulator.naze import SimulatedNaze
-from service.simulator.options import Faults, SimOptions
+from simulator.naze import SimulatedNaze
+from simulator.options import Faults, SimOptions
 
 BOOT_SECONDS = 2.0
 

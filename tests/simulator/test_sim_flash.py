@@ -3,8 +3,8 @@
 
 import pytest
 
-from service.simulator.flash import PAGE_SIZE, FlashError, NorFlash, PowerCutError
-from service.simulator.options import Faults
+from simulator.flash import PAGE_SIZE, FlashError, NorFlash, PowerCutError
+from simulator.options import Faults
 
 
 def make() -> tuple[NorFlash, Faults, bytearray]:

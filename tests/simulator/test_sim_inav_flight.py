@@ -9,8 +9,8 @@ from math import hypot
 import pytest
 from msp_bench import MspBench, waypoint
 
-from service.simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
-from service.simulator.options import Faults
+from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
+from simulator.options import Faults
 
 NAV_WP = 1 << 13
 NAV, RTH, NONE = 3, 2, 0

@@ -6,8 +6,8 @@ import struct
 import pytest
 from msp_bench import MspBench, waypoint
 
-from service.simulator.msp_options import MspOptions
-from service.simulator.options import Faults
+from simulator.msp_options import MspOptions
+from simulator.options import Faults
 
 VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")
 LENGTHS = {

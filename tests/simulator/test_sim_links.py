@@ -19,8 +19,8 @@ from naze_bench import mission
 from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
-from service.simulator.naze import SimulatedNaze
-from service.simulator.pipe_link import SimLink
+from simulator.naze import SimulatedNaze
+from simulator.pipe_link import SimLink
 
 IDENT = request(100)
 PATIENCE = 10.0
@@ -66,7 +66,7 @@ class Simulator:
     def __init__(self, directory: Path, *options: str) -> None:
         self.link = directory / "naze"
         self._control = directory / "control"
-        program = "from service.simulator.command import sim; sim()"
+        program = "from simulator.command import sim; sim()"
         arguments = ["--link", str(self.link), "--control", str(self._control), *options]
         self.process = subprocess.Popen([sys.executable, "-c", program, *arguments], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
@@ -211,7 +211,7 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
 def test_what_is_in_the_way_is_named(tmp_path: Path, options: list[str], complaint: str) -> None:
     (tmp_path / "file").write_text("mine")
     (tmp_path / "link").symlink_to("file")
-    program = "from service.simulator.command import sim; sim()"
+    program = "from simulator.command import sim; sim()"
     arguments = [option.format(tmp_path) for option in options]
     done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -240,7 +240,7 @@ def test_a_link_that_another_one_has_taken_over_is_left_to_it(start: Callable[..
 def test_a_second_one_leaves_the_link_of_a_running_one_alone(start: Callable[..., Simulator], tmp_path: Path) -> None:
     first = start()
     with serial.Serial(str(first.link), 115200, timeout=PATIENCE, exclusive=True) as port:
-        program = "from service.simulator.command import sim; sim()"
+        program = "from simulator.command import sim; sim()"
         second = subprocess.run(
             [sys.executable, "-c", program, "--link", str(first.link)], capture_output=True, text=True, timeout=PATIENCE
         )

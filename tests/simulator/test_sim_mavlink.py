@@ -10,8 +10,8 @@ from pymavlink.dialects.v20 import common as mavlink2
 
 from protocols.msp.frame import request
 from protocols.msp.mission import encode_radius
-from service.simulator.firmware import Protocol
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.firmware import Protocol
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 IDENT = request(100)
 

@@ -31,8 +31,8 @@ from protocols.msp.mission import (
     encode_read,
 )
 from protocols.wp_record import WpRecord
-from service.simulator.naze import Power
-from service.simulator.options import Faults, SimOptions
+from simulator.naze import Power
+from simulator.options import Faults, SimOptions
 
 NOTHING = ListIdentity(0, 0)
 LINE_RATE = 115200 / 10

@@ -10,8 +10,8 @@ from naze_bench import BOOT_SECONDS, Bench
 
 from protocols.msp.frame import Direction, request
 from protocols.msp.mission import INFO_REQUEST
-from service.simulator.naze import Power
-from service.simulator.options import Faults, SimOptions
+from simulator.naze import Power
+from simulator.options import Faults, SimOptions
 
 IDENT = request(100)
 LENGTHS = {

@@ -6,9 +6,9 @@ import struct
 import pytest
 from msp_bench import SET_WP, MspBench, waypoint
 
-from service.simulator.msp_options import MspOptions
-from service.simulator.nav_waypoint import FLAG_LAST, Action
-from service.simulator.options import Faults
+from simulator.msp_options import MspOptions
+from simulator.nav_waypoint import FLAG_LAST, Action
+from simulator.options import Faults
 
 LENGTHS = {
     100: 7,

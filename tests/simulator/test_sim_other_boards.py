@@ -16,7 +16,7 @@ import serial
 from msp_bench import Frame, take_apart, waypoint
 
 from protocols.msp.frame import request
-from service.simulator.nav_waypoint import FLAG_LAST, Action
+from simulator.nav_waypoint import FLAG_LAST, Action
 
 PATIENCE = 20.0
 REPOSITORY = Path(__file__).resolve().parents[2]

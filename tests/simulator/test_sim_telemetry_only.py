@@ -6,7 +6,7 @@ import struct
 import pytest
 from msp_bench import MspBench, waypoint
 
-from service.simulator.options import Faults
+from simulator.options import Faults
 
 LENGTHS = {
     "betaflight": {1: 3, 2: 4, 3: 3, 101: 24, 102: 18, 105: 32, 106: 18, 107: 5, 108: 6, 109: 6, 110: 9},

@@ -7,9 +7,9 @@ from naze_bench import BOOT_SECONDS, Bench, mission
 from protocols.mission_record import identify
 from protocols.msp.frame import request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
-from service.simulator.firmware import Protocol
-from service.simulator.naze import Power
-from service.simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.firmware import Protocol
+from simulator.naze import Power
+from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 IDENT = request(100)
 # A frame that ends in one 0D: size 1 ^ command 108 ^ payload 60.

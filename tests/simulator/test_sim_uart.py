@@ -4,9 +4,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.simulator.line import garble
-from service.simulator.options import Counters
-from service.simulator.uart import Uart
+from simulator.line import garble
+from simulator.options import Counters
+from simulator.uart import Uart
 
 BAUD = 115200
 BYTE = 10 / BAUD

@@ -112,6 +112,6 @@ def test_a_power_cut_before_the_first_commit_is_no_damage(tmp_path: Path, size: 
 
 def test_commits_are_synced_to_the_disk(tmp_path: Path) -> None:
     with open_store(tmp_path / "missions.db", now=0.0).store as store:
-        (journal,) = store._connection.execute("PRAGMA journal_mode").fetchone()
+        (log_event,) = store._connection.execute("PRAGMA journal_mode").fetchone()
         (synchronous,) = store._connection.execute("PRAGMA synchronous").fetchone()
-    assert (journal, synchronous) == ("wal", 2)
+    assert (log_event, synchronous) == ("wal", 2)

@@ -7,9 +7,9 @@ from dataclasses import asdict, replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.harakiri_check import HarakiriRules
-from bridge.mission_check import check_list
-from bridge.verdict import Result
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.list_check import check_list
+from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
 from service.mission_data import to_json
 from service.web.comparison import MAX_ROWS, difference, sent_and_stored, stored_mission

@@ -8,7 +8,7 @@ from functools import partial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.web.door import (
+from service.web.connection_limit import (
     MAX_CONNECTIONS,
     MAX_FROM_ONE,
     MAX_IN_A_SECOND,

@@ -4,9 +4,8 @@
 import math
 from dataclasses import dataclass, replace
 
-from bridge.finding import CLEARED, DROPPED, Finding, Rejection, reject
-from bridge.harakiri_records import items_from_records
-from bridge.harakiri_rules import (
+from bridge.controllers.harakiri.records import items_from_records
+from bridge.controllers.harakiri.rules import (
     NO_ROI_KNOWN,
     NOSE_ON_ROI,
     UNUSED,
@@ -15,7 +14,7 @@ from bridge.harakiri_rules import (
     Range,
     command_rules,
 )
-from bridge.mission_check import (
+from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
     ListCheck,
@@ -24,7 +23,8 @@ from bridge.mission_check import (
     refuse_frame,
     refuse_position,
 )
-from bridge.verdict import Result, Verdict
+from bridge.model.finding import CLEARED, DROPPED, Finding, Rejection, reject
+from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.wp_record import WpCommand, WpRecord
 

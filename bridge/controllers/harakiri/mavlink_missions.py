@@ -4,7 +4,7 @@
 It takes MISSION_ITEM only, with coordinates in single precision, one item at a time, and forgets a transfer after
 500 ms. What is then in its memory, a part of the list, it writes a second later. But any error that it finds meanwhile
 makes it load the old list again: so after a failure it is sent an item that is out of sequence. The traps
-of its serial port are minded by `bridge.mavlink_sender`; an item that cannot be sent safely refuses the list.
+of its serial port are minded by `bridge.fc.mavlink_sender`; an item that cannot be sent safely refuses the list.
 
 A written list is read back, item by item. Single precision holds a coordinate to 0.4 m.
 """
@@ -13,11 +13,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from bridge.harakiri_check import HarakiriRules
-from bridge.harakiri_records import items_from_records
-from bridge.harakiri_rules import MAV_COMMANDS
-from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from bridge.procedure import Await, LinkLost, Procedure, Stopped, Transmit, pause
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.records import items_from_records
+from bridge.controllers.harakiri.rules import MAV_COMMANDS
+from bridge.fc.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
+from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.float32 import neighbours, single
 from protocols.mavlink.codec import MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
@@ -70,7 +70,7 @@ class HarakiriMavlinkMissions:
         """Harakiri's default: its own value cannot be asked for here."""
         return self._rules.wp_radius_cm
 
-    def report(self) -> Procedure[StoreReport | None]:
+    def report(self) -> Conversation[StoreReport | None]:
         """Tell whether it would take a list; what it holds is not known without reading it."""
         yield from pause(0.0)
         armed = self._is_armed()
@@ -78,7 +78,7 @@ class HarakiriMavlinkMissions:
             return None
         return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules, None)
 
-    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult[WpRecord]]:
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult[WpRecord]]:
         """Write the list and read it back."""
         if self._is_armed() is not False:
             # The firmware itself does not look: it would take a list, or lose its own, in flight.
@@ -112,7 +112,7 @@ class HarakiriMavlinkMissions:
             failure = PushFailure.UNCERTAIN
         return PushResult(failure)
 
-    def pull(self) -> Procedure[tuple[WpRecord, ...] | None]:
+    def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
         """Read the list that is there."""
         return (yield from self._read(self._known or ()))
 
@@ -128,12 +128,12 @@ class HarakiriMavlinkMissions:
         """Return the same number: each record is an item, home too."""
         return number if number < len(records) else 0
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
         """Harakiri knows the parameter by another name and scale; it is not set from here."""
         yield from pause(0.0)
         return None
 
-    def _write(self, items: Sequence[Message], progress: PushProgress) -> Procedure[None]:
+    def _write(self, items: Sequence[Message], progress: PushProgress) -> Conversation[None]:
         """Send the list up to its MISSION_ACK."""
         answer = yield from self._ask(m.MAVLink_mission_count_message(*_TARGET, len(items)), 0)
         for seq, item in enumerate(items):
@@ -147,7 +147,7 @@ class HarakiriMavlinkMissions:
             progress(seq + 1)
         raise _Failed(PushFailure.NO_ANSWER)
 
-    def _ask(self, message: Message, expected: int) -> Procedure[MavlinkFrame]:
+    def _ask(self, message: Message, expected: int) -> Conversation[MavlinkFrame]:
         """Send, and wait for the request for item `expected` or a MISSION_ACK. A refusal raises."""
         for _ in range(_TRIES):
             is_safe: bool = yield Transmit(pack(message))
@@ -168,7 +168,7 @@ class HarakiriMavlinkMissions:
                     return answer
         raise _Failed(PushFailure.NO_ANSWER)
 
-    def _restore(self) -> Procedure[bool]:
+    def _restore(self) -> Conversation[bool]:
         """Have the old list loaded again; tell whether it said so."""
         nowhere = replace(items_from_records([_HOME])[0], seq=_NO_SEQ)
         for _ in range(3):
@@ -178,7 +178,7 @@ class HarakiriMavlinkMissions:
                 return True
         return False
 
-    def _read(self, likely: tuple[WpRecord, ...]) -> Procedure[tuple[WpRecord, ...] | None]:
+    def _read(self, likely: tuple[WpRecord, ...]) -> Conversation[tuple[WpRecord, ...] | None]:
         """Read the list; as `likely` if it reads as that one would. An empty one is not answered at all."""
         for _ in range(_MAX_BEGINS):
             count = yield from self._question(m.MAVLink_mission_request_list_message(*_TARGET), _COUNT)
@@ -190,10 +190,10 @@ class HarakiriMavlinkMissions:
             if items == [_as_read(seq, item) for seq, item in enumerate(items_from_records(likely))]:
                 return likely
             return tuple(_record(item) for item in items)
-        # As many questions stay unanswered by an empty store; a line that is gone ends the procedure.
+        # As many questions stay unanswered by an empty store; a line that is gone ends the conversation.
         return () if count is None else None
 
-    def _read_items(self, count: int) -> Procedure[list[MissionItem] | None]:
+    def _read_items(self, count: int) -> Conversation[list[MissionItem] | None]:
         items: list[MissionItem] = []
         for seq in range(count):
             message = m.MAVLink_mission_request_message(*_TARGET, seq)
@@ -206,7 +206,7 @@ class HarakiriMavlinkMissions:
             items.append(MissionItem(seq, decoded.command, decoded.frame, *params, lat_e7, lon_e7, decoded.z))
         return items
 
-    def _question(self, message: Message, answer_id: int, seq: int | None = None) -> Procedure[MavlinkFrame | None]:
+    def _question(self, message: Message, answer_id: int, seq: int | None = None) -> Conversation[MavlinkFrame | None]:
         for _ in range(_TRIES):
             is_safe: bool = yield Transmit(pack(message))
             if not is_safe:

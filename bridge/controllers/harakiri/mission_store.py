@@ -4,10 +4,10 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 
-from bridge.harakiri_check import HarakiriRules
-from bridge.harakiri_records import items_from_records
-from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from bridge.procedure import LinkLost, Procedure, Stopped, ask, ask_surely, pause, receive, send
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.records import items_from_records
+from bridge.fc.conversation import Conversation, LinkLost, Stopped, ask, ask_surely, pause, receive, send
+from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
@@ -69,7 +69,7 @@ class HarakiriMissions:
         """gps_wp_radius as last heard, cm."""
         return self.info.wp_radius_cm
 
-    def report(self) -> Procedure[StoreReport | None]:
+    def report(self) -> Conversation[StoreReport | None]:
         """Ask the flight controller for its state; None if it does not answer."""
         info = yield from self._read_info()
         if info is None:
@@ -84,7 +84,7 @@ class HarakiriMissions:
         rules = HarakiriRules(info.capacity, info.wp_radius_cm, self._takeoff_max_m)
         return StoreReport(state, rules, info.stored)
 
-    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Procedure[PushResult[WpRecord]]:
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult[WpRecord]]:
         """Put the list there: BEGIN, CHUNKs in a window, COMMIT; proven by the checksum over the flash."""
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER
@@ -116,7 +116,7 @@ class HarakiriMissions:
             return PushResult((yield from self._look_what_is_stored(wanted, failure)))
         return PushResult(failure)
 
-    def pull(self) -> Procedure[tuple[WpRecord, ...] | None]:
+    def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
         """Read the whole list and compare its checksum; once more if the list changed meanwhile."""
         for _ in range(2):
             info = yield from self._read_info()
@@ -140,7 +140,7 @@ class HarakiriMissions:
         """Return the same number: each record is an item, home too."""
         return number if number < len(records) else 0
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
         """Set gps_wp_radius, 0..2000 cm; INFO tells what came of it, and not a late answer to another value."""
         frame = ext.encode_radius(wp_radius_cm)
         waited_s = 0.0
@@ -159,12 +159,12 @@ class HarakiriMissions:
         self.info = info
         return info.wp_radius_cm
 
-    def _read_info(self) -> Procedure[Info | None]:
+    def _read_info(self) -> Conversation[Info | None]:
         # Of the radius in it every waypoint gets its own, and its checksum tells what is stored.
         reply = yield from ask_surely(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
         return None if reply is None else ext.decode_info(reply.payload)
 
-    def _begin(self, wanted: ListIdentity) -> Procedure[Progress]:
+    def _begin(self, wanted: ListIdentity) -> Conversation[Progress]:
         waited_s = 0.0
         while True:
             reply = yield from ask(ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, exclusive=True)
@@ -181,7 +181,7 @@ class HarakiriMissions:
                 raise _again(answer.status)
             return answer
 
-    def _transfer(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Procedure[None]:
+    def _transfer(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Conversation[None]:
         """Keep the window full and send COMMIT right behind the last chunk: the line never waits for an answer.
 
         After a loss go back to the first record that the flight controller lacks. To a COMMIT that comes before the
@@ -242,7 +242,7 @@ class HarakiriMissions:
             committing = False
             most = max(most // 2, 1)
 
-    def _look_what_is_stored(self, wanted: ListIdentity, failure: PushFailure) -> Procedure[PushFailure | None]:
+    def _look_what_is_stored(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
         """Ask whether COMMIT was done after all; only silence leaves it uncertain."""
         try:
             info = yield from self._read_info()
@@ -252,12 +252,12 @@ class HarakiriMissions:
             return PushFailure.UNCERTAIN
         return None if info.stored == wanted else failure
 
-    def _is_stored(self, records: Sequence[WpRecord]) -> Procedure[bool]:
+    def _is_stored(self, records: Sequence[WpRecord]) -> Conversation[bool]:
         """Compare record by record: "the same list" is a claim by checksum only."""
         held = yield from self.pull()
         return held == tuple(records)
 
-    def _read(self, info: Info) -> Procedure[tuple[WpRecord, ...] | None]:
+    def _read(self, info: Info) -> Conversation[tuple[WpRecord, ...] | None]:
         """Read all records, two requests in flight, each asked again until it is there."""
         step = min(info.read_records, _READ_RECORDS)
         total = info.stored.count

@@ -4,7 +4,7 @@
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from bridge.harakiri_rules import MAV_COMMANDS
+from bridge.controllers.harakiri.rules import MAV_COMMANDS
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.wp_record import WpRecord
 

@@ -8,7 +8,7 @@ the contents stay as they came.
 
 from collections.abc import Sequence
 
-from bridge.ground import Ground
+from bridge.gcs.ground import Ground
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame

@@ -3,9 +3,9 @@
 
 from contextlib import suppress
 
-from bridge.mission_dialect import PushFailure
-from bridge.nav_missions import NOTHING, Failed, NavMissions
-from bridge.procedure import LinkLost, Procedure, ask
+from bridge.controllers.nav.mission_store import NOTHING, Failed, NavMissions
+from bridge.fc.conversation import Conversation, LinkLost, ask
+from bridge.missions.fc_mission_store import PushFailure
 from protocols.msp.frame import Direction, request
 from protocols.msp.nav import INFO_SIZE, LOAD_REQUEST, SAVE_REQUEST, Nav, NavInfo, NavRecord, decode_info
 
@@ -16,7 +16,7 @@ _SAVE_PATIENCE = 4
 class InavMissions(NavMissions):
     """The mission store of one INAV. Record 1 wipes what is there, and no list is valid before its last record."""
 
-    def pull(self) -> Procedure[tuple[NavRecord, ...] | None]:
+    def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
         """Read the list that is there. One that is not whole is none; so is the single RTH of a cleared one."""
         info = yield from self._info()
         if info is None:
@@ -33,14 +33,14 @@ class InavMissions(NavMissions):
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
         return list(enumerate(wanted, 1))
 
-    def _prove(self, count: int) -> Procedure[None]:
+    def _prove(self, count: int) -> Conversation[None]:
         info = yield from self._info()
         if info is None:
             raise Failed(PushFailure.NO_ANSWER)
         if not info.is_valid or info.count != count:
             raise Failed(PushFailure.REFUSED, is_final=False)
 
-    def _keep(self) -> Procedure[None]:
+    def _keep(self) -> Conversation[None]:
         """SAVE, and look again: the flight controller stands still meanwhile, and may have restarted."""
         before = yield from self._info()
         if before is None:
@@ -56,11 +56,11 @@ class InavMissions(NavMissions):
         if reply is None or reply.direction is Direction.ERROR or last is None:
             raise Failed(PushFailure.NOT_SAVED)
 
-    def _still_holds(self, records: tuple[NavRecord, ...]) -> Procedure[bool]:
+    def _still_holds(self, records: tuple[NavRecord, ...]) -> Conversation[bool]:
         info = yield from self._info()
         return _has(info, records)
 
-    def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
+    def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Have it LOAD what was saved last: the old list, unless somebody else wrote one and did not save it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
@@ -68,7 +68,7 @@ class InavMissions(NavMissions):
             return bool(before) and _has(info, before or ())
         return False
 
-    def _info_after_save(self) -> Procedure[NavInfo | None]:
+    def _info_after_save(self) -> Conversation[NavInfo | None]:
         """Ask for longer than its flash takes to be written."""
         for _ in range(_SAVE_PATIENCE):
             info = yield from self._info()
@@ -76,7 +76,7 @@ class InavMissions(NavMissions):
                 return info
         return None
 
-    def _info(self) -> Procedure[NavInfo | None]:
+    def _info(self) -> Conversation[NavInfo | None]:
         reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE)
         return None if reply is None else decode_info(reply.payload)
 

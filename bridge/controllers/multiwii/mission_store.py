@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii 2.4 NAV: each record goes to EEPROM at once, the list ends with the first that says so (docs/inav.md)."""
 
-from bridge.nav_missions import NOTHING, NavMissions
-from bridge.procedure import Procedure
+from bridge.controllers.nav.mission_store import NOTHING, NavMissions
+from bridge.fc.conversation import Conversation
 from protocols.msp.nav import LAST, NavRecord
 
 #: Flags of what is no record: damaged in EEPROM, or not told because it navigates.
@@ -14,7 +14,7 @@ class MultiwiiMissions(NavMissions):
 
     _stores_slowly = True
 
-    def pull(self) -> Procedure[tuple[NavRecord, ...] | None]:
+    def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
         """Read up to the last record. A list without one is none; so is the single RTH of a cleared one."""
         records: list[NavRecord] = []
         known: tuple[NavRecord, ...] = ()
@@ -36,5 +36,5 @@ class MultiwiiMissions(NavMissions):
         first, *rest = enumerate(wanted, 1)
         return [(1, NOTHING[0]), *rest, first] if rest else [first]
 
-    def _keep(self) -> Procedure[None]:
+    def _keep(self) -> Conversation[None]:
         yield from ()

@@ -5,20 +5,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from bridge.finding import DROPPED, Rejection, reject
-from bridge.mission_check import (
-    SEA_LEVEL_FRAMES,
-    TERRAIN_FRAMES,
-    ListCheck,
-    given,
-    missing_coordinate,
-    refuse_frame,
-    refuse_position,
-)
-from bridge.nav_items import home_item, items_from_records
-from bridge.nav_jumps import Jumps
-from bridge.nav_landing import placed_landing
-from bridge.nav_rules import (
+from bridge.controllers.nav.items import home_item, items_from_records
+from bridge.controllers.nav.jumps import Jumps
+from bridge.controllers.nav.landing import placed_landing
+from bridge.controllers.nav.leg_speed import LegSpeed
+from bridge.controllers.nav.rules import (
     HEADING,
     LANDS,
     NAV_RULES,
@@ -28,10 +19,19 @@ from bridge.nav_rules import (
     Height,
     NavProfile,
     NavRule,
-    Whole,
+    WholeRange,
 )
-from bridge.nav_speed import LegSpeed
-from bridge.verdict import Result, Verdict
+from bridge.missions.list_check import (
+    SEA_LEVEL_FRAMES,
+    TERRAIN_FRAMES,
+    ListCheck,
+    given,
+    missing_coordinate,
+    refuse_frame,
+    refuse_position,
+)
+from bridge.model.finding import DROPPED, Rejection, reject
+from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord
@@ -232,7 +232,7 @@ class NavCheck(ListCheck):
             self._note(item, "frame", item.frame, int(Frame.GLOBAL_RELATIVE_ALT), "height taken as relative")
         return alt_cm, 0
 
-    def _fit(self, item: MissionItem, name: str, value: float, allowed: Whole) -> int:
+    def _fit(self, item: MissionItem, name: str, value: float, allowed: WholeRange) -> int:
         stored = allowed.fit(value)
         if stored != (0 if math.isnan(value) else value):
             truncated = math.isfinite(value) and stored == math.trunc(value)

@@ -8,7 +8,7 @@ none of them.
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
-from bridge.nav_rules import ENDLESS_S, LEAST_SPEED_CMS, ROI_COMMANDS
+from bridge.controllers.nav.rules import ENDLESS_S, LEAST_SPEED_CMS, ROI_COMMANDS
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
 

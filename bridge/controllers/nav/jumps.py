@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from bridge.finding import Note, Rejection, reject
+from bridge.model.finding import Note, Rejection, reject
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import LEGS, NavRecord
 

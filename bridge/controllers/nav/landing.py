@@ -4,8 +4,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bridge.finding import Note
-from bridge.mission_check import missing_coordinate
+from bridge.missions.list_check import missing_coordinate
+from bridge.model.finding import Note
 from protocols.mission_item import Frame, MissionItem
 from protocols.msp.nav import LEGS, NavRecord
 

@@ -4,10 +4,10 @@
 import math
 from dataclasses import dataclass
 
-from bridge.finding import Note
-from bridge.mission_check import given
-from bridge.nav_items import AS_SET, GROUND_SPEED
-from bridge.nav_rules import LEAST_SPEED_CMS
+from bridge.controllers.nav.items import AS_SET, GROUND_SPEED
+from bridge.controllers.nav.rules import LEAST_SPEED_CMS
+from bridge.missions.list_check import given
+from bridge.model.finding import Note
 from protocols.float32 import is_single
 from protocols.mission_item import MissionItem
 

@@ -10,11 +10,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from bridge.mission_dialect import PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from bridge.nav_check import NavRules
-from bridge.nav_items import home_item, item_seqs, items_from_records
-from bridge.nav_rules import NavProfile
-from bridge.procedure import LinkLost, Procedure, Stopped, ask, pause, receive, send
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
+from bridge.controllers.nav.rules import NavProfile
+from bridge.fc.conversation import Conversation, LinkLost, Stopped, ask, pause, receive, send
+from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_item import MissionItem
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
@@ -79,12 +79,12 @@ class NavMissions(ABC):
         """It is a setting of its own that is neither asked for nor set from here."""
         return None
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
         """Set nothing."""
         yield from pause(0.0)
         return None
 
-    def report(self) -> Procedure[StoreReport | None]:
+    def report(self) -> Conversation[StoreReport | None]:
         """Tell whether it would take a list; what it holds is not known without reading it."""
         armed = yield from self._ask_armed()
         if armed is None:
@@ -107,7 +107,7 @@ class NavMissions(ABC):
         """Return the number of the item that record `number` is shown as; 0: there is none."""
         return item_seqs(records)[number - 1] if 1 <= number <= len(records) else 0
 
-    def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Procedure[PushResult[NavRecord]]:
+    def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult[NavRecord]]:
         """Put the list there and prove it; after a failure put back what was there, if that is known."""
         before, self._known = self._known, None
         # What to say if the link is lost now.
@@ -145,7 +145,7 @@ class NavMissions(ABC):
             return PushResult(failed.failure)
 
     @abstractmethod
-    def pull(self) -> Procedure[tuple[NavRecord, ...] | None]:
+    def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
         """Read the list that is there; None if that fails."""
 
     @abstractmethod
@@ -153,20 +153,20 @@ class NavMissions(ABC):
         """Return what is written, in order, with its number: at no moment can half a list be flown."""
 
     @abstractmethod
-    def _keep(self) -> Procedure[None]:
+    def _keep(self) -> Conversation[None]:
         """Do what has to be done after the last record; raises Failed."""
 
-    def _still_holds(self, records: tuple[NavRecord, ...]) -> Procedure[bool]:
+    def _still_holds(self, records: tuple[NavRecord, ...]) -> Conversation[bool]:
         """Tell, as far as that takes no time, whether nobody else has written another list since this one was read."""
         yield from ()
         return True
 
-    def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
+    def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Put the old list back if that takes no time; tell whether it is there."""
         yield from ()
         return False
 
-    def _write_surely(self, wanted: tuple[NavRecord, ...], progress: PushProgress) -> Procedure[None]:
+    def _write_surely(self, wanted: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[None]:
         for begins in range(1, _MAX_BEGINS + 1):
             try:
                 yield from self._write(wanted, progress)
@@ -175,7 +175,7 @@ class NavMissions(ABC):
                 if failed.is_final or begins == _MAX_BEGINS:
                     raise
 
-    def _write(self, wanted: tuple[NavRecord, ...], progress: PushProgress) -> Procedure[None]:
+    def _write(self, wanted: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[None]:
         order = self._order(wanted)
         for done, (number, record) in enumerate(order, 1):
             if done == len(order) > 1:
@@ -196,11 +196,11 @@ class NavMissions(ABC):
             progress(done)
         yield from self._prove(len(wanted))
 
-    def _prove(self, count: int) -> Procedure[None]:
+    def _prove(self, count: int) -> Conversation[None]:
         """Make sure of what no single record tells; raises Failed."""
         yield from ()
 
-    def _compare(self, number: int, record: NavRecord) -> Procedure[None]:
+    def _compare(self, number: int, record: NavRecord) -> Conversation[None]:
         """Read what was written; once more if it differs: the checksum of 8 bits lets some damage through."""
         for _ in range(2):
             held = yield from self.read(number)
@@ -210,7 +210,7 @@ class NavMissions(ABC):
                 return
         raise Failed(PushFailure.REFUSED, is_final=False)
 
-    def read(self, number: int) -> Procedure[NavRecord | None]:
+    def read(self, number: int) -> Conversation[NavRecord | None]:
         """Read one record; answers that are about another one (home is asked for by telemetry) are left alone."""
         for _ in range(_TRIES):
             yield from send(encode_read_wp(number), Nav.WP, WP_SIZE)
@@ -223,7 +223,7 @@ class NavMissions(ABC):
                     return answer[1]
         return None
 
-    def _restore(self, before: tuple[NavRecord, ...] | None) -> Procedure[bool]:
+    def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Write the old list again, if it is known and there was one; tell whether it is there."""
         if not before or self._craft.is_armed():
             return False
@@ -235,14 +235,14 @@ class NavMissions(ABC):
         self._known = before
         return True
 
-    def _make_sure_disarmed(self) -> Procedure[None]:
+    def _make_sure_disarmed(self) -> Conversation[None]:
         armed = yield from self._ask_armed()
         if armed is None:
             raise Failed(PushFailure.NO_ANSWER)
         if armed:
             raise Failed(PushFailure.ARMED)
 
-    def _ask_armed(self) -> Procedure[bool | None]:
+    def _ask_armed(self) -> Conversation[bool | None]:
         reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
         status = None if reply is None else decode_status(reply.payload)
         return None if status is None else bool(status.box_flags & self._craft.arm_mask)

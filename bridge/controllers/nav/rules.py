@@ -79,8 +79,8 @@ class Height(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Whole:
-    """Whole numbers that a parameter can hold."""
+class WholeRange:
+    """The whole numbers that a parameter can hold."""
 
     low: int
     high: int
@@ -92,11 +92,11 @@ class Whole:
         return min(max(whole, self.low), self.high)
 
 
-UNUSED = Whole(0, 0, "not used")
-HOLD = Whole(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
-LANDS = Whole(0, 1, "1 = land at home")
-HEADING = Whole(0, 359, "degrees 0..359")
-REPEATS = Whole(-1, 32767, "repeats -1..32767")
+UNUSED = WholeRange(0, 0, "not used")
+HOLD = WholeRange(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
+LANDS = WholeRange(0, 1, "1 = land at home")
+HEADING = WholeRange(0, 359, "degrees 0..359")
+REPEATS = WholeRange(-1, 32767, "repeats -1..32767")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +104,13 @@ class NavRule:
     """One row. p1: what the first parameter can hold. position: needed; if False, none is kept."""
 
     name: str
-    p1: Whole
+    p1: WholeRange
     position: bool
     height: Height
 
 
 _ROI = NavRule("ROI", UNUSED, True, Height.FLOWN)
-#: Commands that become a record of their own with nothing but these fields. `bridge.nav_check` has the others:
+#: Commands that become a record of their own with nothing but these fields. `check` in this package has the others:
 #: CONDITION_YAW, DO_SET_ROI_NONE, DO_JUMP, DO_CHANGE_SPEED.
 NAV_RULES: Mapping[int, NavRule] = {
     Command.NAV_WAYPOINT: NavRule("WAYPOINT", HOLD, True, Height.FLOWN),

@@ -14,9 +14,9 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_record import identify
 from protocols.wp_record import WpCommand, WpRecord, unpack_records
-from service.simulator.flash import NorFlash
-from service.simulator.mission_slots import MissionSlots
-from service.simulator.missions import Board
+from simulator.flash import NorFlash
+from simulator.mission_slots import MissionSlots
+from simulator.missions import Board
 
 _TIMEOUT_S = 0.5
 _WRITE_DELAY_S = 1.0

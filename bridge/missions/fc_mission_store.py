@@ -2,7 +2,7 @@
 """The seam between missions and the flight controllers that store them.
 
 A dialect is one kind of flight controller: by which rules a list is judged, how it is put there, proven and read back.
-`bridge.harakiri` and `bridge.harakiri_mavlink` are two.
+`bridge.controllers.harakiri.mission_store` and `bridge.controllers.harakiri.mavlink_missions` are two.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Generic, Protocol
 
-from bridge.mission_check import MissionRules
-from bridge.procedure import Procedure
-from bridge.verdict import RecordT
+from bridge.fc.conversation import Conversation
+from bridge.missions.list_check import MissionRules
+from bridge.model.verdict import RecordT
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity
 
@@ -73,26 +73,26 @@ class PushResult(Generic[RecordT]):
 PushProgress = Callable[[int], None]
 
 
-class MissionDialect(Protocol[RecordT]):
+class FcMissionStore(Protocol[RecordT]):
     """What the bridge asks of a flight controller that stores missions."""
 
     @property
     def wp_radius_cm(self) -> int | None:
         """The least hit radius as last heard, cm; None if it cannot be known or set."""
 
-    def report(self) -> Procedure[StoreReport | None]:
+    def report(self) -> Conversation[StoreReport | None]:
         """Ask the flight controller; None if it does not answer."""
 
-    def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Procedure[PushResult[RecordT]]:
+    def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult[RecordT]]:
         """Put the list there and prove it. The empty list clears."""
 
-    def pull(self) -> Procedure[tuple[RecordT, ...] | None]:
+    def pull(self) -> Conversation[tuple[RecordT, ...] | None]:
         """Read the list that is there, and make sure that it was read right; None if that fails."""
 
     def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         """Return what a ground station reads of a list, home first; `sent_as` is remembered from when it was sent."""
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Procedure[int | None]:
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
         """Set gps_wp_radius, 0..2000 cm; the value in force, None if there was no answer."""
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
@@ -103,4 +103,4 @@ class MissionDialect(Protocol[RecordT]):
 
 
 #: Whatever the present flight controller is.
-AnyDialect = MissionDialect[Any]
+AnyFcMissionStore = FcMissionStore[Any]
