@@ -55,7 +55,15 @@ def test_what_is_installed_has_its_example(tmp_path: Path) -> None:
     for package in project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
         shutil.copytree(REPOSITORY / package, tmp_path / package)
     ended = subprocess.run(
-        [sys.executable, "-c", "from service.cli import main; main()", "demo", "--once", "--port", str(free_port())],
+        [
+            sys.executable,
+            "-c",
+            "from service.cli.main import main; main()",
+            "demo",
+            "--once",
+            "--port",
+            str(free_port()),
+        ],
         cwd=tmp_path,
         capture_output=True,
         text=True,

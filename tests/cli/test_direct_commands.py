@@ -138,7 +138,7 @@ def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, command: list[st
 def test_a_daemon_does_not_load_what_only_commands_use() -> None:
     """On a Pi with 512 MB each library counts."""
     script = (
-        "import sys, click; from service.cli import main; main.get_command(click.Context(main), 'run');"
+        "import sys, click; from service.cli.main import main; main.get_command(click.Context(main), 'run');"
         "print(*sorted({'rich', 'pygments', 'zenoh', 'starlette', 'prometheus_client'} & set(sys.modules)))"
     )
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

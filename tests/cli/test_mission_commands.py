@@ -199,7 +199,7 @@ def test_no_daemon(tmp_path: Path) -> None:
 def test_a_daemon_that_belongs_to_somebody_else(daemon: Daemon) -> None:
     """Nobody may look into root's directory; who is not root is kept out of a directory of his own."""
     as_nobody = (
-        "import os; from service.cli import main; import service.mission_commands;"
+        "import os; from service.cli.main import main; import service.cli.mission_commands;"
         "os.geteuid() or os.setuid(65534); main(prog_name='naze-bridge')"
     )
     daemon.state_dir.chmod(0)

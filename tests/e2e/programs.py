@@ -19,7 +19,7 @@ from service.api import ControlError, ask_daemon
 #: Seconds after which something that must come at all counts as not coming.
 PATIENCE = 20.0
 REPOSITORY = Path(__file__).resolve().parents[2]
-NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')"]
+NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')"]
 T = TypeVar("T")
 
 

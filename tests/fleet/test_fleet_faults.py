@@ -23,7 +23,7 @@ from protocols.mission_file import write_qgc_wpl
 #: 146 records at this speed take some seconds: time enough for something to go wrong.
 _SLOW_BAUD = 9600
 _COUNT = 146
-_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')", "fleet"]
+_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')", "fleet"]
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from simulator.nav_waypoint import FLAG_LAST, Action
 
 PATIENCE = 20.0
 REPOSITORY = Path(__file__).resolve().parents[2]
-NAZE_BRIDGE = [sys.executable, "-c", "from service.cli import main; main(prog_name='naze-bridge')"]
+NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')"]
 T = TypeVar("T")
 
 
