@@ -13,7 +13,7 @@ from math import inf
 
 import serial
 
-from bridge.fc.poll_schedule import POLLS, Poll
+from bridge.line.poll_schedule import POLLS, Poll
 from bridge.vehicle.telemetry_table import TELEMETRY
 
 

@@ -23,7 +23,7 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import BenchmarkError, free_udp_port, simulated_naze
 from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.fc.conversation import Conversation, Send
+from bridge.line.conversation import Conversation, Send
 from bridge.missions.fc_mission_store import PushResult
 from bridge.missions.list_check import check_list
 from protocols.msp.mission import MissionCommand

@@ -17,17 +17,17 @@ from functools import partial
 from math import inf
 from typing import Any
 
-from bridge.controllers.dialects import Surroundings, dialect_of
 from bridge.controllers.harakiri.relay import HarakiriRelay
+from bridge.controllers.table import Surroundings, dialect_of
 from bridge.fc.actions import FcActions
-from bridge.fc.conversation import Conversation, StoreEffect
-from bridge.fc.identity import FlightController, Kind
-from bridge.fc.runner import Runner
+from bridge.fc.flight_controller import FlightController, Kind
 from bridge.fc.session import Autopilot, FcSession, State
 from bridge.gcs.ground import Ground, Tap
 from bridge.gcs.guard import Guard, GuardRefusal, LinkAccess, denial
 from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity, Station
+from bridge.line.conversation import Conversation, StoreEffect
+from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import Delivery, HeldMission, MissionService, Refusal

@@ -12,8 +12,8 @@ import structlog
 
 from bridge.bridge import Bridge, BridgeConfig
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.conversation import StoreEffect
 from bridge.gcs.station import Peer
+from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission

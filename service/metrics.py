@@ -12,8 +12,8 @@ from prometheus_client import CollectorRegistry, Counter, Histogram, generate_la
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from bridge.fc.round_trips import BOUNDS_S, RoundTrips
 from bridge.fc.session import State
+from bridge.line.round_trips import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission

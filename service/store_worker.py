@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import structlog
 
-from bridge.fc.conversation import Conclude, Recall, Save, StoreEffect
+from bridge.line.conversation import Conclude, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission
 from protocols.mission_record import identify, pack_records
 from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store

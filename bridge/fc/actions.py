@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from bridge.fc.conversation import Conversation, ask
-from bridge.fc.runner import Runner
 from bridge.fc.session import FcSession
+from bridge.line.conversation import Conversation, ask
+from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, request

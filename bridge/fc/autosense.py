@@ -15,8 +15,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from bridge.fc.msp_link import RESYNC, RESYNC_REPLY_SIZE
-from bridge.fc.pending_replies import PendingReplies
+from bridge.line.msp_link import RESYNC, RESYNC_REPLY_SIZE
+from bridge.line.pending_replies import PendingReplies
 from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.commands import Msp

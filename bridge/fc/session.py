@@ -5,13 +5,13 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 
 from bridge.fc.autosense import Autosense, Found, Spoken
-from bridge.fc.frsky_line import FrskyLine
-from bridge.fc.identity import FlightController, Kind, identify_msp
-from bridge.fc.mavlink_line import MavlinkLine
-from bridge.fc.msp_link import MspLink
-from bridge.fc.pending_replies import PendingReplies
-from bridge.fc.poll_schedule import PollSchedule
-from bridge.fc.runner import Runner
+from bridge.fc.flight_controller import FlightController, Kind, identify_msp
+from bridge.line.frsky_line import FrskyLine
+from bridge.line.mavlink_line import MavlinkLine
+from bridge.line.msp_link import MspLink
+from bridge.line.pending_replies import PendingReplies
+from bridge.line.poll_schedule import PollSchedule
+from bridge.line.runner import Runner
 from bridge.model.events import EventLog, Incidents
 from bridge.model.vehicle_state import VehicleState
 from protocols.frsky import FRSKY_SPEED

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Generic, Protocol
 
-from bridge.fc.conversation import Conversation
+from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
 from bridge.model.verdict import RecordT
 from protocols.mission_item import MissionItem

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bridge.fc.conversation import Conversation, LinkLost, Stopped, conclude, pause, recall, save
-from bridge.fc.identity import FlightController, Kind
+from bridge.fc.flight_controller import FlightController, Kind
+from bridge.line.conversation import Conversation, LinkLost, Stopped, conclude, pause, recall, save
 from bridge.missions.fc_mission_store import LIST_IS_GONE, AnyFcMissionStore, PushFailure, StoreReport, StoreState
 from bridge.missions.list_check import MissionRules
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome

@@ -5,7 +5,7 @@ A craft that arms may change protocol and speed, and is searched for a second or
 reads warnings out loud.
 """
 
-from bridge.fc.identity import FlightController, Kind
+from bridge.fc.flight_controller import FlightController, Kind
 from bridge.gcs.station import Severity
 
 #: Switching takes less.

@@ -4,8 +4,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridge.fc.runner import Runner
 from bridge.gcs.station import Post, Severity, Station
+from bridge.line.runner import Runner
 from bridge.missions.mission_service import ARMED, HeldMission, MissionService, Refusal
 from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION
 from protocols.mavlink.dialect import messages

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from bridge.fc.runner import Runner
 from bridge.gcs.station import Peer, Post, Severity, Station
+from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import ListCheck, check_count
 from bridge.missions.mission_service import ARMED, Delivery, MissionService, Refusal

@@ -3,8 +3,8 @@
 
 import math
 
-from bridge.fc.runner import Runner
 from bridge.gcs.station import Post, Severity, Station
+from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.mission import MAX_RADIUS_CM

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.fc.session import FcSession, State
 from bridge.gcs.ground import Ground
 from bridge.missions.mission_service import MissionService

@@ -17,7 +17,7 @@ from fake_controllers import (
 from world import World
 
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.fc.session import State
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request

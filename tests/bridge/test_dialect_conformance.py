@@ -14,9 +14,9 @@ import pytest
 from conversations import Download, Upload, clear_message, waypoints
 from world import GroundStation, World
 
-from bridge.controllers.dialects import _DIALECTS
+from bridge.controllers.table import _DIALECTS
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import Delivery, HeldMission

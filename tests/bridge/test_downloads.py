@@ -17,7 +17,7 @@ from conversations import (
 from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from world import Air, GroundStation, World, flash_holding
 
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.missions.mission_service import HeldMission, Refusal
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionResult

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from test_pass_through import Autopilot
 from world import Air, GroundStation, World
 
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.gcs.guard import LinkAccess
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA, Message

@@ -10,7 +10,7 @@ from world import GroundStation, World
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.mavlink_missions import as_stored
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.wp_record import WpRecord

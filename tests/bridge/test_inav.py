@@ -11,7 +11,7 @@ from world import Air, GroundStation, World
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.missions.list_check import check_list
 from bridge.model.mission_log import Outcome
 from protocols.mavlink.dialect import messages

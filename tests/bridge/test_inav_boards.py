@@ -12,7 +12,7 @@ from world import GroundStation, World
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser

@@ -8,8 +8,8 @@ import pytest
 from conversations import Download, records_of, waypoints
 from world import GroundStation, World, flash_holding
 
-from bridge.fc.conversation import Send
-from bridge.fc.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
+from bridge.line.conversation import Send
+from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from simulator.options import Faults, SimOptions

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from world import GroundStation, World
 
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify

@@ -10,7 +10,7 @@ from fake_controllers import QuietLine
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from world import GroundStation, World
 
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from protocols.mavlink.frame import MavlinkSplitter
 
 KEY = sha256(b"a passphrase").digest()

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.fc.msp_link import MAX_OUTSTANDING_BYTES, MspLink
-from bridge.fc.poll_schedule import POLLS, PollSchedule
+from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, MspLink
+from bridge.line.poll_schedule import POLLS, PollSchedule
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 

@@ -12,7 +12,7 @@ import pytest
 from world import World
 
 from bridge.fc.autosense import PROBE, SPEEDS
-from bridge.fc.msp_link import RESYNC
+from bridge.line.msp_link import RESYNC
 from protocols.msp.hazards import HAZARDS, RUN_LENGTH, is_clean
 from simulator.line import garble
 from simulator.options import SimOptions

@@ -7,7 +7,7 @@ import pytest
 from conversations import Upload, records_of, waypoints
 from world import GroundStation, World
 
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from protocols.mission_item import MissionResult
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions, TelemetryProtocol

@@ -10,7 +10,7 @@ import pytest
 from conversations import waypoints
 from world import GroundStation, World
 
-from bridge.fc.poll_schedule import POLLS
+from bridge.line.poll_schedule import POLLS
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bridge.fc.identity import FlightController, Kind
+from bridge.fc.flight_controller import FlightController, Kind
 from bridge.model.vehicle_state import VehicleState
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from test_pass_through import Autopilot, passing
 from world import GroundStation, World
 
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from bridge.vehicle.mavlink_groups import MavlinkGroups
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter

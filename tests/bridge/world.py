@@ -15,12 +15,12 @@ from typing import Any
 
 from bridge.bridge import Bridge, BridgeConfig
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.conversation import Conclude, Recall, Save, StoreEffect
-from bridge.fc.identity import Kind
+from bridge.fc.flight_controller import Kind
 from bridge.fc.session import State
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
+from bridge.line.conversation import Conclude, Recall, Save, StoreEffect
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
 from protocols.mavlink.codec import MavlinkDecoder

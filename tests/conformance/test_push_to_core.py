@@ -10,9 +10,9 @@ import pytest
 from c_core import CCore, PowerCut
 
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
-from bridge.fc.conversation import Conversation, StoreEffect
-from bridge.fc.msp_link import MspLink
-from bridge.fc.runner import Runner
+from bridge.line.conversation import Conversation, StoreEffect
+from bridge.line.msp_link import MspLink
+from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushResult
 from protocols.mission_record import pack_records
 from protocols.msp.mission import MissionCommand, decode_info

@@ -4,7 +4,7 @@
 It takes MISSION_ITEM only, with coordinates in single precision, one item at a time, and forgets a transfer after
 500 ms. What is then in its memory, a part of the list, it writes a second later. But any error that it finds meanwhile
 makes it load the old list again: so after a failure it is sent an item that is out of sequence. The traps
-of its serial port are minded by `bridge.fc.mavlink_sender`; an item that cannot be sent safely refuses the list.
+of its serial port are minded by `bridge.line.mavlink_sender`; an item that cannot be sent safely refuses the list.
 
 A written list is read back, item by item. Single precision holds a coordinate to 0.4 m.
 """
@@ -16,7 +16,7 @@ from dataclasses import replace
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.records import items_from_records
 from bridge.controllers.harakiri.rules import MAV_COMMANDS
-from bridge.fc.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
+from bridge.line.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
 from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.float32 import neighbours, single
 from protocols.mavlink.codec import MavlinkDecoder, pack

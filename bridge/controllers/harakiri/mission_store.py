@@ -6,7 +6,7 @@ from contextlib import suppress
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.records import items_from_records
-from bridge.fc.conversation import Conversation, LinkLost, Stopped, ask, ask_surely, pause, receive, send
+from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, ask_surely, pause, receive, send
 from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify

@@ -4,7 +4,7 @@
 from contextlib import suppress
 
 from bridge.controllers.nav.mission_store import NOTHING, Failed, NavMissions
-from bridge.fc.conversation import Conversation, LinkLost, ask
+from bridge.line.conversation import Conversation, LinkLost, ask
 from bridge.missions.fc_mission_store import PushFailure
 from protocols.msp.frame import Direction, request
 from protocols.msp.nav import INFO_SIZE, LOAD_REQUEST, SAVE_REQUEST, Nav, NavInfo, NavRecord, decode_info

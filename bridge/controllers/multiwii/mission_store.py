@@ -2,7 +2,7 @@
 """MultiWii 2.4 NAV: each record goes to EEPROM at once, the list ends with the first that says so (docs/inav.md)."""
 
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
-from bridge.fc.conversation import Conversation
+from bridge.line.conversation import Conversation
 from protocols.msp.nav import LAST, NavRecord
 
 #: Flags of what is no record: damaged in EEPROM, or not told because it navigates.

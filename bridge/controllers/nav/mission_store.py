@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
-from bridge.fc.conversation import Conversation, LinkLost, Stopped, ask, pause, receive, send
+from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, pause, receive, send
 from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_item import MissionItem
 from protocols.msp.commands import Msp

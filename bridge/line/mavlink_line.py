@@ -2,7 +2,7 @@
 """A port on which MAVLink is spoken: what comes in, and when it is over. Sans-IO."""
 
 from bridge.fc.autosense import PROBE, is_plausible_heartbeat
-from bridge.fc.mavlink_sender import HarakiriSender
+from bridge.line.mavlink_sender import HarakiriSender
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspParser

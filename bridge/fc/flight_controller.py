@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from bridge.controllers.box_ids import box_names
-from bridge.fc.conversation import Conversation, ask_surely
+from bridge.line.conversation import Conversation, ask_surely
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.mission import INFO_SIZE, Info, MissionCommand, decode_info

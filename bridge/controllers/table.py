@@ -10,7 +10,7 @@ from bridge.controllers.inav.mission_store import InavMissions
 from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.mission_store import NavCraft
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
-from bridge.fc.identity import FlightController, Kind
+from bridge.fc.flight_controller import FlightController, Kind
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 
 

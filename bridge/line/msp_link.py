@@ -10,8 +10,8 @@ Waiting time follows the measured round trip, as in TCP: 7/8 old + 1/8 measured,
 from collections import deque
 from dataclasses import dataclass
 
-from bridge.fc.conversation import Send
-from bridge.fc.round_trips import RoundTrips
+from bridge.line.conversation import Send
+from bridge.line.round_trips import RoundTrips
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request

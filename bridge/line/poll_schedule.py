@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
-from bridge.fc.conversation import Send
-from bridge.fc.msp_link import MspLink
+from bridge.line.conversation import Send
+from bridge.line.msp_link import MspLink
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, request
 

@@ -5,7 +5,7 @@ Harakiri's send ring has no overflow check (bridge.msp_link). Whoever is silent 
 it is asked at its own speed may still be answered: with what was asked before, they must fit the ring.
 """
 
-from bridge.fc.msp_link import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES
+from bridge.line.msp_link import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES
 
 
 class PendingReplies:

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from bridge.fc.conversation import (
+from bridge.line.conversation import (
     Await,
     Conversation,
     LinkLost,
@@ -16,8 +16,8 @@ from bridge.fc.conversation import (
     StoreEffect,
     Transmit,
 )
-from bridge.fc.mavlink_line import MavlinkLine
-from bridge.fc.msp_link import MspLink
+from bridge.line.mavlink_line import MavlinkLine
+from bridge.line.msp_link import MspLink
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
 
