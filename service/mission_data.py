@@ -4,7 +4,7 @@
 import json
 import math
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeGuard
 
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
@@ -41,9 +41,9 @@ def verdict_data(verdict: Verdict[Any]) -> Json:
 def whole_number(data: Json, key: str, least: int, most: int) -> int:
     """Return data[key]; ValueError if it is no whole number from `least` to `most`."""
     value = data.get(key)
-    if type(value) is not int or not least <= value <= most:
+    if not _is_whole(value) or not least <= value <= most:
         raise ValueError(f"{key} must be a whole number from {least} to {most}")
-    return value
+    return int(value)
 
 
 def _item(entry: object) -> MissionItem:
@@ -64,9 +64,14 @@ def _number(entry: Json, key: str) -> float:
 
 def _place(entry: Json, key: str) -> int | None:
     value = entry.get(key)
-    if value is None or (type(value) is int and math.isfinite(_number(entry, key))):
-        return value
+    if value is None or (_is_whole(value) and math.isfinite(_number(entry, key))):
+        return None if value is None else int(value)
     raise ValueError(f"{key} must be degrees * 1e7, or null if it is not given")
+
+
+def _is_whole(value: object) -> TypeGuard[int]:
+    """True for any int, so for a Command too, but not for a bool: JSON's true is no number."""
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _strict(value: object) -> object:

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every command that takes `--fc`, against every board that can be simulated."""
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from benches import Starter
+from plan import HOME, PlanRow, waypoint
+from programs import Board, run_naze_bridge
+
+from protocols.mission_file import read_mission_file, write_qgc_wpl
+from protocols.mission_item import Command
+from simulator.fc_kinds import KINDS
+
+STORES_MISSIONS = ("naze", "inav", "multiwii")
+STORES_NONE = ("betaflight", "baseflight")
+assert {*STORES_MISSIONS, *STORES_NONE} == {"naze", *KINDS}
+PLAN = [HOME, waypoint(1), waypoint(2), PlanRow(Command.NAV_ROI, 45.3843398, 8.4742597), waypoint(3)]
+
+
+@pytest.fixture(scope="module", params=STORES_MISSIONS)
+def board(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Board]:
+    with ExitStack() as stack:
+        kind = () if request.param == "naze" else ("--kind", request.param)
+        yield Starter(tmp_path_factory.mktemp(request.param), stack).board(*kind)
+
+
+@pytest.fixture(scope="module", params=STORES_NONE)
+def other_board(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Board]:
+    with ExitStack() as stack:
+        yield Starter(tmp_path_factory.mktemp(request.param), stack).board("--kind", request.param)
+
+
+@pytest.fixture
+def plan_file(tmp_path: Path) -> Path:
+    file = tmp_path / "plan.waypoints"
+    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(PLAN)]))
+    return file
+
+
+def test_push_pull_and_clear(board: Board, plan_file: Path, tmp_path: Path) -> None:
+    pushed = run_naze_bridge("push", plan_file, "--fc", board.link)
+    assert (pushed.returncode, pushed.stderr.strip()) == (0, "")
+    assert "ACCEPTED: Mission verified" in pushed.stdout
+    pulled = run_naze_bridge("pull", tmp_path / "held", "--fc", board.link)
+    assert (pulled.returncode, pulled.stderr) == (0, "")
+    held = read_mission_file((tmp_path / "held").read_bytes(), "held")
+    assert [item.command for item in held] == [row.command for row in PLAN]
+    assert run_naze_bridge("pull", "--fc", board.link).returncode == 0
+    cleared = run_naze_bridge("clear", "--fc", board.link)
+    assert (cleared.returncode, cleared.stdout) == (0, "ACCEPTED: Mission on the flight controller cleared\n")
+    assert run_naze_bridge("pull", "--fc", board.link).stdout.startswith("0 records")
+
+
+def test_the_same_as_json(board: Board, plan_file: Path) -> None:
+    pushed = run_naze_bridge("push", plan_file, "--json", "--fc", board.link)
+    assert json.loads(pushed.stdout)["ack"] == "MAV_MISSION_ACCEPTED"
+    held = json.loads(run_naze_bridge("pull", "--json", "--fc", board.link).stdout)
+    assert [item["command"] for item in held["items"]] == [row.command for row in PLAN]
+    assert json.loads(run_naze_bridge("clear", "--json", "--fc", board.link).stdout)["ack"] == "MAV_MISSION_ACCEPTED"
+
+
+def assert_status(board: Board) -> None:
+    status = json.loads(run_naze_bridge("status", "--json", "--fc", board.link).stdout)
+    assert (status["state"], status["armed"]) == ("MSP", False)
+    assert "flight controller" in run_naze_bridge("status", "--fc", board.link).stdout
+    assert "Traceback" not in (diagnosis := run_naze_bridge("doctor", "--fc", board.link)).stderr
+    assert str(board.link) in diagnosis.stdout
+
+
+def test_status_and_doctor(board: Board) -> None:
+    assert_status(board)
+
+
+def test_a_board_without_missions_says_so_and_its_status_works(other_board: Board, plan_file: Path) -> None:
+    sentence = "This flight controller stores no missions"
+    for command in (("push", plan_file), ("clear",)):
+        refused = run_naze_bridge(*command, "--fc", other_board.link)
+        assert (refused.returncode, refused.stderr.strip()) == (1, "")
+        assert refused.stdout.splitlines()[-1] == f"UNSUPPORTED: {sentence}"
+    pulled = run_naze_bridge("pull", "--fc", other_board.link)
+    assert (pulled.returncode, pulled.stderr) == (1, f"naze-bridge: {sentence}\n")
+    assert_status(other_board)
