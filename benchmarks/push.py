@@ -23,7 +23,7 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import BenchmarkError, free_udp_port, simulated_naze
 from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.line.conversation import Conversation, Send
+from bridge.line.conversation import Conversation, LinkLost, Send
 from bridge.missions.fc_mission_store import PushResult
 from bridge.missions.list_check import check_list
 from protocols.msp.mission import MissionCommand
@@ -80,12 +80,12 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     dialect = daemon.bridge.missions.dialect
     assert dialect is not None
     begun_at: list[float] = []
-    done: asyncio.Future[tuple[PushResult[WpRecord] | None, float]] = loop.create_future()
+    done: asyncio.Future[tuple[PushResult[WpRecord] | LinkLost, float]] = loop.create_future()
     push = _noting_first_chunk(dialect.push(records, lambda _: None), lambda: begun_at.append(loop.time()))
     daemon.bridge.runner.start(push, lambda result, _: done.set_result((result, loop.time())), loop.time())
     daemon.flush()
     result, ended_at = await done
-    if result is None or result.failure or result.unchanged:
+    if isinstance(result, LinkLost) or result.failure or result.unchanged:
         raise BenchmarkError(f"the push ended with {result}")
     return ended_at - begun_at[0]
 

@@ -11,31 +11,32 @@ An autopilot that speaks MAVLink for itself is not represented but passed throug
     FcSession <-> PassThrough <-> Ground
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
-from typing import Any
 
 from bridge.controllers.harakiri.relay import HarakiriRelay
-from bridge.controllers.table import Surroundings, dialect_of
+from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
+from bridge.controllers.table import PROFILES
 from bridge.fc.actions import FcActions
-from bridge.fc.flight_controller import FlightController, Kind
-from bridge.fc.session import Autopilot, FcSession, State
+from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
+from bridge.fc.session import FcSession
+from bridge.fc.states import Autopilot, Mavlink
 from bridge.gcs.ground import Ground, Tap
 from bridge.gcs.guard import Guard, GuardRefusal, LinkAccess, denial
 from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity, Station
-from bridge.line.conversation import Conversation, StoreEffect
+from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
-from bridge.missions.fc_mission_store import StoreReport
-from bridge.missions.list_check import check_list
-from bridge.missions.mission_service import Delivery, HeldMission, MissionService, Refusal
+from bridge.missions.fc_mission_store import AnyFcMissionStore
+from bridge.missions.mission_service import NO_LINK, Delivery, MissionService
 from bridge.model.events import EventLog, Incidents
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.verdict import Verdict
+from bridge.model.refusal import Refusal
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.link_announcer import LinkAnnouncer
+from bridge.vehicle.local_missions import LocalMissions
 from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.mission_download import MissionDownloads
 from bridge.vehicle.mission_upload import MissionUploads
@@ -46,7 +47,6 @@ from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.target import target_of
-from protocols.mission_item import MissionItem, MissionResult
 
 _AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
 
@@ -61,8 +61,9 @@ class BridgeConfig:
     speeds: Sequence[int | None]
     sysid: int = 1
     compid: int = 1
-    takeoff_max_m: int = 15
+    takeoff_max_m: int = TAKEOFF_MAX_M
     autopilot: Autopilot = Autopilot.AUTO
+    profiles: Sequence[Profile] = PROFILES
     links: Mapping[str, LinkAccess] = field(default_factory=dict)
 
 
@@ -74,7 +75,6 @@ class Bridge:
         self._log_event = log_event
         self._decoder = MavlinkDecoder()
         self._store_effects: list[StoreEffect] = []
-        self._now = now
         self._was_armed = False
         self._pass_through: PassThrough | None = None
         self._relay: HarakiriRelay | None = None
@@ -91,6 +91,7 @@ class Bridge:
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(
             config.speeds,
+            config.profiles,
             self.runner,
             log_event,
             self._incidents,
@@ -107,6 +108,7 @@ class Bridge:
         self._uploads = MissionUploads(
             self.missions, self.runner, self.ground, log_event, self._incidents, home, self.ground.moved_to
         )
+        self.local = LocalMissions(self.missions, self.runner, self.ground, log_event, self._incidents, home)
         self._downloads = MissionDownloads(self.missions, self.runner, self.ground, self._is_armed, home)
         self._parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
@@ -125,21 +127,18 @@ class Bridge:
     @property
     def is_passing_through(self) -> bool:
         """Tell whether an autopilot speaks MAVLink for itself, so that nobody here waits for the next byte."""
-        return self._pass_through is not None and self.session.state is State.MAVLINK
+        return self._pass_through is not None and isinstance(self.session.state, Mavlink)
 
     def fc_opened(self, now: float) -> None:
         """Take note that the port is open."""
-        self._now = now
         self.session.opened(now)
 
     def fc_closed(self, now: float, why: str | None) -> None:
         """Take note that the port is gone; `why` is None if we closed it ourselves."""
-        self._now = now
         self.session.closed(now, why)
 
     def fc_received(self, data: bytes, now: float) -> None:
         """Take bytes from the port."""
-        self._now = now
         self.session.received(data, now)
         armed = self.session.vehicle.armed
         if armed is None or armed == self._was_armed:
@@ -158,7 +157,6 @@ class Bridge:
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Take bytes from a ground station. A datagram holds whole frames only."""
-        self._now = now
         for frame in self.ground.received(peer, data, now, datagram=datagram):
             refused = self.guard.refusal(peer, frame)
             if refused is not None:
@@ -173,14 +171,12 @@ class Bridge:
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""
-        self._now = now
         self._uploads.peer_gone(peer, now)
         self.ground.gone(peer)
         self._left(peer)
 
     def link_closed(self, name: str, now: float) -> None:
         """A link to ground stations is given up, and all who were heard on it are gone."""
-        self._now = now
         for peer in self.ground.remove_link(name):
             self._uploads.peer_gone(peer, now)
             self._left(peer)
@@ -195,76 +191,12 @@ class Bridge:
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
         """Take the store's answer to an effect."""
-        self._now = now
         self.runner.store_answered(effect, answer, now)
 
     def take_mission_endings(self) -> list[tuple[ArrivedMission, Delivery]]:
         """Return the missions that were dealt with to their end, and how."""
         endings, self._mission_endings = self._mission_endings, []
         return endings
-
-    # The command line's side.
-
-    def push_locally(
-        self,
-        items: Sequence[MissionItem],
-        source: str,
-        on_progress: Callable[[int], None],
-        on_done: Callable[[Delivery | Refusal, ArrivedMission | None], None],
-        now: float,
-    ) -> None:
-        """Do what an upload by a ground station does, with a list that is all there. No items: clear."""
-        self._now = now
-        owner = object()
-        incident = self._incidents.begin("push")
-        arrived: list[ArrivedMission] = []
-
-        def conversation() -> Conversation[Delivery | Refusal]:
-            report: StoreReport | Refusal = yield from self.missions.preflight()
-            if isinstance(report, Refusal):
-                return report
-            verdict = check_list(items, report.rules, self._vehicle.home())
-            arrived.append(ArrivedMission(source, tuple(items), verdict))
-            return (yield from self.missions.deliver(arrived[0], on_progress))
-
-        def done(result: Delivery | Refusal, _at: float) -> None:
-            self.missions.release(owner)
-            if arrived and isinstance(result, Delivery):
-                self.ground.say(Severity.NOTICE, f"{source}: {result.text}")
-            self._log_event(
-                "info" if result.ack is MissionResult.ACCEPTED else "warning",
-                "mission.push_ended",
-                source=source,
-                mission=result.number if isinstance(result, Delivery) else None,
-                ack=result.ack.name,
-                detail=result.text,
-                incident=incident,
-            )
-            on_done(result, arrived[0] if arrived else None)
-
-        self._log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
-        refusal = self.missions.acquire(owner)
-        if refusal is None:
-            self.runner.start(conversation(), done, now)
-        else:
-            done(refusal, now)
-
-    def pull_locally(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
-        """Read what the flight controller holds."""
-        self._now = now
-        self.runner.start(self.missions.read_back(), lambda held, _at: on_done(held), now)
-
-    def check_locally(
-        self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
-    ) -> None:
-        """Tell what would become of a list on the present flight controller, which is not touched."""
-        self._now = now
-
-        def conversation() -> Conversation[Verdict[Any] | Refusal]:
-            rules = yield from self.missions.rules()
-            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._vehicle.home())
-
-        self.runner.start(conversation(), lambda verdict, _at: on_done(verdict), now)
 
     # The end.
 
@@ -275,20 +207,22 @@ class Bridge:
 
     def stop_missions(self, now: float) -> None:
         """Begin no more transfers. An upload whose items are still coming in ends; a push under way goes on."""
-        self._now = now
         self.missions.close()
         self._uploads.stop(now)
 
     def abort_missions(self, now: float) -> None:
         """End a push under way: the flight controller keeps its old list, and the store and who sent it are told."""
-        self._now = now
         self.runner.stop(now)
 
     # Time.
 
+    def restart(self, why: str, now: float) -> None:
+        """Recover from a fault of our own: end the running conversation and search for the flight controller again."""
+        self.runner.reset(now)
+        self.session.restart(why, now)
+
     def tick(self, now: float) -> None:
         """Do what is due."""
-        self._now = now
         self.session.tick(now)
         self.runner.tick(now)
         self._uploads.tick(now)
@@ -349,9 +283,8 @@ class Bridge:
         return system in (0, self._config.sysid) and component in (0, self._config.compid)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
-        around = Surroundings(self._is_armed, self._home, self._vehicle.home, self._config.takeoff_max_m)
-        dialect = None if controller is None else dialect_of(controller, around)
-        self.missions.controller_changed(controller, dialect)
+        store = self._open_store(controller)
+        self.missions.use(store)
         self._downloads.forget_all()
         self.report.controller_changed()
         if controller is None:
@@ -359,12 +292,23 @@ class Bridge:
             self._uploads.link_lost(now)
             self._announcer.lost(now)
             return
-        self._relay = HarakiriRelay(self.ground) if controller.kind is Kind.HARAKIRI_MAVLINK else None
-        self._pass_through = PassThrough(self.ground) if controller.kind is Kind.MAVLINK else None
+        is_passed_through = controller.profile.is_passed_through
+        self._relay = None if is_passed_through else HarakiriRelay(self.ground)
+        self._pass_through = PassThrough(self.ground) if is_passed_through else None
         self._say(self._announcer.found(controller))
-        if dialect is not None:
+        if not isinstance(store, Refusal):
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
             self.runner.start(self.missions.read_back(), lambda _held, _at: None, now)
+
+    def _open_store(self, controller: FlightController | None) -> AnyFcMissionStore | Refusal:
+        """How missions are written to this flight controller, or why not."""
+        if controller is None:
+            return NO_LINK
+        profile = controller.profile
+        if profile.open_store is None:
+            return profile.no_missions
+        view = VehicleView(self._is_armed, self._home, self._vehicle.home)
+        return profile.open_store(controller, view, RuleSettings(self._config.takeoff_max_m))
 
     def _answered(self, command: int, now: float) -> None:
         self._vehicle.answered(command, now)

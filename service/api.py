@@ -16,8 +16,9 @@ from typing import Any, TypeVar
 
 import structlog
 
-from bridge.missions.mission_service import Delivery, HeldMission, Refusal
+from bridge.missions.mission_service import Delivery, HeldMission
 from bridge.model.mission_log import ArrivedMission
+from bridge.model.refusal import Refusal
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
@@ -81,14 +82,14 @@ class MissionJobs:
             _resolve(future, answer)
 
         bridge = self._daemon.bridge
-        bridge.push_locally(items, source, lambda records: progress({"progress": records}), done, self._loop.time())
+        bridge.local.push(items, source, lambda records: progress({"progress": records}), done, self._loop.time())
         self._daemon.flush()
         return await future
 
     async def check(self, items: list[MissionItem]) -> Json:
         """Tell what would become of a list on the present flight controller."""
         future: asyncio.Future[Verdict[Any] | Refusal] = self._loop.create_future()
-        self._daemon.bridge.check_locally(items, lambda verdict: _resolve(future, verdict), self._loop.time())
+        self._daemon.bridge.local.check(items, lambda verdict: _resolve(future, verdict), self._loop.time())
         self._daemon.flush()
         verdict = await future
         if isinstance(verdict, Refusal):
@@ -98,7 +99,7 @@ class MissionJobs:
     async def pull(self) -> Json:
         """Read what the flight controller holds."""
         future: asyncio.Future[HeldMission | Refusal] = self._loop.create_future()
-        self._daemon.bridge.pull_locally(lambda held: _resolve(future, held), self._loop.time())
+        self._daemon.bridge.local.pull(lambda held: _resolve(future, held), self._loop.time())
         self._daemon.flush()
         held = await future
         if isinstance(held, Refusal):
@@ -120,7 +121,7 @@ class MissionJobs:
         link = session.link
         return {
             "flight_controller": None if controller is None else controller.name,
-            "state": session.state.value,
+            "state": session.state.name,
             "speed_baud": session.speed if controller else None,
             "armed": vehicle.armed,
             "battery_v": vehicle.analog.battery_dv / 10 if vehicle.analog else None,

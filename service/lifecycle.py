@@ -98,6 +98,6 @@ def link_line(daemon: Daemon) -> str:
     else:
         speed = "" if session.speed is None else f", {session.speed} baud"
         armed = {None: "", True: ", armed", False: ", disarmed"}[session.vehicle.armed]
-        where = f"{session.controller.name} ({session.state.value}{speed}{armed})"
+        where = f"{session.controller.name} ({session.state.name}{speed}{armed})"
     count = len(list(bridge.ground.peers()))
     return f"{where}; {count} ground station{'' if count == 1 else 's'}"

@@ -12,7 +12,7 @@ from prometheus_client import CollectorRegistry, Counter, Histogram, generate_la
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from bridge.fc.session import State
+from bridge.fc.session import TRANSITIONS
 from bridge.line.round_trips import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
@@ -129,8 +129,8 @@ class _State(Collector):
     def _flight_controller(self) -> Iterator[Metric]:
         session = self._daemon.bridge.session
         state = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the state that the link is in.", labels=["state"])
-        for each in State:
-            state.add_metric([each.value], float(session.state is each))
+        for each in TRANSITIONS:
+            state.add_metric([each.name], float(type(session.state) is each))
         yield state
         # These begin anew with each flight controller that is found, as Prometheus lets counters do.
         damaged = _counters("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bridge.fc.session import FcSession
-from bridge.line.conversation import Conversation, ask
+from bridge.line.conversation import Conversation, LinkLost, ask
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from protocols.msp.commands import Msp, MspAction
@@ -75,12 +75,14 @@ class FcActions:
         self._present = action
         arm_mask = 1 << controller.arm_bit
 
-        def done(outcome: ActionResult | None, _at: float) -> None:
+        def done(result: ActionResult | LinkLost, _at: float) -> None:
             self._present = None
             self._missions.release(self)
-            if outcome is ActionResult.DONE and action.freezes and controller.is_harakiri:
-                outcome = ActionResult.FREEZES
-            on_done(outcome or ActionResult.NO_ANSWER)
+            if isinstance(result, LinkLost):
+                result = ActionResult.NO_ANSWER
+            elif result is ActionResult.DONE and action.freezes and controller.profile.restarts_after_calibration:
+                result = ActionResult.FREEZES
+            on_done(result)
 
         self._runner.start(_act(action, arm_mask), done, now)
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Conversations: conversations with the flight controller and the store, written top to bottom without any I/O.
+"""Conversations with the flight controller and the store, written top to bottom without any I/O.
 
-A conversation is a generator. It yields one effect at a time and is sent the effect's answer; `bridge.line.runner.Runner`
-carries the effects out. When the link to the flight controller goes down, LinkLost is raised at the `yield`; when the
-bridge can wait no longer for the end, its kind Stopped.
+A conversation is a generator. It yields one effect at a time and is sent the effect's answer;
+`bridge.line.runner.Runner` carries the effects out. When the line goes down, LinkLost is raised at the `yield`;
+when the bridge is about to end, its subclass Stopped.
 """
 
 from collections.abc import Generator, Mapping

@@ -7,7 +7,7 @@ the rest), and lost replies slow all polls down until they come again. A questio
 has come or is given up, so a long round trip slows the fast ones down by itself.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -129,12 +129,11 @@ class PollSchedule:
         """What losses leave of the rates, 0.1..1."""
         return self._quality
 
-    def begin(self, baud: int | None, *, navigates: bool = False) -> None:
+    def begin(self, baud: int | None, polls: Sequence[Poll] = POLLS) -> None:
         """A flight controller is there: ask it everything once, then as often as wanted."""
         self._budget = (baud or _ASSUMED_BAUD) / 10 * _LINE_SHARE
         self._quality = 1.0
         self._lost_before = 0
-        polls = (*POLLS, NAV_POLL) if navigates else POLLS
         self._slots = {
             poll.command: _Slot(poll, frozenset((poll.command,)), poll.reply_payload + FRAME_OVERHEAD) for poll in polls
         }

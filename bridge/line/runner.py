@@ -3,7 +3,8 @@
 
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 from bridge.line.conversation import (
     Await,
@@ -26,6 +27,18 @@ from protocols.msp.frame import MspFrame
 _STORE_PATIENCE_S = 3.0
 
 
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Task(Generic[T]):
+    """A conversation that was started. `began_at` is None while it waits for its turn."""
+
+    conversation: Conversation[T]
+    on_done: Callable[[T | LinkLost, float], None]
+    began_at: float | None = None
+
+
 class Runner:
     """Runs conversations in the order in which they were started. Time is passed in.
 
@@ -36,8 +49,8 @@ class Runner:
         self._on_store = on_store
         self._link: MspLink | None = None
         self._mavlink: MavlinkLine | None = None
-        self._queue: deque[tuple[Conversation[Any], Callable[[Any, float], None]]] = deque()
-        self._current: tuple[Conversation[Any], Callable[[Any, float], None]] | None = None
+        self._queue: deque[Task[Any]] = deque()
+        self._current: Task[Any] | None = None
         self._awaited: Receive | Await | Pause | StoreEffect | None = None
         self._deadline: float | None = None
         self._busy = False
@@ -47,10 +60,19 @@ class Runner:
         """Whether a conversation is under way."""
         return self._current is not None
 
-    def start(self, conversation: Conversation[Any], on_done: Callable[[Any, float], None], now: float) -> None:
-        """Queue a conversation; `on_done` gets its result (None if LinkLost ended it) and the time."""
-        self._queue.append((conversation, on_done))
+    def start(
+        self, conversation: Conversation[T], on_done: Callable[[T | LinkLost, float], None], now: float
+    ) -> Task[T]:
+        """Queue a conversation; `on_done` gets its result, or the LinkLost that ended it, and the time."""
+        task = Task(conversation, on_done)
+        self._queue.append(task)
         self._begin_next(now)
+        return task
+
+    def reset(self, now: float) -> None:
+        """End the running conversation, whatever it waits for, as if the line were gone."""
+        if self._current is not None and not self._busy:
+            self._advance(LinkLost("internal error"), now)
 
     def link_up(self, link: MspLink) -> None:
         """Use this link from now on."""
@@ -107,6 +129,7 @@ class Runner:
         """Run what is queued; a loop, because all of it may end at once when there is no link."""
         while self._current is None and self._queue and not self._busy:
             self._current = self._queue.popleft()
+            self._current.began_at = now
             self._run(None, now)
 
     def _advance(self, answer: object, now: float) -> None:
@@ -117,7 +140,8 @@ class Runner:
     def _run(self, answer: object, now: float) -> None:
         """Run the current conversation up to its next wait."""
         assert self._current is not None
-        conversation, on_done = self._current
+        task = self._current
+        conversation = task.conversation
         self._awaited = None
         self._deadline = None
         try:
@@ -154,10 +178,15 @@ class Runner:
                     return
         except StopIteration as stop:
             result = stop.value
-        except LinkLost:
-            result = None
+        except LinkLost as lost:
+            result = lost
+        except Exception:
+            self._current = None
+            raise
         self._current = None
         # What on_done starts is run after it has returned, so that it sees a consistent state.
         self._busy = True
-        on_done(result, now)
-        self._busy = False
+        try:
+            task.on_done(result, now)
+        finally:
+            self._busy = False

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bridge.fc.flight_controller import FlightController, Kind
 from bridge.line.conversation import Conversation, LinkLost, Stopped, conclude, pause, recall, save
 from bridge.missions.fc_mission_store import LIST_IS_GONE, AnyFcMissionStore, PushFailure, StoreReport, StoreState
 from bridge.missions.list_check import MissionRules
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
+from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
@@ -20,14 +20,6 @@ from protocols.mission_record import ListIdentity, identify
 #: mission-rules.md, "a flash write is still running": wait for it up to 1 s.
 _BUSY_PATIENCE_S = 1.0
 _BUSY_INTERVAL_S = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """Why nothing is done, as the ground station hears it."""
-
-    ack: MissionResult
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +40,7 @@ class HeldMission:
     items: tuple[MissionItem, ...]
 
 
-ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to change the mission")
-_REASONS: dict[Kind, Refusal] = {
-    Kind.HARAKIRI: Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
-    Kind.OTHER_MSP: Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions"),
-    Kind.FRSKY: ARMED,
-}
-_NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
+NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
 _STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
 _OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
@@ -69,15 +55,14 @@ class MissionService:
     def __init__(self, on_ending: Callable[[ArrivedMission, Delivery], None]) -> None:
         self._on_ending = on_ending
         self._dialect: AnyFcMissionStore | None = None
-        self._refusal = _NO_LINK
+        self._refusal = NO_LINK
         self._owner: object | None = None
         self._closed = False
         self.held: HeldMission | None = None
 
-    def controller_changed(self, controller: FlightController | None, dialect: AnyFcMissionStore | None) -> None:
-        """Work with another flight controller, or with none."""
-        self._dialect = dialect
-        self._refusal = _NO_LINK if controller is None else _REASONS.get(controller.kind, _NO_LINK)
+    def use(self, store: AnyFcMissionStore | Refusal) -> None:
+        """Work with another flight controller from now on; with a Refusal, every attempt gets it as the reply."""
+        self._dialect, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
         self.held = None
 
     @property
@@ -118,7 +103,7 @@ class MissionService:
                     return self._refusal
                 report = yield from self._dialect.report()
                 if report is None:
-                    return _NO_LINK
+                    return NO_LINK
                 if report.state is StoreState.READY:
                     return report
                 if report.state is StoreState.ARMED:
@@ -130,7 +115,7 @@ class MissionService:
         except Stopped:
             return _STOPPING
         except LinkLost:
-            return _NO_LINK
+            return NO_LINK
 
     def rules(self) -> Conversation[MissionRules | Refusal]:
         """Return by which rules the present flight controller's lists are judged, armed or not."""
@@ -139,8 +124,8 @@ class MissionService:
         try:
             report = yield from self._dialect.report()
         except LinkLost:
-            return _NO_LINK
-        return _NO_LINK if report is None else report.rules
+            return NO_LINK
+        return NO_LINK if report is None else report.rules
 
     def deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Conversation[Delivery]:
         """Store the mission, bring it to the flight controller if the rules let it, store how that ended."""
@@ -197,18 +182,18 @@ class MissionService:
         try:
             report = yield from dialect.report()
             if report is None:
-                return _NO_LINK
+                return NO_LINK
             if self.held is not None and self.held.identity == report.stored:
                 return self._refreshed(dialect, self.held)
             if report.state is StoreState.ARMED and report.stored is None:
                 return ARMED
             records = yield from dialect.pull()
             if records is None:
-                return _NO_LINK
+                return NO_LINK
         except Stopped:
             return _STOPPING
         except LinkLost:
-            return _NO_LINK
+            return NO_LINK
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:
             return self._refreshed(dialect, self.held)

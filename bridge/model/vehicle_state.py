@@ -4,7 +4,7 @@
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from bridge.fc.flight_controller import FlightController
+from bridge.fc.profile import FlightController
 from bridge.model.flight_mode import FlightMode, flight_mode
 from bridge.model.ground_track import GroundTrack, Velocity
 from protocols.msp.commands import Msp

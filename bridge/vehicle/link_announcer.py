@@ -5,7 +5,8 @@ A craft that arms may change protocol and speed, and is searched for a second or
 reads warnings out loud.
 """
 
-from bridge.fc.flight_controller import FlightController, Kind
+from bridge.fc.autosense import Spoken
+from bridge.fc.profile import FlightController
 from bridge.gcs.station import Severity
 
 #: Switching takes less.
@@ -27,13 +28,14 @@ class LinkAnnouncer:
     def found(self, controller: FlightController) -> tuple[Severity, str] | None:
         """It is there."""
         self._lost_at = None
-        if controller.kind is Kind.HARAKIRI_MAVLINK and self._known is not None:
+        profile = controller.profile
+        if profile.spoken is Spoken.MAVLINK and not profile.is_passed_through and self._known is not None:
             return None
         before, self._known = self._known, controller.name
         if controller.name == before:
             return None
-        if controller.kind is Kind.FRSKY:
-            return Severity.WARNING, "Telemetry not readable while armed (FrSky)"
+        if profile.notice is not None:
+            return Severity.WARNING, profile.notice
         return Severity.INFO, f"Found {controller.name}"
 
     def tick(self, now: float) -> tuple[Severity, str] | None:

@@ -5,8 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bridge.gcs.station import Post, Severity, Station
+from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import ARMED, HeldMission, MissionService, Refusal
+from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
+from bridge.model.refusal import ARMED, Refusal
 from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
@@ -98,8 +100,10 @@ class MissionDownloads:
             self._is_reading = True
             self._runner.start(self._missions.read_back(), self._read, now)
 
-    def _read(self, held: HeldMission | Refusal, now: float) -> None:
+    def _read(self, held: HeldMission | Refusal | LinkLost, now: float) -> None:
         self._is_reading = False
+        if isinstance(held, LinkLost):
+            held = NO_LINK
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):

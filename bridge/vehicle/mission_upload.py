@@ -11,13 +11,15 @@ from enum import Enum
 from typing import Any
 
 from bridge.gcs.station import Peer, Post, Severity, Station
+from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import ListCheck, check_count
-from bridge.missions.mission_service import ARMED, Delivery, MissionService, Refusal
+from bridge.missions.mission_service import NO_LINK, Delivery, MissionService
 from bridge.model.events import EventLog, Incidents
 from bridge.model.finding import Finding
 from bridge.model.mission_log import ArrivedMission
+from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from bridge.vehicle.item_request import ItemRequest
 from bridge.vehicle.recent_answers import RecentAnswers
@@ -243,8 +245,10 @@ class MissionUploads:
             return None
         return min(transfer.request.due, transfer.progress_at + _GIVE_UP_S)
 
-    def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
+    def _asked(self, answer: StoreReport | Refusal | LinkLost, now: float) -> None:
         self._is_asking = False
+        if isinstance(answer, LinkLost):
+            answer = NO_LINK
         transfer = self._transfer
         if transfer is None or transfer.phase is not Phase.ASKING:
             return
@@ -325,7 +329,9 @@ class MissionUploads:
         for finding in findings:
             self._post.say(Severity.NOTICE, finding.text())
 
-    def _delivered(self, transfer: _Transfer, delivery: Delivery, now: float) -> None:
+    def _delivered(self, transfer: _Transfer, delivery: Delivery | LinkLost, now: float) -> None:
+        if isinstance(delivery, LinkLost):
+            delivery = Delivery(NO_LINK.ack, NO_LINK.text, None)
         accepted = delivery.ack is MissionResult.ACCEPTED
         self._post.say(Severity.INFO if accepted else Severity.ERROR, delivery.text)
         if delivery.number is None:

@@ -4,6 +4,7 @@
 import math
 
 from bridge.gcs.station import Post, Severity, Station
+from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from protocols.mavlink.dialect import Message, messages
@@ -41,6 +42,8 @@ class Parameters:
         """PARAM_SET: answered by the value that is in force then, as the protocol wants."""
         dialect = self._missions.dialect
         if name != WP_RADIUS or dialect is None or dialect.wp_radius_cm is None:
+            if name == WP_RADIUS:
+                self._post.say(Severity.ERROR, f"{WP_RADIUS} cannot be set on this flight controller now")
             self._send(station, name)
             return
         if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
@@ -57,9 +60,9 @@ class Parameters:
             # Its answer is on the way; who asked for another value asks again.
             return
 
-        def done(radius_cm: int | None, _at: float) -> None:
+        def done(radius_cm: int | LinkLost | None, _at: float) -> None:
             self._is_setting = False
-            if radius_cm is None:
+            if radius_cm is None or isinstance(radius_cm, LinkLost):
                 self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer")
             elif radius_cm != wanted_cm:
                 self._post.say(Severity.ERROR, f"{WP_RADIUS} stays {radius_cm}: disarm, or try again")

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from bridge.fc.flight_controller import Kind
-from bridge.fc.session import FcSession, State
+from bridge.fc.session import FcSession
+from bridge.fc.states import Mavlink
 from bridge.gcs.ground import Ground
 from bridge.missions.mission_service import MissionService
 from bridge.model.vehicle_groups import Group, Link, MissionIdentity, VehicleReport
@@ -48,7 +48,7 @@ class VehicleReporter:
     def controller_changed(self) -> None:
         """It is another flight controller, or none, or it speaks otherwise."""
         controller = self._session.controller
-        is_harakiri = controller is not None and controller.kind is Kind.HARAKIRI_MAVLINK
+        is_harakiri = controller is not None and not controller.profile.is_passed_through
         self._mavlink = MavlinkGroups(self._fresh, is_harakiri=is_harakiri)
         self._mavlink.is_watched = bool(self._watched)
 
@@ -76,7 +76,7 @@ class VehicleReporter:
         """Return one group as it is now: an instance of its class in bridge.vehicle_groups."""
         if group is Group.LINK:
             return self._link()
-        if self._session.state is not State.MAVLINK:
+        if not isinstance(self._session.state, Mavlink):
             return _FROM_MSP[group](MspGroups(self._session.vehicle))
         found = _FROM_MAVLINK[group](self._mavlink)
         home = self._session.vehicle.home
@@ -95,7 +95,7 @@ class VehicleReporter:
         session, controller = self._session, self._session.controller
         msp = session.link
         return Link(
-            state=session.state.value,
+            state=session.state.name,
             flight_controller=None if controller is None else controller.name,
             speed_baud=None if controller is None else session.speed,
             round_trip_ms=None if msp is None else round(msp.round_trip_s * 1000, 1),

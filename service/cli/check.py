@@ -8,9 +8,10 @@ from typing import Any
 
 import click
 
-from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import NAV_CAPACITY, inav_profile, multiwii_profile
+from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USUAL_WP_RADIUS_CM
+from bridge.controllers.nav.rules import NAV_CAPACITY
+from bridge.controllers.table import PROFILES
+from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
 from bridge.model.finding import DROPPED
 from bridge.model.verdict import Result, Verdict
@@ -21,12 +22,9 @@ from service.cli.mission_table import mission_table
 from service.cli.printing import print_json, print_table
 from service.mission_data import verdict_data
 
-_DEFAULT = HarakiriRules()
-#: Rules by kind of flight controller, from its capacity (None: the usual one) and its hit radius, cm.
-_RULES: Mapping[str, Callable[[int | None, int], MissionRules]] = {
-    "harakiri": lambda capacity, radius_cm: HarakiriRules(capacity or _DEFAULT.capacity, radius_cm),
-    "inav": lambda capacity, _: NavRules(inav_profile(capacity or NAV_CAPACITY)),
-    "multiwii": lambda capacity, _: NavRules(multiwii_profile(capacity or NAV_CAPACITY)),
+#: The rules of each flight controller that stores missions.
+_RULES: Mapping[str, Callable[[RuleSettings], MissionRules]] = {
+    profile.check_kind: profile.rules for profile in PROFILES if profile.check_kind and profile.rules
 }
 
 
@@ -45,14 +43,14 @@ class ExitCode(IntEnum):
 @click.option(
     "--wp-radius-cm",
     type=click.IntRange(0, 2000),
-    default=_DEFAULT.wp_radius_cm,
+    default=USUAL_WP_RADIUS_CM,
     show_default=True,
     help="Harakiri's gps_wp_radius.",
 )
 @click.option(
     "--capacity",
     type=click.IntRange(2, 65535),
-    help=f"Records that it holds; without: Harakiri {_DEFAULT.capacity}, home included, others {NAV_CAPACITY}.",
+    help=f"Records that it holds; without: Harakiri {USUAL_CAPACITY}, home included, others {NAV_CAPACITY}.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each file.")
 @click.pass_context
@@ -69,7 +67,7 @@ def check(
 
     Nothing is sent anywhere. Exit code 0: every file would be accepted, 1: one would be rejected, 2: one is unreadable.
     """
-    rules = _RULES[kind](capacity, wp_radius_cm)
+    rules = _RULES[kind](RuleSettings(TAKEOFF_MAX_M, wp_radius_cm, capacity))
     ctx.exit(max(_check_file(path, rules, strict, as_json) for path in files))
 
 

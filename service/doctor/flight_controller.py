@@ -3,7 +3,7 @@
 
 from collections.abc import Callable
 
-from bridge.fc.session import State
+from bridge.fc.states import Closed
 from service.api import ControlError
 from service.doctor.checked import Checked, note, ok, problem
 from service.links.connection import FcAddress
@@ -32,7 +32,7 @@ def check_flight_controller(
 
 def _who(fc: FcAddress, status: Json) -> Checked:
     name = status["flight_controller"]
-    if status["state"] == State.NO_PORT.value:
+    if status["state"] == Closed.name:
         return note("flight controller", f"{fc} cannot be opened yet", "see the port, and the daemon's log")
     if name is None:
         return problem("flight controller", f"nobody answers on {fc}: {status['state']}", _WIRING)

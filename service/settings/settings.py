@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridge.fc.session import Autopilot
+from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
+from bridge.fc.states import Autopilot
 from service.links.connection import FcAddress, GcsAddress
 from service.links.write_access import WriteAccess
 from service.web.settings import WebSettings
@@ -13,7 +14,6 @@ from service.zenoh_link.settings import ZenohSettings
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
 DEFAULT_SYSID = 1
-DEFAULT_TAKEOFF_MAX_M = 15
 DEFAULT_LOG_LEVEL = "info"
 
 
@@ -38,7 +38,7 @@ class Settings:
     gcs: Sequence[GcsAddress] = ()
     state_dir: Path | None = None
     sysid: int = DEFAULT_SYSID
-    takeoff_max_m: int = DEFAULT_TAKEOFF_MAX_M
+    takeoff_max_m: int = TAKEOFF_MAX_M
     tlog: TlogLimits | None = None
     record_uart: Path | None = None
     autopilot: Autopilot = Autopilot.AUTO

@@ -3,7 +3,8 @@
 
 from pathlib import Path
 
-from bridge.fc.session import Autopilot
+from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
+from bridge.fc.states import Autopilot
 from service.links.connection import parse_fc
 from service.links.write_access import parse_link
 from service.settings.key import Choice, FileName, Key, Several, Text, Unfit, Whole, YesNo
@@ -11,7 +12,6 @@ from service.settings.settings import (
     DEFAULT_GCS,
     DEFAULT_LOG_LEVEL,
     DEFAULT_SYSID,
-    DEFAULT_TAKEOFF_MAX_M,
     TlogLimits,
 )
 from service.web.settings import DEFAULT_LISTEN, parse_listen
@@ -64,7 +64,7 @@ KEYS = (
         "takeoff_max_m",
         Whole(2, 255),
         "Greatest take-off height of a mission, metres, 2..255; a higher one becomes this.",
-        str(DEFAULT_TAKEOFF_MAX_M),
+        str(TAKEOFF_MAX_M),
     ),
     Key(
         "autopilot",

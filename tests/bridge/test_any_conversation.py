@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from world import GroundStation, World, flash_holding
 
-from bridge.fc.session import State
+from bridge.fc.states import Msp
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.wp_record import WpRecord
@@ -154,7 +154,7 @@ class Conversation(RuleBasedStateMachine):
             world.power_on()
         world.run(10)
         self.the_board_holds_a_list_that_was_sent()
-        assert world.bridge.session.state is State.MSP
+        assert isinstance(world.bridge.session.state, Msp)
         assert world.bridge._uploads.phase is None
         assert not world.bridge.runner.is_busy
         items = waypoints(LONGEST + 5, 900)

@@ -16,9 +16,10 @@ from fake_controllers import (
 )
 from world import World
 
+from bridge.controllers import other
+from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.flight_controller import Kind
-from bridge.fc.session import State
+from bridge.fc.states import Closed, Searching
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
 from simulator.options import Faults, SimOptions, TelemetryProtocol
@@ -29,7 +30,7 @@ BOXES = b"ANGLE;HORIZON;BARO;MAG;CAMSTAB;ARM;GPS HOME;GPS HOLD;"
 
 def verdict(world: World) -> bool:
     """It is known what is spoken, and at which speed."""
-    return world.bridge.session.state not in (State.NO_PORT, State.SEARCHING)
+    return not isinstance(world.bridge.session.state, Closed | Searching)
 
 
 def thinks_armed(world: World) -> bool | None:
@@ -46,7 +47,7 @@ def test_found_at_every_speed_in_time(baud: int, extension: bool) -> None:
         world.plug()
         assert world.wait_until(verdict, 20) <= (1.5 if baud == SPEEDS[0] else 8)
         world.wait_ready()
-        assert world.kind is (Kind.HARAKIRI_MISSIONS if extension else Kind.HARAKIRI)
+        assert world.kind is (harakiri.PATCHED if extension else harakiri.UNPATCHED)
         assert world.bridge.speed == baud
         found = world.events("fc.found")
         assert [event.facts["speed_baud"] for event in found] == [baud]
@@ -107,7 +108,7 @@ def test_back_within_3_s_of_the_ports_return(baud: int) -> None:
         # Perhaps in the middle of being asked who it is: then it has no name yet, but its speed is known.
         world.run(draw.random() * draw.choice((0.2, 4)))
         world.unplug()
-        assert world.bridge.session.state is State.NO_PORT
+        assert isinstance(world.bridge.session.state, Closed)
         world.run(draw.choice((0.001, draw.random() * 8)))
         world.plug()
         assert world.wait_until(verdict, 20) <= 3
@@ -167,7 +168,7 @@ def test_power_and_port_that_come_and_go_at_random_are_survived() -> None:
         world.run(0.8)
         # A board that was lost must first be missed.
         world.run(2.0)
-        world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 3)
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED, 3)
 
 
 @pytest.mark.parametrize(
@@ -186,13 +187,13 @@ def test_armed_it_may_turn_to_mavlink_and_back(protocol: TelemetryProtocol, baud
     world.wait_ready()
     for _ in range(2):
         world.faults.armed = True
-        assert world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 20) <= 8
+        assert world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 20) <= 8
         world.run(1.2)
         assert thinks_armed(world) is True
         world.run(6)
-        assert world.kind is Kind.HARAKIRI_MAVLINK
+        assert world.kind is harakiri.MAVLINK
         world.faults.armed = False
-        assert world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 20) <= 8
+        assert world.wait_until(lambda w: w.kind is harakiri.PATCHED, 20) <= 8
         world.run(0.5)
         assert thinks_armed(world) is False
         world.run(3)
@@ -206,10 +207,10 @@ def test_armed_from_the_start(protocol: TelemetryProtocol) -> None:
     world = World(SimOptions(tele_prot=protocol), Faults(armed=True))
     world.run(0.5)
     assert world.naze.armed
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 3)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 3)
     assert "no answer to" in str(world.events("fc.found")[0].facts["why"])
     world.faults.armed = False
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 8)
+    world.wait_until(lambda w: w.kind is harakiri.PATCHED, 8)
     world.assert_line_was_clean()
 
 
@@ -218,11 +219,11 @@ def test_frsky_telemetry_of_an_armed_craft_is_taken_for_nothing() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     world.wait_ready()
     world.faults.armed = True
-    world.wait_until(lambda w: w.bridge.speed == 9600 and w.kind is Kind.HARAKIRI_MISSIONS, 15)
+    world.wait_until(lambda w: w.bridge.speed == 9600 and w.kind is harakiri.PATCHED, 15)
     world.run(30)
     assert world.bridge.session.vehicle.armed
     world.faults.armed = False
-    world.wait_until(lambda w: w.bridge.speed == 115200 and w.kind is Kind.HARAKIRI_MISSIONS, 8)
+    world.wait_until(lambda w: w.bridge.speed == 115200 and w.kind is harakiri.PATCHED, 8)
     assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
     world.assert_line_was_clean()
 
@@ -230,7 +231,7 @@ def test_frsky_telemetry_of_an_armed_craft_is_taken_for_nothing() -> None:
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("rate", [1e-4, 1e-3])
 def test_bit_errors_delay_the_finding_and_never_change_the_finding(rate: float, extension: bool) -> None:
-    kind = Kind.HARAKIRI_MISSIONS if extension else Kind.HARAKIRI
+    kind = harakiri.PATCHED if extension else harakiri.UNPATCHED
     found = 0
     for seed in range(120):
         faults = Faults(bit_error_rate=rate, extension=extension)
@@ -240,7 +241,7 @@ def test_bit_errors_delay_the_finding_and_never_change_the_finding(rate: float, 
         if controller is None:
             continue
         found += 1
-        assert controller.kind is kind
+        assert controller.profile is kind
         assert controller.arm_bit == 5
         assert controller.mixer == 3
         if controller.info is not None:
@@ -252,7 +253,7 @@ def test_lost_bytes_delay_the_finding_and_never_change_it() -> None:
     for seed in range(60):
         world = World(SimOptions(seed=seed), Faults(lost_byte_rate=3e-3), speeds=(115200,))
         world.wait_until(lambda w: w.kind is not None, 20)
-        assert world.kind is Kind.HARAKIRI_MISSIONS
+        assert world.kind is harakiri.PATCHED
 
 
 OTHERS: dict[str, Callable[[], MspFake]] = {
@@ -271,9 +272,9 @@ def test_relatives_are_other_flight_controllers(name: str) -> None:
     fake = OTHERS[name]()
     world = World(peer=fake)
     world.wait_until(lambda w: w.is_found, 3)
-    assert world.kind is Kind.OTHER_MSP
+    assert world.kind is other.OTHER_MSP
     world.run(10)
-    assert world.kind is Kind.OTHER_MSP
+    assert world.kind is other.OTHER_MSP
     # Command numbers that mean something else to them are never sent.
     assert not {190, 191, 192, 193, 194, 195, 196} & set(fake.asked)
 
@@ -298,16 +299,16 @@ def test_the_arm_box_is_found_by_its_name() -> None:
 def test_a_lone_heartbeat_a_second_is_mavlink(version: int) -> None:
     world = World(peer=MavlinkOnly(version))
     assert world.wait_until(lambda w: w.is_found, 5) <= 1.5
-    assert world.kind is Kind.MAVLINK
+    assert world.kind is other.OTHER_MAVLINK
     world.run(20)
-    assert world.kind is Kind.MAVLINK
+    assert world.kind is other.OTHER_MAVLINK
     assert world.events("fc.lost") == []
 
 
 def test_a_heartbeat_without_content_is_no_heartbeat() -> None:
     """MAVLink 2 leaves zeros out: an empty heartbeat is one byte long."""
     world = World(peer=MavlinkOnly())
-    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)
     for fields in ((0, 0, 0, 0, 0, 0), (2, 3, 0x80, 0, 3, 0), (2, 3, 0x80 | 81, 0, 4, 3)):
         for version in (1, 2):
@@ -320,7 +321,7 @@ def test_a_heartbeat_without_content_is_no_heartbeat() -> None:
 def test_nobody_is_found_where_nobody_is(peer: Callable[[], QuietLine]) -> None:
     world = World(peer=peer())
     world.run(60)
-    assert world.bridge.session.state is State.SEARCHING
+    assert isinstance(world.bridge.session.state, Searching)
     assert world.events("fc.found") == []
 
 

@@ -14,9 +14,12 @@ import pytest
 from conversations import Download, Upload, clear_message, waypoints
 from world import GroundStation, World
 
-from bridge.controllers.table import _DIALECTS
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.controllers.inav import profile as inav
+from bridge.controllers.multiwii import profile as multiwii
+from bridge.controllers.table import PROFILES
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.flight_controller import Kind
+from bridge.fc.profile import Profile
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import Delivery, HeldMission
@@ -52,7 +55,7 @@ class Craft:
 
     def pull(self) -> HeldMission:
         held: list[Any] = []
-        self.world.bridge.pull_locally(held.append, self.world.now)
+        self.world.bridge.local.pull(held.append, self.world.now)
         self.world.wait_until(lambda _: bool(held), PATIENCE_S)
         assert isinstance(held[0], HeldMission), held[0]
         return held[0]
@@ -72,7 +75,7 @@ def is_alike(one: MissionItem, other: MissionItem) -> bool:
     return near and replace(one, lat_e7=other.lat_e7, lon_e7=other.lon_e7) == other
 
 
-def harakiri() -> Craft:
+def patched_harakiri() -> Craft:
     faults = Faults()
     world = World(faults=faults, speeds=(115200,))
     return Craft(world, GroundStation(world), faults, 2.0)
@@ -90,16 +93,16 @@ def board(kind: str) -> Craft:
     return Craft(world, GroundStation(world), faults, 0.0)
 
 
-MAKERS: dict[Kind, Callable[[], Craft]] = {
-    Kind.HARAKIRI_MISSIONS: harakiri,
-    Kind.HARAKIRI_MAVLINK: harakiri_mavlink,
-    Kind.INAV: lambda: board("inav"),
-    Kind.MULTIWII_NAV: lambda: board("multiwii"),
+MAKERS: dict[Profile, Callable[[], Craft]] = {
+    harakiri.PATCHED: patched_harakiri,
+    harakiri.MAVLINK: harakiri_mavlink,
+    inav.PROFILE: lambda: board("inav"),
+    multiwii.PROFILE: lambda: board("multiwii"),
 }
 
 
 def test_every_dialect_is_here() -> None:
-    assert MAKERS.keys() == _DIALECTS.keys()
+    assert MAKERS.keys() == {profile for profile in PROFILES if profile.open_store is not None}
 
 
 def assert_is_true(craft: Craft, delivery: Delivery, old: Sequence[MissionItem], new: Sequence[MissionItem]) -> None:

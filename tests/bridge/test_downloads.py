@@ -17,8 +17,9 @@ from conversations import (
 from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from world import Air, GroundStation, World, flash_holding
 
-from bridge.fc.flight_controller import Kind
-from bridge.missions.mission_service import HeldMission, Refusal
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.missions.mission_service import HeldMission
+from bridge.model.refusal import Refusal
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import MspParser
@@ -261,7 +262,7 @@ def test_a_long_queue_without_a_link_ends() -> None:
     bridge = world.bridge
     answers: list[HeldMission | Refusal] = []
     for _ in range(600):
-        bridge.pull_locally(answers.append, world.now)
+        bridge.local.pull(answers.append, world.now)
     bridge.fc_closed(world.now, "unplugged")
     assert len(answers) == 600
     assert {answer.text for answer in answers if isinstance(answer, Refusal)} == {"No link to the flight controller"}
@@ -287,7 +288,7 @@ def test_armed_in_mavlink_mode_home_is_served_and_no_more() -> None:
     home = world.bridge.session.vehicle.home_or_position()
     assert home is not None
     world.faults.armed = True
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 8)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
     world.run(1.5)
     (item,) = ask(station, request_message(0))
     assert (item.x, item.y) == home

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from test_pass_through import Autopilot
 from world import Air, GroundStation, World
 
-from bridge.fc.flight_controller import Kind
+from bridge.controllers import other
 from bridge.gcs.guard import LinkAccess
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA, Message
@@ -96,7 +96,7 @@ def signing_station(world: World, name: str = "gcs", *, at: int = ticks(NOON), s
 def passing(links: dict[str, LinkAccess], sysid: int = 1) -> tuple[World, Autopilot]:
     autopilot = Autopilot(sysid=sysid)
     world = World(peer=autopilot, links=links)
-    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     world.run(1.5)
     autopilot.received.clear()
     return world, autopilot

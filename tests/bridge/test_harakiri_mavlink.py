@@ -8,9 +8,9 @@ import pytest
 from conversations import Download, Upload, waypoints
 from world import GroundStation, World
 
+from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.mavlink_missions import as_stored
-from bridge.fc.flight_controller import Kind
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.wp_record import WpRecord
@@ -24,7 +24,7 @@ def mavlink_only(faults: Faults | None = None, seed: int = 0) -> tuple[World, Gr
     faults = faults or Faults()
     faults.extension = faults.msp = False
     world = World(SimOptions(seed=seed), faults, speeds=(115200,), seed=seed)
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 8)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
     world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 8)
     return world, GroundStation(world)
 
@@ -71,7 +71,7 @@ def test_a_list_that_was_there_is_read() -> None:
     assert Upload(station, mixed()).run() is A.ACCEPTED
     world.unplug()
     world.plug()
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 8)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
     world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 8)
     read = Download(station).run()
     assert read is not None
@@ -142,6 +142,6 @@ def test_a_bad_line_costs_time_and_never_the_truth(rate: float) -> None:
 def test_an_unpatched_harakiri_that_answers_msp_is_told_what_it_lacks() -> None:
     faults = Faults(extension=False)
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=(115200,))
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI, 8)
+    world.wait_until(lambda w: w.kind is harakiri.UNPATCHED, 8)
     station = GroundStation(world)
     assert Upload(station, waypoints(5)).run() is A.UNSUPPORTED

@@ -9,9 +9,12 @@ from conversations import Download, Upload, clear_message, count_message, waypoi
 from fake_inav import FakeInav, FakeMultiwii, lossy
 from world import Air, GroundStation, World
 
+from bridge.controllers import other
+from bridge.controllers.inav import profile as inav
+from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
-from bridge.fc.flight_controller import Kind
+from bridge.fc.profile import Profile
 from bridge.missions.list_check import check_list
 from bridge.model.mission_log import Outcome
 from protocols.mavlink.dialect import messages
@@ -43,9 +46,9 @@ def found(peer: FakeInav) -> tuple[World, GroundStation]:
 
 
 @pytest.mark.parametrize(
-    ("make", "kind", "capacity"), [(FakeInav, Kind.INAV, 120), (FakeMultiwii, Kind.MULTIWII_NAV, 60)]
+    ("make", "kind", "capacity"), [(FakeInav, inav.PROFILE, 120), (FakeMultiwii, multiwii.PROFILE, 60)]
 )
-def test_it_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Kind, capacity: int) -> None:
+def test_it_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
     world, _ = found(make())
     assert world.kind is kind
     assert world.bridge.session.controller is not None
@@ -187,16 +190,16 @@ def test_a_save_that_fails_is_told() -> None:
 
 
 def test_cleared_is_a_single_way_home_and_reads_as_nothing() -> None:
-    for inav in (FakeInav(), FakeMultiwii()):
-        world, station = found(inav)
+    for board in (FakeInav(), FakeMultiwii()):
+        world, station = found(board)
         assert Upload(station, plan(10)).run() is ACCEPTED
         station.send(count_message(0))
         world.run(3)
-        assert (inav.flown if isinstance(inav, FakeMultiwii) else inav.saved) == [CLEARED]
+        assert (board.flown if isinstance(board, FakeMultiwii) else board.saved) == [CLEARED]
         download = Download(station)
         assert download.run() == []
         assert download.count == 0
-        other, other_station = found(inav)
+        other, other_station = found(board)
         assert other.bridge.missions.held is not None
         assert Download(other_station).run() == []
 
@@ -288,27 +291,27 @@ def test_only_a_question_tells_that_a_telemetry_reply_is_no_record() -> None:
 
 @pytest.mark.parametrize("name", [b"BTFL", b"CLFL", b"INAV"])
 def test_others_are_telemetry_only(name: bytes) -> None:
-    other = FakeInav()
-    other.answers = {1: b"\0\1\x2a", 2: name, 119: bytes((0, 1, 2)), 116: b"ARM;ANGLE;"}
-    other.answer = lambda frame: (  # type: ignore[method-assign]
-        bytes(6) + b"\1\0\0\0\0" if frame.command == 101 else other.answers.get(frame.command)
+    board = FakeInav()
+    board.answers = {1: b"\0\1\x2a", 2: name, 119: bytes((0, 1, 2)), 116: b"ARM;ANGLE;"}
+    board.answer = lambda frame: (  # type: ignore[method-assign]
+        bytes(6) + b"\1\0\0\0\0" if frame.command == 101 else board.answers.get(frame.command)
     )
-    world, station = found(other)
-    assert world.kind is Kind.OTHER_MSP
+    world, station = found(board)
+    assert world.kind is other.OTHER_MSP
     world.run(1)
     assert world.bridge.session.vehicle.armed is True
     assert Upload(station, plan(5)).run() is MissionResult.UNSUPPORTED
     assert any("stores no missions" in text for text in station.texts())
-    assert not {Nav.SET_WP, Nav.SAVE, Nav.LOAD} & set(other.commands)
+    assert not {Nav.SET_WP, Nav.SAVE, Nav.LOAD} & set(board.commands)
 
 
 def test_the_boxes_of_a_betaflight_whose_names_outgrow_a_frame() -> None:
-    other = FakeInav()
-    other.answers = {2: b"BTFL", 119: bytes((0, 1, 46, 11))}
-    other.answer = lambda frame: (  # type: ignore[method-assign]
-        bytes(6) + b"\5\0\0\0\0" if frame.command == 101 else other.answers.get(frame.command)
+    board = FakeInav()
+    board.answers = {2: b"BTFL", 119: bytes((0, 1, 46, 11))}
+    board.answer = lambda frame: (  # type: ignore[method-assign]
+        bytes(6) + b"\5\0\0\0\0" if frame.command == 101 else board.answers.get(frame.command)
     )
-    world, station = found(other)
+    world, station = found(board)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     world.run(3)
     beat = station.said("HEARTBEAT")[-1]

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from test_inav import packed, plan
 from world import GroundStation, World
 
+from bridge.controllers.inav import profile as inav
+from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
-from bridge.fc.flight_controller import Kind
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
@@ -73,7 +74,7 @@ def without_home(items: list[MissionItem]) -> list[MissionItem]:
 @pytest.mark.parametrize("version", BOXES)
 def test_a_mission_comes_back_as_it_was_sent_on_each_version(version: str) -> None:
     board, world, station = board_with(version=version)
-    assert world.kind is Kind.INAV
+    assert world.kind is inav.PROFILE
     sent = mixed()
     assert Upload(station, sent).run() is ACCEPTED
     assert world.store.missions[-1][0].verdict.findings == ()
@@ -88,7 +89,7 @@ def test_a_mission_comes_back_as_it_was_sent_on_each_version(version: str) -> No
 
 def test_a_multiwii_holds_what_it_can() -> None:
     board, world, station = board_with("multiwii", capacity=40)
-    assert world.kind is Kind.MULTIWII_NAV
+    assert world.kind is multiwii.PROFILE
     assert Upload(station, plan(42), tries=60).run() is MissionResult.NO_SPACE
     assert Upload(station, plan(21), tries=60).run() is ACCEPTED
     wanted = [r.pack() for r in check_list(plan(21), NavRules(multiwii_profile())).records]
@@ -246,6 +247,6 @@ def test_a_frame_that_somebody_left_unfinished_does_not_hide_the_board(size: int
     board.receive(bytes((ord("$"), ord("M"), ord("<"), size, Nav.SET_WP, 1)), world.now)
     world.run(0.5)
     world.plug()
-    world.wait_until(lambda w: w.kind is Kind.INAV, 15)
+    world.wait_until(lambda w: w.kind is inav.PROFILE, 15)
     assert Upload(GroundStation(world), plan(10)).run() is ACCEPTED
     assert not board.counters.cli_entered

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from world import GroundStation, World
 
-from bridge.fc.flight_controller import Kind
+from bridge.controllers.harakiri import profile as harakiri
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify
@@ -80,7 +80,7 @@ class Stubborn(Odd):
 
 def found(peer: QuietLine) -> tuple[World, GroundStation]:
     world = World(speeds=(115200,), peer=peer)
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS, 5)
+    world.wait_until(lambda w: w.kind is harakiri.PATCHED, 5)
     return world, GroundStation(world)
 
 

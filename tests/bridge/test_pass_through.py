@@ -10,7 +10,7 @@ from fake_controllers import QuietLine
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from world import GroundStation, World
 
-from bridge.fc.flight_controller import Kind
+from bridge.controllers import other
 from protocols.mavlink.frame import MavlinkSplitter
 
 KEY = sha256(b"a passphrase").digest()
@@ -55,7 +55,7 @@ def passing(autopilot: Autopilot | None = None, stations: int = 2) -> tuple[Worl
     """An autopilot that was found, and ground stations that were heard."""
     autopilot = autopilot or Autopilot()
     world = World(peer=autopilot)
-    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     heard = [GroundStation(world, f"gcs{number}", sysid=255 - number) for number in range(stations)]
     for station in heard:
         station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
@@ -204,7 +204,7 @@ def test_an_autopilot_that_is_gone_is_not_played() -> None:
     world.run(10)
     assert station.said() == []
     world.plug()
-    world.wait_until(lambda w: w.kind is Kind.MAVLINK, 3)
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     world.run(3)
     assert station.said("HEARTBEAT")
 

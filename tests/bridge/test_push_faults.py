@@ -13,7 +13,8 @@ from conversations import records_of, waypoints
 from world import World, flash_holding
 
 from bridge.missions.fc_mission_store import PushFailure
-from bridge.missions.mission_service import ARMED, Delivery, HeldMission, Refusal
+from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.model.refusal import ARMED, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
@@ -141,7 +142,7 @@ def test_a_pull_over_a_bad_line_is_right_or_refused() -> None:
         world.faults.bit_error_rate = 1e-3
         world.bridge.missions.held = None
         answers: list[HeldMission | Refusal] = []
-        world.bridge.pull_locally(answers.append, world.now)
+        world.bridge.local.pull(answers.append, world.now)
         world.wait_until(lambda _, answers=answers: bool(answers), 60)  # type: ignore[misc]
         if isinstance(answers[0], HeldMission):
             held += 1

@@ -8,8 +8,8 @@ from conversations import Upload, count_message, records_of, waypoints
 from world import Air, GroundStation, World, flash_holding
 
 from bridge.missions.fc_mission_store import PushFailure
-from bridge.missions.mission_service import Refusal
 from bridge.model.mission_log import Outcome
+from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand

@@ -7,7 +7,8 @@ import pytest
 from conversations import Upload, records_of, waypoints
 from world import GroundStation, World
 
-from bridge.fc.flight_controller import Kind
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.fc.profile import Profile
 from protocols.mission_item import MissionResult
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions, TelemetryProtocol
@@ -70,8 +71,8 @@ def test_one_vehicle_throughout(protocol: TelemetryProtocol, baud: int) -> None:
     world.assert_line_was_clean()
 
 
-@pytest.mark.parametrize(("board", "wanted"), [(SimulatedNaze, Kind.HARAKIRI_MISSIONS), (DeafWhileArmed, Kind.FRSKY)])
-def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Kind) -> None:
+@pytest.mark.parametrize(("board", "wanted"), [(SimulatedNaze, harakiri.PATCHED), (DeafWhileArmed, harakiri.FRSKY)])
+def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> None:
     faults = Faults()
     world = World(faults=faults, peer=board(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults))
     station = GroundStation(world)
@@ -88,7 +89,7 @@ def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Kind) -> None:
         assert len(warnings) == (board is DeafWhileArmed)
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         faults.armed = False
-        world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MISSIONS and w.bridge.speed == 115200, 5)
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.speed == 115200, 5)
         world.run(3)
         assert max(heartbeat_gaps(station)) <= 1.5
     world.assert_line_was_clean()

@@ -7,7 +7,9 @@ from typing import Any
 
 import pytest
 
-from bridge.fc.flight_controller import FlightController, Kind
+from bridge.controllers import other
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.fc.profile import FlightController
 from bridge.model.vehicle_state import VehicleState
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY
@@ -16,11 +18,11 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
 
 HARAKIRI_BOXES = ("ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO")
-HARAKIRI = FlightController(Kind.HARAKIRI, "Harakiri", 3, HARAKIRI_BOXES)
+HARAKIRI = FlightController(harakiri.UNPATCHED, "Harakiri", 3, HARAKIRI_BOXES)
 INAV = FlightController(
-    Kind.OTHER_MSP, "INAV", None, ("ARM", "ANGLE", "HORIZON", "NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
+    other.OTHER_MSP, "INAV", None, ("ARM", "ANGLE", "HORIZON", "NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
 )
-BETAFLIGHT = FlightController(Kind.OTHER_MSP, "BTFL", None, ("ARM", "ANGLE", "HORIZON", "ALT HOLD", "GPS RESCUE"))
+BETAFLIGHT = FlightController(other.OTHER_MSP, "BTFL", None, ("ARM", "ANGLE", "HORIZON", "ALT HOLD", "GPS RESCUE"))
 ALL_SENSORS = 0b1111
 U16, U8 = 65535, 255
 

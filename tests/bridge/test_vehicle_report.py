@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from test_pass_through import Autopilot, passing
 from world import GroundStation, World
 
-from bridge.fc.flight_controller import Kind
+from bridge.controllers.harakiri import profile as harakiri
 from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from bridge.vehicle.mavlink_groups import MavlinkGroups
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
@@ -131,7 +131,7 @@ def test_an_armed_harakiri_goes_on_in_mavlink() -> None:
     world.run(2.0)
     before = world.bridge.report.whole()
     world.faults.armed = True
-    world.wait_until(lambda w: w.kind is Kind.HARAKIRI_MAVLINK, 10)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 10)
     world.run(3.0)
     now = world.bridge.report.whole()
     assert now.status.armed

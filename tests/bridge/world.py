@@ -14,9 +14,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from bridge.bridge import Bridge, BridgeConfig
+from bridge.controllers import other
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.controllers.inav import profile as inav
+from bridge.controllers.multiwii import profile as multiwii
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.flight_controller import Kind
-from bridge.fc.session import State
+from bridge.fc.profile import Profile
+from bridge.fc.states import Mavlink, Msp
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
@@ -200,20 +204,20 @@ class World:
     def push(self, items: Sequence[Any]) -> list[Any]:
         """Push as the command line does; the list gets the outcome."""
         outcome: list[Any] = []
-        self.bridge.push_locally(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
+        self.bridge.local.push(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
         self._flush()
         return outcome
 
     # What tests look at.
 
     @property
-    def kind(self) -> Kind | None:
+    def kind(self) -> Profile | None:
         controller = self.bridge.session.controller
-        return None if controller is None else controller.kind
+        return None if controller is None else controller.profile
 
     @property
     def is_found(self) -> bool:
-        return self.bridge.session.state in (State.MSP, State.MAVLINK)
+        return isinstance(self.bridge.session.state, Msp | Mavlink)
 
     @property
     def stored(self) -> tuple[WpRecord, ...]:
@@ -273,18 +277,18 @@ class World:
 
     def _write(self, data: bytes) -> None:
         assert self._plugged
-        if self.kind is Kind.MAVLINK:
+        if self.kind is other.OTHER_MAVLINK:
             # What ground stations send to an autopilot that speaks for itself.
             (passed,) = MavlinkSplitter().feed(data)
             assert passed.raw == data
-        elif self.kind is Kind.HARAKIRI_MAVLINK and data[0] == MAGIC_V1:
+        elif self.kind is harakiri.MAVLINK and data[0] == MAGIC_V1:
             # Whether it sets off a trap is counted by the board.
             (sent,) = MavlinkSplitter().feed(data)
             assert sent.raw == data
         else:
             frames = MspParser().feed(data)
             assert b"".join(frame.encode() for frame in frames) == data, f"not whole frames: {data.hex()}"
-            assert is_clean(data) or self.kind in (Kind.INAV, Kind.MULTIWII_NAV), data.hex()
+            assert is_clean(data) or self.kind in (inav.PROFILE, multiwii.PROFILE), data.hex()
         speed = self.bridge.speed
         self.written.append((self.now, speed, data))
         self.naze.receive(garble(data, speed, self.naze.baud) if speed else data, self.now)

@@ -8,7 +8,10 @@ from bridge.controllers.harakiri.records import items_from_records
 from bridge.controllers.harakiri.rules import (
     NO_ROI_KNOWN,
     NOSE_ON_ROI,
+    TAKEOFF_MAX_M,
     UNUSED,
+    USUAL_CAPACITY,
+    USUAL_WP_RADIUS_CM,
     CommandRule,
     Place,
     Range,
@@ -36,9 +39,9 @@ class HarakiriRules:
     capacity: records it can hold, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: highest take-off.
     """
 
-    capacity: int = 146
-    wp_radius_cm: int = 200
-    takeoff_max_m: int = 15
+    capacity: int = USUAL_CAPACITY
+    wp_radius_cm: int = USUAL_WP_RADIUS_CM
+    takeoff_max_m: int = TAKEOFF_MAX_M
 
     @property
     def max_items(self) -> int:

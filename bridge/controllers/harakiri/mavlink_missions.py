@@ -59,16 +59,15 @@ class _Failed(Exception):
 class HarakiriMavlinkMissions:
     """The mission store of one Harakiri in MAVLink mode. `is_armed`: None while no heartbeat told."""
 
-    def __init__(self, is_armed: Callable[[], bool | None], takeoff_max_m: int) -> None:
+    def __init__(self, is_armed: Callable[[], bool | None], rules: HarakiriRules) -> None:
         self._is_armed = is_armed
-        self._rules = HarakiriRules(takeoff_max_m=takeoff_max_m)
+        self._rules = rules
         self._decoder = MavlinkDecoder()
         self._known: tuple[WpRecord, ...] | None = None
 
     @property
-    def wp_radius_cm(self) -> int:
-        """Harakiri's default: its own value cannot be asked for here."""
-        return self._rules.wp_radius_cm
+    def wp_radius_cm(self) -> None:
+        """gps_wp_radius cannot be read over Harakiri's MAVLink."""
 
     def report(self) -> Conversation[StoreReport | None]:
         """Tell whether it would take a list; what it holds is not known without reading it."""

@@ -21,6 +21,11 @@ MAV_COMMANDS: Mapping[int, Command] = {
 }
 ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
 
+#: Of a board with its default settings; a patched one reports its own.
+USUAL_CAPACITY = 146
+USUAL_WP_RADIUS_CM = 200
+#: The user manual's limit; the firmware itself would take 255.
+TAKEOFF_MAX_M = 15
 _MAX_RADIUS_M = 255
 
 

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Harakiri: how it is recognised, and what it can do on each protocol that it speaks.
+
+Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky telemetry (1) or MAVLink (2, 3).
+"""
+
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
+from bridge.controllers.harakiri.mission_store import HarakiriMissions
+from bridge.controllers.harakiri.rules import USUAL_CAPACITY, USUAL_WP_RADIUS_CM
+from bridge.fc.autosense import Spoken
+from bridge.fc.interview import Interview
+from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
+from bridge.line.conversation import Conversation
+from bridge.missions.fc_mission_store import AnyFcMissionStore
+from bridge.model.refusal import ARMED, Refusal
+from protocols.mission_item import MissionResult
+from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
+
+_FAMILY = "Harakiri"
+_VERSION = 211
+_CAPABILITY = 0x80000000
+#: A box that no other firmware has.
+_OWN_BOX = "GTUNE"
+
+
+def rules(settings: RuleSettings) -> HarakiriRules:
+    """The mission rules; what the settings leave open is as on a board with its default settings."""
+    radius_cm = USUAL_WP_RADIUS_CM if settings.wp_radius_cm is None else settings.wp_radius_cm
+    return HarakiriRules(settings.capacity or USUAL_CAPACITY, radius_cm, settings.takeoff_max_m)
+
+
+def _recognise_patched(board: Interview) -> Conversation[FlightController | None]:
+    harakiri = yield from _recognise_unpatched(board)
+    if harakiri is None:
+        return None
+    # Asked last, and only of a Harakiri: to other boards this command number means something else.
+    info = decode_info((yield from board.ask(MissionCommand.INFO, INFO_SIZE)).payload)
+    return None if info is None else FlightController(PATCHED, PATCHED.name, harakiri.mixer, harakiri.boxes, info)
+
+
+def _recognise_unpatched(board: Interview) -> Conversation[FlightController | None]:
+    ident = yield from board.ident()
+    if ident is None or (ident.version, ident.capability) != (_VERSION, _CAPABILITY):
+        return None
+    boxes = yield from board.box_names()
+    return FlightController(UNPATCHED, UNPATCHED.name, ident.mixer, boxes) if _OWN_BOX in boxes else None
+
+
+def _msp_store(controller: FlightController, _view: VehicleView, settings: RuleSettings) -> AnyFcMissionStore:
+    assert controller.info is not None
+    return HarakiriMissions(controller.info, settings.takeoff_max_m)
+
+
+def _mavlink_store(_controller: FlightController, view: VehicleView, settings: RuleSettings) -> AnyFcMissionStore:
+    return HarakiriMavlinkMissions(view.is_armed, rules(settings))
+
+
+PATCHED = Profile(
+    "Harakiri with the mission extension",
+    _FAMILY,
+    recognise=_recognise_patched,
+    open_store=_msp_store,
+    check_kind="harakiri",
+    rules=rules,
+    restarts_after_calibration=True,
+)
+UNPATCHED = Profile(
+    "Harakiri without the mission extension",
+    _FAMILY,
+    recognise=_recognise_unpatched,
+    no_missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
+    restarts_after_calibration=True,
+)
+MAVLINK = Profile(
+    "Harakiri in MAVLink mode",
+    _FAMILY,
+    Spoken.MAVLINK,
+    open_store=_mavlink_store,
+    mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
+)
+FRSKY = Profile(
+    "Harakiri in FrSky mode",
+    _FAMILY,
+    Spoken.FRSKY,
+    no_missions=ARMED,
+    notice="Telemetry not readable while armed (FrSky)",
+)
+PROFILES = (PATCHED, UNPATCHED, MAVLINK, FRSKY)

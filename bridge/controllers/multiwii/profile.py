@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""MultiWii 2.4 with navigation: how it is recognised, and what it can do."""
+
+from bridge.controllers.multiwii.mission_store import MultiwiiMissions
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.mission_store import NavCraft
+from bridge.controllers.nav.rules import NAV_CAPACITY, multiwii_profile
+from bridge.fc.interview import Interview
+from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
+from bridge.line.conversation import Conversation
+from bridge.line.poll_schedule import NAV_POLL, POLLS
+from bridge.missions.fc_mission_store import AnyFcMissionStore
+from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
+
+#: IDENT's capability bit of a board that flies missions.
+_NAV_CAPABILITY = 1 << 4
+
+
+def _recognise(board: Interview) -> Conversation[FlightController | None]:
+    ident = yield from board.ident()
+    if ident is None or not ident.capability & _NAV_CAPABILITY or (yield from board.variant()) is not None:
+        return None
+    boxes = yield from board.box_names()
+    name = f"MultiWii {ident.version}"
+    if FlightController(PROFILE, name, boxes=boxes).arm_bit is None:
+        return None
+    capacity = decode_nav_config((yield from board.ask(Nav.NAV_CONFIG, NAV_CONFIG_SIZE)).payload)
+    return FlightController(PROFILE, name, ident.mixer, boxes, capacity=capacity) if capacity else None
+
+
+def _rules(settings: RuleSettings) -> NavRules:
+    return NavRules(multiwii_profile(settings.capacity or NAV_CAPACITY))
+
+
+def _open_store(controller: FlightController, view: VehicleView, _settings: RuleSettings) -> AnyFcMissionStore:
+    assert controller.arm_bit is not None
+    craft = NavCraft(1 << controller.arm_bit, view.is_armed, view.home, view.position)
+    return MultiwiiMissions(multiwii_profile(controller.capacity), craft)
+
+
+PROFILE = Profile(
+    "MultiWii NAV",
+    "MultiWii",
+    recognise=_recognise,
+    polls=(*POLLS, NAV_POLL),
+    accepts_any_byte=True,
+    open_store=_open_store,
+    check_kind="multiwii",
+    rules=_rules,
+)

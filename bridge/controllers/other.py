@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Flight controllers that are shown but store no missions here, and autopilots that speak MAVLink themselves."""
+
+from bridge.fc.autosense import Spoken
+from bridge.fc.interview import Interview
+from bridge.fc.profile import FlightController, Profile
+from bridge.line.conversation import Conversation
+from bridge.model.refusal import Refusal
+from protocols.mission_item import MissionResult
+
+_BETAFLIGHT = "BTFL"
+#: Betaflight's permanent box ids (msp_box.c) of the modes that make a flight mode.
+_BETAFLIGHT_BOXES = {0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "ALT HOLD", 11: "POS HOLD", 46: "GPS RESCUE"}
+
+
+def _recognise(board: Interview) -> Conversation[FlightController | None]:
+    """Any board that answers is one of these."""
+    ident = yield from board.ident()
+    if ident is not None:
+        boxes = yield from board.box_names()
+        name = (yield from board.variant()) or f"MultiWii {ident.version}"
+        return FlightController(OTHER_MSP, name, ident.mixer, boxes)
+    name = (yield from board.variant()) or "unknown"
+    if name == _BETAFLIGHT:
+        boxes = yield from board.boxes_by_id(_BETAFLIGHT_BOXES)
+    else:
+        boxes = yield from board.box_names()
+    return FlightController(OTHER_MSP, name, boxes=boxes)
+
+
+OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise)
+#: Ground stations write missions to such an autopilot directly; only the command line can ask the bridge for it.
+OTHER_MAVLINK = Profile(
+    "another MAVLink autopilot",
+    "other",
+    Spoken.MAVLINK,
+    no_missions=Refusal(
+        MissionResult.UNSUPPORTED, "This autopilot speaks MAVLink itself: write its missions from a ground station"
+    ),
+    is_passed_through=True,
+)

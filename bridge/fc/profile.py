@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The profile of a flight controller: everything in which one kind differs from another.
+
+`bridge.controllers.table` lists the profiles. To add a flight controller, write its profile in a file of its own under
+`bridge/controllers/` and add it to that list; nothing else asks what kind of board it is.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bridge.fc.autosense import Spoken
+from bridge.fc.interview import Interview
+from bridge.line.conversation import Conversation
+from bridge.line.poll_schedule import POLLS, Poll
+from bridge.missions.fc_mission_store import AnyFcMissionStore
+from bridge.missions.list_check import MissionRules
+from bridge.model.refusal import Refusal
+from protocols.mission_item import MissionResult
+from protocols.msp.mission import Info
+
+_ARM_BOX = "ARM"
+
+NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions")
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleView:
+    """What a mission store may ask about the craft while it works. Positions are degrees * 1e7.
+
+    is_armed: None while unknown. home: as the flight controller reports it. position: home, or else where it is.
+    """
+
+    is_armed: Callable[[], bool | None]
+    home: Callable[[], tuple[int, int] | None]
+    position: Callable[[], tuple[int, int] | None]
+
+
+@dataclass(frozen=True, slots=True)
+class RuleSettings:
+    """What the mission rules depend on beside the firmware. capacity: records, None for the firmware's usual number."""
+
+    takeoff_max_m: int
+    wp_radius_cm: int | None = None
+    capacity: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """One kind of flight controller, on one protocol.
+
+    name: for people and logs. family: profiles of one firmware share it; a board that switches protocol stays in it.
+    recognise: MSP only; returns the flight controller if the interview shows that it is this kind.
+    polls: the telemetry questions it answers. accepts_any_byte: its parser acts on no byte runs inside a frame.
+    open_store: how missions are written to it, or None with `no_missions` as the reply to any attempt.
+    check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
+    mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
+    is_passed_through: an autopilot that represents itself to ground stations. It is never spoken for.
+    restarts_after_calibration: it reboots by itself when a calibration is done.
+    notice: a warning for the pilot while this profile is active.
+    """
+
+    name: str
+    family: str
+    spoken: Spoken = Spoken.MSP
+    recognise: Callable[[Interview], Conversation["FlightController | None"]] | None = None
+    polls: tuple[Poll, ...] = POLLS
+    accepts_any_byte: bool = False
+    open_store: Callable[["FlightController", VehicleView, RuleSettings], AnyFcMissionStore] | None = None
+    no_missions: Refusal = NO_MISSIONS
+    check_kind: str | None = None
+    rules: Callable[[RuleSettings], MissionRules] | None = None
+    mavlink_sender: tuple[int, int, int] | None = None
+    is_passed_through: bool = False
+    restarts_after_calibration: bool = False
+    notice: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FlightController:
+    """The board on the line. `boxes` are in the order of the status flags; "" is a flag without a meaning here.
+
+    mixer: IDENT's frame type. info: Harakiri's mission extension. capacity: mission records, if the board reported it.
+    """
+
+    profile: Profile
+    name: str
+    mixer: int | None = None
+    boxes: tuple[str, ...] = ()
+    info: Info | None = None
+    capacity: int = 0
+
+    @property
+    def arm_bit(self) -> int | None:
+        """The place of the ARM box in the status flags."""
+        return self.boxes.index(_ARM_BOX) if _ARM_BOX in self.boxes else None

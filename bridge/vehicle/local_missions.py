@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Missions from the Pi itself: the command line, the status page and zenoh write, read and check them here. Sans-IO."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from bridge.gcs.station import Post, Severity
+from bridge.line.conversation import Conversation, LinkLost
+from bridge.line.runner import Runner
+from bridge.missions.fc_mission_store import StoreReport
+from bridge.missions.list_check import check_list
+from bridge.missions.mission_service import NO_LINK, Delivery, HeldMission, MissionService
+from bridge.model.events import EventLog, Incidents
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.refusal import Refusal
+from bridge.model.verdict import Verdict
+from protocols.mission_item import MissionItem, MissionResult
+
+
+class LocalMissions:
+    """Does with a whole list what an upload by a ground station does item by item."""
+
+    def __init__(
+        self,
+        missions: MissionService,
+        runner: Runner,
+        post: Post,
+        log_event: EventLog,
+        incidents: Incidents,
+        fallback_home: Callable[[], tuple[int, int] | None],
+    ) -> None:
+        self._missions = missions
+        self._runner = runner
+        self._post = post
+        self._log_event = log_event
+        self._incidents = incidents
+        self._fallback_home = fallback_home
+
+    def push(
+        self,
+        items: Sequence[MissionItem],
+        source: str,
+        on_progress: Callable[[int], None],
+        on_done: Callable[[Delivery | Refusal, ArrivedMission | None], None],
+        now: float,
+    ) -> None:
+        """Write a list; without items, clear the flight controller's. `on_progress` gets the records written so far."""
+        owner = object()
+        incident = self._incidents.begin("push")
+        arrived: list[ArrivedMission] = []
+
+        def conversation() -> Conversation[Delivery | Refusal]:
+            report: StoreReport | Refusal = yield from self._missions.preflight()
+            if isinstance(report, Refusal):
+                return report
+            verdict = check_list(items, report.rules, self._fallback_home())
+            arrived.append(ArrivedMission(source, tuple(items), verdict))
+            return (yield from self._missions.deliver(arrived[0], on_progress))
+
+        def done(result: Delivery | Refusal | LinkLost, _at: float) -> None:
+            self._missions.release(owner)
+            if isinstance(result, LinkLost):
+                result = NO_LINK
+            if arrived and isinstance(result, Delivery):
+                self._post.say(Severity.NOTICE, f"{source}: {result.text}")
+            self._log_event(
+                "info" if result.ack is MissionResult.ACCEPTED else "warning",
+                "mission.push_ended",
+                source=source,
+                mission=result.number if isinstance(result, Delivery) else None,
+                ack=result.ack.name,
+                detail=result.text,
+                incident=incident,
+            )
+            on_done(result, arrived[0] if arrived else None)
+
+        self._log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
+        refusal = self._missions.acquire(owner)
+        if refusal is None:
+            self._runner.start(conversation(), done, now)
+        else:
+            done(refusal, now)
+
+    def pull(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
+        """Read the list that the flight controller holds."""
+
+        def done(held: HeldMission | Refusal | LinkLost, _at: float) -> None:
+            on_done(NO_LINK if isinstance(held, LinkLost) else held)
+
+        self._runner.start(self._missions.read_back(), done, now)
+
+    def check(
+        self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
+    ) -> None:
+        """Check a list by the rules of the present flight controller, without writing it."""
+
+        def conversation() -> Conversation[Verdict[Any] | Refusal]:
+            rules = yield from self._missions.rules()
+            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._fallback_home())
+
+        def done(verdict: Verdict[Any] | Refusal | LinkLost, _at: float) -> None:
+            on_done(NO_LINK if isinstance(verdict, LinkLost) else verdict)
+
+        self._runner.start(conversation(), done, now)
