@@ -5,8 +5,12 @@
 #include "board.h"
 #include "mw.h"
 
-/* The slots lie right below the configuration. stm32_flash.ld refuses to link a program that reaches so far. */
+/* The slots lie right below the configuration. stm32_flash.ld refuses to link a program that reaches LINKED_BELOW. */
 #define MISSION_FLASH_ADDR (FLASH_WRITE_ADDR - NM_FLASH_SIZE)
+#define LINKED_BELOW 0x0801DC00u
+
+/* Another FLASH_PAGE_COUNT moves the configuration and with it the slots: stm32_flash.ld must then be changed too. */
+typedef char slots_lie_where_stm32_flash_ld_says[MISSION_FLASH_ADDR == LINKED_BELOW ? 1 : -1];
 
 static nm_t mission;
 
@@ -37,7 +41,7 @@ static bool program(void *self, uint16_t offset, const uint8_t *data, uint16_t l
 static const uint8_t *flash(void *self)
 {
     (void)self;
-    return (const uint8_t *)MISSION_FLASH_ADDR;
+    return (const uint8_t *)(uintptr_t)MISSION_FLASH_ADDR;
 }
 
 static uint32_t now_ms(void *self)
@@ -46,10 +50,11 @@ static uint32_t now_ms(void *self)
     return millis();
 }
 
+/* FEATURE_PASS never arms: there the throttle drives the motors directly. */
 static bool armed(void *self)
 {
     (void)self;
-    return f.ARMED;
+    return f.ARMED || (feature(FEATURE_PASS) && rcData[THROTTLE] >= cfg.rc_minchk);
 }
 
 static bool write_pending(void *self)
@@ -74,7 +79,8 @@ static void set_radius(void *self, uint16_t radius_cm)
 static void list_changed(void *self, const uint8_t *records, uint16_t count)
 {
     (void)self;
-    memcpy(cfg.FloppyDisk, records, count * NM_RECORD_SIZE);
+    if (count)
+        memcpy(cfg.FloppyDisk, records, count * NM_RECORD_SIZE);
     cfg.FDUsedDatasets = count;
 }
 
@@ -92,19 +98,26 @@ void MissionLoad(void)
         if (!nm_records(&mission))
             (void)nm_store(&mission, cfg.FloppyDisk, cfg.FDUsedDatasets);
     }
-    if (nm_records(&mission))
-        list_changed(NULL, nm_records(&mission), mission.stored.count);
+    list_changed(NULL, nm_records(&mission), mission.stored.count);
 }
 
 void MissionStore(void)
 {
-    if (mission.board)
+    if (!mission.board)
+        return;
+    if (MissionEndUpload())
+        MissionLoad();
+    else
         (void)nm_store(&mission, cfg.FloppyDisk, cfg.FDUsedDatasets);
 }
 
 void MissionPoll(void)
 {
     nm_poll(&mission);
+    if (feature(FEATURE_PASS) && ScheduleEEPROMwriteMS && millis() >= ScheduleEEPROMwriteMS && !armed(NULL)) {
+        writeParams(0);
+        ScheduleEEPROMwriteMS = 0;
+    }
 }
 
 int MissionRequest(uint8_t command, uint8_t *buffer, uint8_t size)

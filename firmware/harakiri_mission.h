@@ -11,16 +11,26 @@
 #include "naze_mission.h"
 
 /*
- * The configuration has been read into cfg, or an upload has failed: put the stored list in place. The first call finds it;
- * if there is none yet, a list in the configuration (of the time before the patch) becomes it.
+ * Put the stored list into cfg; call it when the configuration has been read into cfg, and when an upload has failed. With no
+ * stored list that is the empty one. The first call looks for the list in flash; if there has never been one there, a list in
+ * the configuration (from before the patch) becomes the stored list.
  */
 void MissionLoad(void);
 
-/* The configuration is about to be written: store the list in cfg if it is another one. Does nothing while armed. */
+/*
+ * The configuration is about to be written: store the list in cfg if it is another one. Does nothing while armed. A write in
+ * the middle of a MAVLink upload ends the upload, and the stored list stays.
+ */
 void MissionStore(void);
 
-/* Once per main loop. */
+/*
+ * Once per main loop. With FEATURE_PASS, whose main loop does not serve scheduled writes of the configuration, it writes them
+ * while the throttle is down.
+ */
 void MissionPoll(void);
+
+/* The patch adds this to baseflight_mavlink.c: end a MAVLink upload that is under way. True if there was one. */
+bool MissionEndUpload(void);
 
 /* nm_handle() on the receive buffer. */
 int MissionRequest(uint8_t command, uint8_t *buffer, uint8_t size);

@@ -96,16 +96,23 @@ static void use_slot(nm_t *m, uint8_t slot)
     m->stored.checksum = get32(header + CHECKSUM_AT);
 }
 
-/* The header's page goes first, so that no cut can leave an old header above half erased records. */
+static bool blank(const uint8_t *bytes, uint16_t length)
+{
+    while (length--)
+        if (*bytes++ != 0xFF)
+            return false;
+    return true;
+}
+
+/* Erase the pages that need it. The header's page goes first, so that no cut can leave an old header above half erased records. */
 static bool erase_slot(const nm_t *m, uint8_t slot)
 {
     for (uint8_t page = 0; page < NM_SLOT_PAGES; page++) {
         const uint8_t *bytes = slot_flash(m, slot) + page * NM_PAGE_SIZE;
-        if (!m->board->erase(m->self, (uint8_t)(slot * NM_SLOT_PAGES + page)))
+        if (blank(bytes, NM_PAGE_SIZE))
+            continue;
+        if (!m->board->erase(m->self, (uint8_t)(slot * NM_SLOT_PAGES + page)) || !blank(bytes, NM_PAGE_SIZE))
             return false;
-        for (uint16_t i = 0; i < NM_PAGE_SIZE; i++)
-            if (bytes[i] != 0xFF)
-                return false;
     }
     return true;
 }
@@ -155,6 +162,26 @@ static nm_status_t may_write(const nm_t *m)
     return m->board->write_pending(m->self) ? NM_BUSY : NM_OK;
 }
 
+/* Take a write from the budget. */
+static bool spend_write(nm_t *m)
+{
+    if (m->writes_left == 0)
+        return false;
+    m->writes_left--;
+    return true;
+}
+
+/* Make the unused slot ready for records. */
+static nm_status_t clear_slot(nm_t *m)
+{
+    const uint8_t slot = unused_slot(m);
+    if (blank(slot_flash(m, slot), NM_SLOT_SIZE))
+        return NM_OK;
+    if (!spend_write(m))
+        return NM_BUSY;
+    return erase_slot(m, slot) ? NM_OK : NM_FLASH;
+}
+
 static nm_list_t get_list(const uint8_t *body)
 {
     nm_list_t list;
@@ -171,9 +198,9 @@ static void heard(nm_t *m)
 static nm_status_t begin(nm_t *m, const uint8_t *body)
 {
     const nm_list_t list = get_list(body);
-    const nm_status_t allowed = may_write(m);
-    if (allowed != NM_OK)
-        return allowed;
+    nm_status_t status = may_write(m);
+    if (status != NM_OK)
+        return status;
     if (!m->open || !same(list, m->wanted)) {
         m->open = false;
         if (list.count > NM_CAPACITY)
@@ -182,8 +209,9 @@ static nm_status_t begin(nm_t *m, const uint8_t *body)
             return NM_BAD_REQUEST;
         if (is_stored(m, list))
             return NM_SAME;
-        if (!erase_slot(m, unused_slot(m)))
-            return NM_FLASH;
+        status = clear_slot(m);
+        if (status != NM_OK)
+            return status;
         m->open = true;
         m->wanted = list;
         m->staged.count = 0;
@@ -256,7 +284,7 @@ static nm_status_t set_radius(nm_t *m, const uint8_t *body)
         return NM_ARMED;
     if (radius == m->board->radius(m->self))
         return NM_OK;
-    if (m->board->write_pending(m->self))
+    if (m->board->write_pending(m->self) || !spend_write(m))
         return NM_BUSY;
     m->board->set_radius(m->self, radius);
     return NM_OK;
@@ -278,10 +306,11 @@ static int reply_progress(const nm_t *m, uint8_t *reply, nm_status_t status)
     return reply_list(reply, status, m->open ? m->staged : nothing);
 }
 
+/* The checksum is computed from flash, which takes 2 ms for a full list: armed, the main loop is not held up for that. */
 static int reply_stored(const nm_t *m, uint8_t *reply, nm_status_t status)
 {
     nm_list_t list = m->stored;
-    if (m->slot != NM_SLOTS)
+    if (m->slot != NM_SLOTS && !m->board->armed(m->self))
         list.checksum = checksum_in_slot(m, m->slot, list.count);
     return reply_list(reply, status, list);
 }
@@ -291,7 +320,7 @@ static int reply_info(const nm_t *m, uint8_t *reply)
     reply[0] = NM_OK;
     reply[1] = NM_VERSION;
     reply[2] = (uint8_t)((m->board->armed(m->self) ? 1u : 0u) | (m->board->write_pending(m->self) ? 2u : 0u) |
-                         (m->open ? 4u : 0u));
+                         (m->open ? 4u : 0u) | (m->writes_left == 0 ? 8u : 0u));
     reply[3] = NM_CHUNK_RECORDS;
     reply[4] = NM_CHUNK_WINDOW;
     reply[5] = NM_READ_RECORDS;
@@ -361,26 +390,25 @@ int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size)
     const uint8_t *body = buffer + 1;
     uint8_t length;
 
-    if (command < NM_INFO || command > NM_RADIUS)
-        return -1;
     nm_poll(m);
-    length = command == NM_INFO || command == NM_ABORT ? size : unmask(buffer, size);
-
     switch (command) {
     case NM_INFO:
         return reply_info(m, buffer);
     case NM_BEGIN:
-        return reply_progress(m, buffer, length == 6 ? begin(m, body) : NM_BAD_REQUEST);
+        return reply_progress(m, buffer, unmask(buffer, size) == 6 ? begin(m, body) : NM_BAD_REQUEST);
     case NM_CHUNK:
+        length = unmask(buffer, size);
         return reply_progress(m, buffer, chunk_length(length) ? chunk(m, body, length) : NM_BAD_REQUEST);
     case NM_COMMIT:
-        return reply_stored(m, buffer, length == 6 ? commit(m, body) : NM_BAD_REQUEST);
+        return reply_stored(m, buffer, unmask(buffer, size) == 6 ? commit(m, body) : NM_BAD_REQUEST);
+    case NM_ABORT:
+        return reply_abort(m, buffer, size);
     case NM_READ:
-        return reply_read(m, buffer, body, length);
+        return reply_read(m, buffer, body, unmask(buffer, size));
     case NM_RADIUS:
-        return reply_radius(m, buffer, length == 4 ? set_radius(m, body) : NM_BAD_REQUEST);
+        return reply_radius(m, buffer, unmask(buffer, size) == 4 ? set_radius(m, body) : NM_BAD_REQUEST);
     default:
-        return reply_abort(m, buffer, length);
+        return -1;
     }
 }
 
@@ -392,6 +420,8 @@ void nm_start(nm_t *m, const nm_board_t *board, void *self)
     m->board = board;
     m->self = self;
     m->slot = NM_SLOTS;
+    m->writes_left = NM_WRITE_BURST;
+    m->credited_ms = board->millis(self);
     for (uint8_t slot = 0; slot < NM_SLOTS; slot++) {
         const uint32_t sequence = get32(slot_flash(m, slot) + SEQUENCE_AT);
         if (slot_valid(m, slot) && (m->slot == NM_SLOTS || (int32_t)(sequence - m->sequence) > 0))
@@ -401,8 +431,12 @@ void nm_start(nm_t *m, const nm_board_t *board, void *self)
 
 void nm_poll(nm_t *m)
 {
-    if (m->open && (m->board->armed(m->self) || m->board->millis(m->self) - m->heard_ms > NM_IDLE_TIMEOUT_MS))
+    const uint32_t now_ms = m->board->millis(m->self);
+    if (m->open && (m->board->armed(m->self) || now_ms - m->heard_ms > NM_IDLE_TIMEOUT_MS))
         m->open = false;
+    for (; now_ms - m->credited_ms >= NM_WRITE_INTERVAL_MS; m->credited_ms += NM_WRITE_INTERVAL_MS)
+        if (m->writes_left < NM_WRITE_BURST)
+            m->writes_left++;
 }
 
 nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count)

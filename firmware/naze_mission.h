@@ -4,7 +4,7 @@
  *
  * The core takes one MSP command with its payload and gives the reply's payload; it knows nothing of serial ports, of the
  * firmware around it, or of time beyond a millisecond counter. No heap, no float, no globals: all state is one nm_t of the
- * caller's (under 50 bytes on a 32 bit target). What it needs from the board comes in through an nm_board_t.
+ * caller's (under 56 bytes on a 32 bit target). What it needs from the board comes in through an nm_board_t.
  *
  * THE FLASH
  *   NM_PAGES pages of NM_PAGE_SIZE bytes, two slots of NM_SLOT_PAGES each, written in turn. A slot is a header and, from
@@ -22,8 +22,14 @@
  *   it, COMMIT its header and then the seal. So a power cut at any moment leaves the old list or the new one, whole, and no RAM
  *   is spent on staging. Every program and erase is verified by reading back.
  *
- *   Wear: a list costs one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. A list that is stored
- *   already is never written again. nm_t.sequence (INFO's last field) counts the writes.
+ *   Wear: a list costs at most one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. Pages that are
+ *   blank are not erased again, and a list that is stored already is not written again. nm_t.sequence (INFO's last field)
+ *   counts the lists written.
+ *
+ *   A companion in a loop must not wear out the flash: BEGINs that need an erase and RADIUS requests that change the
+ *   configuration share a budget of NM_WRITE_BURST writes after a reset and one more every NM_WRITE_INTERVAL_MS, up to
+ *   NM_WRITE_BURST again. Without a write left they answer NM_BUSY, and INFO says so (flag bit 3). At that rate 10,000 erases
+ *   take 34 days of power without a pause. nm_store() is outside the budget: it must not lose a list.
  *
  * USE
  *   nm_start() once, when the flash can be read; nm_poll() in every main loop; nm_handle() for every valid MSP request whose
@@ -31,11 +37,12 @@
  *   All from one context, never from an interrupt. The core is not reentrant for one nm_t.
  *
  * TIME
- *   BEGIN takes as long as the board's three page erases (STM32F103: 20..40 ms each). A full CHUNK programs 120 half-words
- *   (52..70 us each: under 9 ms). COMMIT and nm_start() compute CRCs over up to 2,336 bytes. Nothing else touches the flash.
+ *   BEGIN takes as long as the board's page erases, up to three (STM32F103: 20..40 ms each). A full CHUNK programs 120 half-words
+ *   (52..70 us each: under 9 ms). COMMIT and nm_start() compute CRCs over up to 2,336 bytes, COMMIT only while disarmed. Nothing
+ *   else touches the flash.
  *
  * STACK
- *   Under 200 bytes below nm_handle() on Cortex-M3, without the board's functions (`make stack` prints it).
+ *   Under 200 bytes below nm_handle() on Cortex-M3, without the board's functions (`make test-arm` measures it).
  */
 #ifndef NAZE_MISSION_H
 #define NAZE_MISSION_H
@@ -53,6 +60,8 @@
 #define NM_BYTE_TIMEOUT_MS 50u /* the receiver's inter-byte time-out (INFO reports it, the receiver around the core keeps it) */
 #define NM_IDLE_TIMEOUT_MS 5000u
 #define NM_MAX_RADIUS_CM 2000u
+#define NM_WRITE_BURST 64u     /* flash writes that requests may cause in a row: more than a day of trying out missions needs */
+#define NM_WRITE_INTERVAL_MS 300000u /* ... and how often one more is allowed */
 
 #define NM_PAGE_SIZE 1024u
 #define NM_SLOT_PAGES 3u
@@ -125,19 +134,21 @@ typedef struct {
 typedef struct {
     const nm_board_t *board;
     void *self;
-    nm_list_t stored;  /* the list in the slot that counts; empty if none does */
-    nm_list_t wanted;  /* the open transfer: what BEGIN announced, */
-    nm_list_t staged;  /* ... what is in the other slot by now, */
-    uint32_t heard_ms; /* ... and when it was last heard of */
-    uint32_t sequence; /* of the slot that counts; 0 if none does */
-    uint8_t slot;      /* the slot that counts: 0, 1, or NM_SLOTS if none does */
-    bool open;         /* a transfer is open */
+    nm_list_t stored;     /* the list in the slot that counts; empty if none does */
+    nm_list_t wanted;     /* the open transfer: what BEGIN announced, */
+    nm_list_t staged;     /* ... what is in the other slot by now, */
+    uint32_t heard_ms;    /* ... and when it was last heard of */
+    uint32_t sequence;    /* of the slot that counts; 0 if none does */
+    uint32_t credited_ms; /* when the write budget last grew, or would have if it had not been full */
+    uint8_t slot;         /* the slot that counts: 0, 1, or NM_SLOTS if none does */
+    uint8_t writes_left;  /* in the budget */
+    bool open;            /* a transfer is open */
 } nm_t;
 
 /* Find the newest valid list. Reads flash only. `board` and `self` must live as long as `m` is used. */
 void nm_start(nm_t *m, const nm_board_t *board, void *self);
 
-/* Drop an open transfer if the craft is armed or nothing was heard of it for 5 s. */
+/* Drop an open transfer if the craft is armed or nothing was heard of it for 5 s; let the write budget grow. */
 void nm_poll(nm_t *m);
 
 /*

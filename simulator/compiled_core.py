@@ -166,7 +166,9 @@ class _Core(ctypes.Structure):
         ("staged", _List),
         ("heard_ms", c_uint32),
         ("sequence", c_uint32),
+        ("credited_ms", c_uint32),
         ("slot", c_uint8),
+        ("writes_left", c_uint8),
         ("open", c_bool),
     )
 

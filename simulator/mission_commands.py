@@ -26,6 +26,9 @@ _LIST = struct.Struct("<HI")
 _READ = struct.Struct("<HBB")
 _RECORDS_HEADER = struct.Struct("<BH")
 _RADIUS = struct.Struct("<HH")
+#: Flash writes that requests may cause in a row, and how often one more is allowed.
+_WRITE_BURST = 64
+_WRITE_INTERVAL_MS = 300_000
 
 
 @dataclass(slots=True)
@@ -45,6 +48,8 @@ class MissionCommands:
         self._options = board.options
         self._slots = MissionSlots(flash, board.options)
         self._transfer: _Upload | None = None
+        self._writes_left = _WRITE_BURST
+        self._intervals = 0
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """Return the reply's payload; None if the command is none of the extension's. PowerCutError."""
@@ -68,7 +73,10 @@ class MissionCommands:
         return None
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if the craft is armed, or if nothing was heard of it for too long."""
+        """Drop an open transfer if the craft is armed or nothing was heard of it for too long; add to the write budget."""
+        intervals = int(now * 1000) // _WRITE_INTERVAL_MS
+        self._writes_left = min(self._writes_left + intervals - self._intervals, _WRITE_BURST)
+        self._intervals = intervals
         if self._transfer:
             silence = now - self._transfer.touched
             if self._board.armed or silence > self._options.transfer_timeout_ms / 1000:
@@ -92,6 +100,8 @@ class MissionCommands:
             flags |= InfoFlag.WRITE_PENDING
         if self._transfer:
             flags |= InfoFlag.TRANSFER_OPEN
+        if not self._writes_left:
+            flags |= InfoFlag.WRITES_SPENT
         options = self._options
         return Info(
             version=VERSION,
@@ -111,6 +121,13 @@ class MissionCommands:
         if self._board.armed:
             return Status.ARMED
         return Status.BUSY if self._board.write_pending else None
+
+    def _spend_write(self) -> bool:
+        """Take a write from the budget; False if there is none."""
+        if self._writes_left:
+            self._writes_left -= 1
+            return True
+        return False
 
     def _progress(self, status: Status) -> Progress:
         """Where the transfer stands, whatever the status; zeros without one."""
@@ -133,10 +150,13 @@ class MissionCommands:
             return Status.BAD_REQUEST
         if identity == self._slots.stored:
             return Status.SAME
-        try:
-            self._slots.prepare()
-        except FlashError:
-            return Status.FLASH
+        if not self._slots.is_prepared:
+            if not self._spend_write():
+                return Status.BUSY
+            try:
+                self._slots.prepare()
+            except FlashError:
+                return Status.FLASH
         self._transfer = _Upload(identity, now)
         return Status.OK
 
@@ -218,7 +238,7 @@ class MissionCommands:
             return Status.ARMED
         if value == self._board.wp_radius_cm:
             return Status.OK
-        if self._board.write_pending:
+        if self._board.write_pending or not self._spend_write():
             return Status.BUSY
         self._board.set_wp_radius(value, now)
         return Status.OK

@@ -10,13 +10,14 @@ import zlib
 
 from protocols.mission_record import ListIdentity
 from protocols.wp_record import RECORD_SIZE
-from simulator.flash import PAGE_SIZE, NorFlash
+from simulator.flash import ERASED, PAGE_SIZE, NorFlash
 from simulator.options import SimOptions
 
 _HEADER = struct.Struct("<HHIII")
 _MAGIC = 0x4C50574E
 _CONFIG = struct.Struct("<HH")
 _SLOTS = 2
+_BLANK = bytes((ERASED,)) * PAGE_SIZE
 
 
 def slot_pages(capacity: int) -> int:
@@ -58,11 +59,16 @@ class MissionSlots:
         count = min(count, self.stored.count - first)
         return self._flash.read(self._record(self._active, first), count * RECORD_SIZE)
 
+    @property
+    def is_prepared(self) -> bool:
+        """True if the slot that is not in use is blank."""
+        return all(self._is_blank(page) for page in self._unused_pages)
+
     def prepare(self) -> None:
-        """Erase the slot that is not in use. FlashError, PowerCutError."""
-        first = self._unused * self._pages
-        for page in range(first, first + self._pages):
-            self._flash.erase(page, self._erase_seconds)
+        """Erase the slot that is not in use, except for blank pages. FlashError, PowerCutError."""
+        for page in self._unused_pages:
+            if not self._is_blank(page):
+                self._flash.erase(page, self._erase_seconds)
 
     def stage(self, index: int, record: bytes) -> None:
         """Program one record into the unused slot. FlashError, PowerCutError."""
@@ -83,6 +89,14 @@ class MissionSlots:
     @property
     def _unused(self) -> int:
         return 1 - self._active
+
+    @property
+    def _unused_pages(self) -> range:
+        first = self._unused * self._pages
+        return range(first, first + self._pages)
+
+    def _is_blank(self, page: int) -> bool:
+        return self._flash.read(page * PAGE_SIZE, PAGE_SIZE) == _BLANK
 
     def _record(self, slot: int, index: int) -> int:
         return slot * self._pages * PAGE_SIZE + index * RECORD_SIZE

@@ -195,6 +195,14 @@ static void fresh_board(const list_t *stored)
         CHECK(push(stored) == (stored->count ? NM_OK : NM_SAME) && holds(stored));
 }
 
+/* A board that holds `old`, and whose other slot holds a full list from before that must be erased. */
+static void used_board(const list_t *old)
+{
+    const list_t older = list_of(NM_CAPACITY, 99);
+    fresh_board(&older);
+    CHECK(push(old) == NM_OK && holds(old));
+}
+
 /* ---- the protocol ----------------------------------------------------------------------------------------------------- */
 
 static void test_push_and_read_back(void)
@@ -267,9 +275,66 @@ static void test_slots_take_turns(void)
         const list_t list = list_of((uint16_t)(turn % 5), turn);
         CHECK((turn % 2 ? push(&list) : store(&list)) == (turn == 0 ? NM_SAME : NM_OK));
     }
+    /* Short lists use a slot's first page only, and each slot's first list found it blank. */
     for (uint8_t page = 0; page < NM_PAGES; page++)
-        CHECK(board.erases[page] == (page < 3 ? 10 : 9));
+        CHECK(board.erases[page] == (page == 0 ? 9 : page == 3 ? 8 : 0));
     CHECK(board.core.sequence == 19);
+}
+
+static unsigned all_erases(void)
+{
+    unsigned sum = 0;
+    for (uint8_t page = 0; page < NM_PAGES; page++)
+        sum += board.erases[page];
+    return sum;
+}
+
+static void test_blank_pages_are_not_erased(void)
+{
+    const list_t full = list_of(NM_CAPACITY, 1), list = list_of(20, 2);
+    fresh_board(NULL);
+    CHECK(begin(&full) == NM_OK && begin(&list) == NM_OK && begin(&full) == NM_OK && all_erases() == 0);
+    CHECK(chunk(&full, 0, 1) == NM_OK && begin(&list) == NM_OK && all_erases() == 1);
+    board.flash[3 * NM_PAGE_SIZE - 1] = 0; /* the slot's last byte, as a torn erase may leave it */
+    CHECK(begin(&full) == NM_OK && board.erases[0] == 1 && board.erases[1] == 0 && board.erases[2] == 1);
+    CHECK(push(&full) == NM_OK && holds(&full) && all_erases() == 2);
+}
+
+/* BEGIN and a CHUNK, over and over: each BEGIN finds a slot that is not blank. */
+static unsigned begins_until_busy(const list_t *list)
+{
+    for (unsigned count = 0;; count++) {
+        const int status = send_list(NM_BEGIN, list->count, count);
+        if (status != NM_OK) {
+            CHECK(status == NM_BUSY);
+            return count;
+        }
+        CHECK(chunk(list, 0, 1) == NM_OK);
+    }
+}
+
+static void test_a_loop_of_requests_cannot_wear_out_the_flash(void)
+{
+    const list_t old = list_of(4, 1), list = list_of(20, 2);
+    fresh_board(&old);
+    CHECK(begins_until_busy(&list) == NM_WRITE_BURST + 1 && all_erases() == NM_WRITE_BURST); /* the first one: blank */
+    CHECK(simple(NM_INFO) == 24 && buffer[2] == 8);
+    CHECK(radius(300, 300 ^ 0xFFFF) == NM_BUSY && board.radius_cm == 200 && begin(&old) == NM_SAME);
+    CHECK(chunk(&list, 0, 1) == NM_NO_TRANSFER && holds(&old));
+
+    sim_advance(&board, NM_WRITE_INTERVAL_MS);
+    CHECK(simple(NM_INFO) == 24 && buffer[2] == 0);
+    CHECK(radius(300, 300 ^ 0xFFFF) == NM_OK && simple(NM_INFO) == 24 && buffer[2] == (2 | 8));
+    sim_advance(&board, NM_WRITE_INTERVAL_MS);
+    CHECK(push(&list) == NM_OK && holds(&list)); /* a list that takes the last write is written whole */
+    CHECK(begin(&old) == NM_BUSY && store(&old) == NM_OK && holds(&old)); /* the firmware's own save always goes through */
+
+    sim_advance(&board, 3 * NM_WRITE_INTERVAL_MS);
+    CHECK(begins_until_busy(&list) == 3);
+    sim_advance(&board, 1000 * NM_WRITE_INTERVAL_MS);
+    CHECK(begins_until_busy(&list) == NM_WRITE_BURST);
+    sim_power_up(&board);
+    CHECK(begins_until_busy(&list) == NM_WRITE_BURST);
 }
 
 static void test_a_sequence_wraps(void)
@@ -311,7 +376,10 @@ static void test_malformed_requests(void)
     body[2] = 1;
     body[3] = 1;
     CHECK(request(NM_READ, body, 4) == 3 && buffer[0] == NM_BAD_REQUEST);
-    CHECK(sim_request(&board, 189, buffer, 0) == -1 && sim_request(&board, 197, buffer, 0) == -1);
+    memset(buffer, 7, sizeof buffer);
+    for (unsigned command = 0; command <= 255; command++)
+        if (command < NM_INFO || command > NM_RADIUS)
+            CHECK(sim_request(&board, (uint8_t)command, buffer, 243) == -1 && buffer[1] == 7);
     CHECK(holds(&old));
 }
 
@@ -350,6 +418,10 @@ static void test_armed(void)
     CHECK(!transfer_open() && chunk(&list, 15, 5) == NM_ARMED && begin(&list) == NM_ARMED && commit(&old) == NM_ARMED);
     CHECK(radius(300, 300 ^ 0xFFFF) == NM_ARMED && le(buffer + 1, 2) == 200 && store(&list) == NM_ARMED);
     CHECK(read(0, 6) == 3 + 4 * 16 && buffer[0] == NM_OK);
+    /* In flight COMMIT answers from RAM: it does not read 2 KB of flash for a checksum. */
+    board.flash[NM_RECORDS_OFFSET] ^= 1;
+    CHECK(commit(&old) == NM_ARMED && le(buffer + 1, 2) == 4 && le(buffer + 3, 4) == checksum(&old));
+    board.flash[NM_RECORDS_OFFSET] ^= 1;
     sim_arm(&board, false);
     CHECK(chunk(&list, 15, 5) == NM_NO_TRANSFER && board.operations == before && holds(&old));
 }
@@ -385,7 +457,7 @@ static void test_flash_failures_leave_the_old_list(void)
     const list_t old = list_of(40, 1), list = list_of(33, 2);
     for (sim_fail_t fail = SIM_FAIL_LOUD; fail <= SIM_FAIL_SILENT; fail++) {
         for (uint32_t at = 1;; at += STEP) {
-            fresh_board(&old);
+            used_board(&old);
             sim_fail_at(&board, at, fail);
             const int status = push(&list);
             if (board.operations < at)
@@ -393,6 +465,7 @@ static void test_flash_failures_leave_the_old_list(void)
             CHECK(status == NM_FLASH && !transfer_open() && holds(&old));
             sim_power_up(&board);
             CHECK(holds(&old) && sim_config_intact(&board));
+            used_board(&old);
             sim_fail_at(&board, at, fail);
             CHECK(store(&list) == NM_FLASH && holds(&old));
             sim_fail_at(&board, 0, fail);
@@ -453,7 +526,7 @@ static void check_whole(const list_t *old, const list_t *new)
 {
     cuts++;
     sim_power_up(&board);
-    CHECK(holds(old) || holds(new));
+    CHECK((old ? holds(old) : board.core.stored.count == 0) || holds(new));
     CHECK(sim_config_intact(&board) && board.violations == 0);
 }
 
@@ -461,7 +534,10 @@ static void check_whole(const list_t *old, const list_t *new)
 static void cut_everywhere(const list_t *old, const list_t *new, act_t act, bool again)
 {
     static sim_t start, recovering;
-    fresh_board(old);
+    if (old)
+        used_board(old);
+    else
+        fresh_board(NULL);
     start = board;
     for (uint32_t at = 1;; at += STEP) {
         for (int cut = SIM_CUT_BEFORE; cut <= SIM_CUT_AFTER; cut++) {
@@ -504,6 +580,7 @@ static int push_twice(const list_t *list)
 static void cut_scenarios(uint16_t records, bool again)
 {
     const list_t none = list_of(0, 0), old = list_of((uint16_t)(records - 1), 77), new = list_of(records, 11);
+    cut_everywhere(NULL, &new, push, again); /* as delivered */
     cut_everywhere(&none, &new, push, again);
     cut_everywhere(&old, &new, push, again);
     cut_everywhere(&old, &none, push, again);
@@ -595,6 +672,8 @@ int main(void)
         test_every_request_may_be_repeated,
         test_a_stored_list_is_not_written_again,
         test_slots_take_turns,
+        test_blank_pages_are_not_erased,
+        test_a_loop_of_requests_cannot_wear_out_the_flash,
         test_a_sequence_wraps,
         test_malformed_requests,
         test_refusals,

@@ -53,6 +53,7 @@ class InfoFlag(IntFlag):
     ARMED = 1
     WRITE_PENDING = 2
     TRANSFER_OPEN = 4
+    WRITES_SPENT = 8
 
 
 _INFO = struct.Struct("<BBBBBBHHIHHHI")
@@ -177,7 +178,7 @@ def decode_info(payload: bytes) -> Info | None:
         return None
     return Info(
         version=version,
-        flags=InfoFlag(flags & 7),
+        flags=InfoFlag(flags & 15),
         chunk_records=chunk_records,
         chunk_window=chunk_window,
         read_records=read_records,

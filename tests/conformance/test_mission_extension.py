@@ -100,12 +100,15 @@ def chunk_frame(first: int, records: bytes) -> bytes:
 
 
 OLD, NEW = mission(4, seed=1), mission(20, seed=2)
+#: In the other slot: what BEGIN has to erase.
+OLDER = mission(CAPACITY, seed=3)
 NOTHING = Progress(Status.OK, 0, 0)
 
 
 @pytest.fixture(params=[CCore, model, simulated_core])
 def fc(request: pytest.FixtureRequest) -> Companion:
     companion = Companion(request.param())
+    companion.push(OLDER)
     companion.push(OLD)
     return companion
 
@@ -128,7 +131,7 @@ def test_info_tells_limits_and_state(fc: Companion) -> None:
         wp_radius_cm=200,
         inter_byte_timeout_ms=50,
         staged=CHUNK,
-        flash_writes=1,
+        flash_writes=2,
     )
     fc.device.arm(True)
     assert fc.info().flags == InfoFlag.ARMED | InfoFlag.WRITE_PENDING
@@ -309,6 +312,48 @@ def test_malformed_requests_change_nothing(fc: Companion) -> None:
 def test_other_commands_are_left_to_the_firmware(fc: Companion) -> None:
     assert fc.device.request(189, b"") is None
     assert fc.device.request(197, b"") is None
+
+
+def begin_until_refused(fc: Companion) -> tuple[int, Status]:
+    """Begin one list after the other, and stage a record of each, so that the next must erase it."""
+    for count in range(1000):
+        status = fc.begin(ListIdentity(len(NEW), count)).status
+        if status is not Status.OK:
+            return count, status
+        assert fc.chunk(NEW, 0, 1).status is Status.OK
+    raise AssertionError("nothing is ever refused")
+
+
+def test_a_blank_slot_costs_no_write(fc: Companion) -> None:
+    assert fc.begin(identify(NEW)).status is Status.OK
+    fc.device.cut_power_at(1)  # the next flash operation
+    for records in (OLDER, NEW) * 100:
+        assert fc.begin(identify(records)).status is Status.OK
+
+
+def test_flash_writes_are_on_a_budget(fc: Companion) -> None:
+    fc.device.power_cycle()
+    assert begin_until_refused(fc) == (64, Status.BUSY)
+    assert fc.info().flags == InfoFlag.WRITES_SPENT
+    assert fc.begin(identify(OLD)).status is Status.SAME
+    assert fc.radius(300) == (Status.BUSY, 200)
+    assert fc.radius(200) == (Status.OK, 200)
+    assert fc.holds(OLD)
+    fc.device.advance(299_999)
+    assert begin_until_refused(fc) == (0, Status.BUSY)
+    fc.device.advance(1)
+    assert fc.info().flags == InfoFlag(0)
+    fc.push(NEW)
+    assert fc.holds(NEW)
+    assert begin_until_refused(fc) == (0, Status.BUSY)
+    fc.device.advance(3 * 300_000)
+    assert fc.radius(300) == (Status.OK, 300)
+    fc.device.advance(1000)
+    assert begin_until_refused(fc) == (2, Status.BUSY)
+    fc.device.advance(1000 * 300_000)
+    assert begin_until_refused(fc) == (64, Status.BUSY)
+    fc.device.power_cycle()
+    assert begin_until_refused(fc) == (64, Status.BUSY)
 
 
 def begin_new(fc: Companion) -> Status:

@@ -43,7 +43,7 @@ def mission(length: int, seed: int) -> tuple[WpRecord, ...]:
     )
 
 
-OLD, NEW = mission(140, 1), mission(146, 2)
+OLDER, OLD, NEW = mission(146, 3), mission(140, 1), mission(146, 2)
 
 
 def clean(data: bytes) -> bytes:
@@ -65,6 +65,7 @@ class Line:
 
     def __init__(self, disturb: Disturb = clean) -> None:
         self.core = CCore()
+        self.core.store(pack_records(OLDER))
         self.core.store(pack_records(OLD))
         self.core.power_cycle()
         info = decode_info(self.core.request(MissionCommand.INFO, b"") or b"")

@@ -173,7 +173,9 @@ class HarakiriMissions:
                 raise _GiveUp(PushFailure.NO_ANSWER)
             if answer.status is Status.BUSY:
                 if waited_s >= _BUSY_PATIENCE_S:
-                    raise _GiveUp(PushFailure.BUSY)
+                    info = yield from self._read_info()
+                    is_spent = info is not None and InfoFlag.WRITES_SPENT in info.flags
+                    raise _GiveUp(PushFailure.WRITES_SPENT if is_spent else PushFailure.BUSY)
                 yield from pause(_BUSY_INTERVAL_S)
                 waited_s += _BUSY_INTERVAL_S
                 continue

@@ -1,0 +1,285 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Tests of harakiri_mission.c: how the list in cfg, the list in the flash slots and the copy in the configuration go together.
+ * Harakiri itself is played by this file: it makes the calls that the patches make.
+ */
+#include "harakiri_mission.c"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+
+#define FLASH_START 0x08000000u
+#define FLASH_END (FLASH_WRITE_ADDR + FLASH_PAGES_FORCONFIG * FLASH_PAGE_SIZE)
+
+config_t cfg;
+flags_t f;
+int16_t rcData[8];
+uint32_t ScheduleEEPROMwriteMS;
+
+static uint32_t now;
+static bool pass, upload_open;
+static unsigned config_writes;
+
+#define CHECK(condition) check((condition), #condition, __LINE__)
+
+static void check(bool condition, const char *what, int line)
+{
+    if (condition)
+        return;
+    printf("test_harakiri.c:%d: failed: %s\n", line, what);
+    exit(1);
+}
+
+/* ---- Harakiri --------------------------------------------------------------------------------------------------------- */
+
+static uint8_t *at(uint32_t address)
+{
+    CHECK(address >= MISSION_FLASH_ADDR && address < FLASH_END); /* nobody may write to the program */
+    return (uint8_t *)(uintptr_t)address;
+}
+
+void FLASH_Unlock(void)
+{
+}
+
+void FLASH_Lock(void)
+{
+}
+
+void FLASH_ClearFlag(uint32_t flags)
+{
+    (void)flags;
+}
+
+FLASH_Status FLASH_ErasePage(uint32_t address)
+{
+    memset(at(address), 0xFF, FLASH_PAGE_SIZE);
+    return FLASH_COMPLETE;
+}
+
+FLASH_Status FLASH_ProgramHalfWord(uint32_t address, uint16_t data)
+{
+    memcpy(at(address), &data, sizeof data);
+    return FLASH_COMPLETE;
+}
+
+uint32_t millis(void)
+{
+    return now;
+}
+
+bool feature(uint32_t mask)
+{
+    return mask == FEATURE_PASS && pass;
+}
+
+bool MissionEndUpload(void)
+{
+    const bool open = upload_open;
+    upload_open = false;
+    return open;
+}
+
+static void read_configuration(void)
+{
+    memcpy(&cfg, at(FLASH_WRITE_ADDR), sizeof cfg);
+    MissionLoad();
+}
+
+void writeParams(uint8_t b)
+{
+    (void)b;
+    MissionStore();
+    memcpy(at(FLASH_WRITE_ADDR), &cfg, sizeof cfg);
+    config_writes++;
+    read_configuration();
+}
+
+static void power_up(void)
+{
+    memset(&mission, 0, sizeof mission);
+    memset(&f, 0, sizeof f);
+    ScheduleEEPROMwriteMS = 0;
+    upload_open = pass = false;
+    rcData[THROTTLE] = 1000;
+    read_configuration();
+}
+
+/* A chip with nothing but a configuration, in which an unpatched firmware left a list of `count` records. */
+static void new_chip(uint16_t count, uint8_t fill)
+{
+    memset(at(MISSION_FLASH_ADDR), 0xFF, FLASH_END - MISSION_FLASH_ADDR);
+    memset(&cfg, 0, sizeof cfg);
+    cfg.gps_wp_radius = 200;
+    cfg.rc_minchk = 1100;
+    cfg.FDUsedDatasets = count;
+    memset(cfg.FloppyDisk, fill, sizeof cfg.FloppyDisk);
+    memcpy(at(FLASH_WRITE_ADDR), &cfg, sizeof cfg);
+    now = 1000;
+    power_up();
+}
+
+/* A MAVLink upload that has put `count` records into RAM so far; each one schedules a write. */
+static void upload(uint16_t count, uint8_t fill)
+{
+    upload_open = true;
+    cfg.FDUsedDatasets = count;
+    memset(cfg.FloppyDisk, fill, count * NM_RECORD_SIZE);
+    ScheduleEEPROMwriteMS = now + 1000;
+}
+
+static void serve_scheduled_write(void)
+{
+    now += 1000;
+    if (ScheduleEEPROMwriteMS && now >= ScheduleEEPROMwriteMS) {
+        writeParams(0);
+        ScheduleEEPROMwriteMS = 0;
+    }
+}
+
+static uint32_t bitwise_crc32(const uint8_t *data, uint32_t length)
+{
+    uint32_t crc = 0xFFFFFFFFu;
+    while (length--) {
+        crc ^= *data++;
+        for (int bit = 0; bit < 8; bit++)
+            crc = crc & 1 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
+    }
+    return ~crc;
+}
+
+/* Push one record, all bytes 1 but for its command. Returns COMMIT's status. */
+static int push_one(uint8_t command)
+{
+    uint8_t record[NM_RECORD_SIZE], chunk[NM_BUFFER_SIZE] = {0}, begin[NM_BUFFER_SIZE] = {0, 1, 0}, commit[NM_BUFFER_SIZE];
+    memset(record, 1, sizeof record);
+    record[NM_RECORD_SIZE - 1] = command;
+    memcpy(chunk + 3, record, sizeof record);
+    const uint32_t checksum = bitwise_crc32(record, sizeof record);
+    memcpy(begin + 3, &checksum, 4);
+    memcpy(commit, begin, 7);
+    if (MissionRequest(NM_BEGIN, begin, 7) != 7 || begin[0] != NM_OK)
+        return begin[0];
+    CHECK(MissionRequest(NM_CHUNK, chunk, 19) == 7 && chunk[0] == NM_OK);
+    CHECK(MissionRequest(NM_COMMIT, commit, 7) == 7);
+    return commit[0];
+}
+
+static int set_radius_to(uint16_t cm)
+{
+    uint8_t buffer[NM_BUFFER_SIZE] = {0, (uint8_t)cm, (uint8_t)(cm >> 8), (uint8_t)~cm, (uint8_t)((cm ^ 0xFFFF) >> 8)};
+    CHECK(MissionRequest(NM_RADIUS, buffer, 5) == 3);
+    return buffer[0];
+}
+
+static bool has(uint16_t count, uint8_t fill)
+{
+    return cfg.FDUsedDatasets == count && mission.stored.count == count && (count == 0 || cfg.FloppyDisk[0] == fill);
+}
+
+/* ---- tests ------------------------------------------------------------------------------------------------------------ */
+
+static void test_a_list_from_before_the_patch_is_taken_over(void)
+{
+    new_chip(5, 9);
+    CHECK(has(5, 9));
+    power_up();
+    CHECK(has(5, 9) && mission.sequence == 1);
+}
+
+static void test_a_configuration_that_cannot_be_right_has_no_list(void)
+{
+    new_chip(NM_CAPACITY + 1, 9);
+    CHECK(has(0, 0));
+}
+
+static void test_an_upload_that_breaks_off_leaves_the_stored_list(void)
+{
+    for (uint16_t stored = 0; stored <= 3; stored += 3) {
+        new_chip(stored, 9);
+        upload(2, 7);
+        upload_open = false;
+        MissionLoad(); /* the upload's time-out */
+        CHECK(has(stored, 9));
+        serve_scheduled_write();
+        power_up();
+        CHECK(has(stored, 9));
+    }
+}
+
+static void test_a_write_of_the_configuration_ends_an_upload(void)
+{
+    new_chip(3, 9);
+    upload(2, 7);
+    writeParams(1); /* a calibration by stick */
+    CHECK(!upload_open && has(3, 9));
+    upload(2, 7);
+    upload_open = false; /* complete */
+    serve_scheduled_write();
+    CHECK(has(2, 7));
+}
+
+static void test_the_configurations_copy_follows_with_the_next_write(void)
+{
+    const config_t *copy = (const config_t *)at(FLASH_WRITE_ADDR);
+    new_chip(5, 9);
+    CHECK(push_one(2) == NM_OK && has(1, 1) && copy->FDUsedDatasets == 5 && config_writes);
+    CHECK(set_radius_to(300) == NM_OK);
+    serve_scheduled_write();
+    CHECK(has(1, 1) && copy->FDUsedDatasets == 1 && copy->FloppyDisk[0] == 1 && copy->gps_wp_radius == 300);
+}
+
+static void test_writing_waits_for_a_scheduled_write(void)
+{
+    new_chip(0, 0);
+    CHECK(set_radius_to(300) == NM_OK && push_one(0) == NM_BUSY);
+    f.ARMED = 1;
+    CHECK(push_one(0) == NM_ARMED);
+    f.ARMED = 0;
+    MissionPoll(); /* not its business: without FEATURE_PASS Harakiri's main loop serves the write */
+    CHECK(push_one(0) == NM_BUSY);
+    serve_scheduled_write();
+    CHECK(push_one(0) == NM_OK);
+}
+
+static void test_with_feature_pass_writes_wait_for_the_throttle(void)
+{
+    new_chip(0, 0);
+    pass = true;
+    config_writes = 0;
+    CHECK(set_radius_to(300) == NM_OK);
+    rcData[THROTTLE] = 1500;
+    MissionPoll();
+    CHECK(config_writes == 0 && push_one(0) == NM_ARMED);
+    rcData[THROTTLE] = 1000;
+    MissionPoll();
+    CHECK(config_writes == 1 && ScheduleEEPROMwriteMS == 0 && push_one(0) == NM_OK);
+    ScheduleEEPROMwriteMS = now + 500;
+    MissionPoll();
+    CHECK(config_writes == 1);
+    now += 500;
+    MissionPoll();
+    MissionPoll();
+    CHECK(config_writes == 2);
+}
+
+int main(void)
+{
+    static void (*const tests[])(void) = {
+        test_a_list_from_before_the_patch_is_taken_over,
+        test_a_configuration_that_cannot_be_right_has_no_list,
+        test_an_upload_that_breaks_off_leaves_the_stored_list,
+        test_a_write_of_the_configuration_ends_an_upload,
+        test_the_configurations_copy_follows_with_the_next_write,
+        test_writing_waits_for_a_scheduled_write,
+        test_with_feature_pass_writes_wait_for_the_throttle,
+    };
+    void *const flash_at = (void *)(uintptr_t)FLASH_START;
+    CHECK(mmap(flash_at, FLASH_END - FLASH_START, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE,
+               -1, 0) == flash_at);
+    for (unsigned i = 0; i < sizeof tests / sizeof *tests; i++)
+        tests[i]();
+    printf("  %u tests of Harakiri's side passed\n", (unsigned)(sizeof tests / sizeof *tests));
+    return 0;
+}
