@@ -73,7 +73,7 @@ class MissionCommands:
         return None
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if the craft is armed or nothing was heard of it for too long; add to the write budget."""
+        """Drop an open transfer if the craft is armed or it has been silent for too long; add to the write budget."""
         intervals = int(now * 1000) // _WRITE_INTERVAL_MS
         self._writes_left = min(self._writes_left + intervals - self._intervals, _WRITE_BURST)
         self._intervals = intervals

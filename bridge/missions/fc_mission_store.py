@@ -39,7 +39,7 @@ class PushFailure(Enum):
 
     ARMED = "the flight controller is armed: disarm first"
     BUSY = "the flight controller is busy writing its configuration: try again"
-    WRITES_SPENT = "the flight controller spares its flash: it takes one list in 5 minutes now, more after a restart"
+    WRITES_SPENT = "the flight controller limits flash wear: one new list in 5 minutes now, no limit after a restart"
     NO_SPACE = "the list does not fit the flight controller"
     REFUSED = "the flight controller refused a record"
     UNSAFE = "an item's bytes would set off a trap of the firmware: move a waypoint a little"

@@ -248,6 +248,18 @@ def test_a_board_that_becomes_busy_in_the_middle_keeps_the_old_list() -> None:
     assert set(came_to) <= {"ACCEPTED", PushFailure.BUSY.value, BUSY_TEXT}
 
 
+def test_a_board_that_limits_flash_wear_is_not_called_busy() -> None:
+    world = holding_the_old_list(0)
+    results = []
+    for seed in range(65):
+        outcome = world.push(waypoints(2, seed=1000 + seed))
+        world.wait_until(lambda _, outcome=outcome: bool(outcome), 20)  # type: ignore[misc]
+        results.append(outcome[0][0])
+    assert [result.ack for result in results] == [MissionResult.ACCEPTED] * 64 + [MissionResult.DENIED]
+    assert results[-1].text == PushFailure.WRITES_SPENT.value
+    assert world.stored == records_of(waypoints(2, seed=1063))
+
+
 @pytest.mark.parametrize(("failures", "expected"), [(1, "ACCEPTED"), (2, "ACCEPTED"), (3, PushFailure.FLASH.value)])
 def test_flash_that_fails_is_tried_twice_again(failures: int, expected: str) -> None:
     def inject(world: World, draw: random.Random) -> None:

@@ -34,9 +34,9 @@ from protocols.mission_record import identify
 from protocols.msp.frame import MspParser
 from protocols.msp.hazards import is_clean
 from protocols.wp_record import WpRecord, unpack_records
-from simulator.flash import ERASED, NorFlash
+from simulator.flash import ERASED, PAGE_SIZE, NorFlash
 from simulator.line import garble
-from simulator.mission_slots import MissionSlots, flash_size
+from simulator.mission_slots import MissionSlots, flash_size, slot_pages
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions
 
@@ -305,13 +305,15 @@ class World:
 
 
 def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None) -> bytes:
-    """Return a flash in which a list is stored, for a new world's board."""
+    """Flash of a board in use: a list is stored, and the other slot holds the remains of an earlier one."""
     options = options or SimOptions()
     memory = bytearray((ERASED,)) * flash_size(options)
     slots = MissionSlots(NorFlash(memoryview(memory), Faults()), options)
     for index, record in enumerate(records):
         slots.stage(index, record.pack())
     slots.commit(identify(records))
+    for page in range(slot_pages(options.capacity)):  # of the first slot: a new flash's first list goes into the second
+        memory[page * PAGE_SIZE + PAGE_SIZE // 2] = 0
     return bytes(memory)
 
 
