@@ -36,16 +36,17 @@ class NorFlash:
     def erase(self, page: int, seconds: float) -> None:
         """Set a page to ones; FlashError if it did not take."""
         start = page * PAGE_SIZE
-        # Cut short, an erase leaves bits neither old nor new: here its second half keeps its contents.
-        done = self._begin(PAGE_SIZE, seconds)
-        self._memory[start : start + done] = bytes((ERASED,)) * done
-        self._end(done == PAGE_SIZE)
+        if self._begin(seconds):
+            # Cut short, an erase has set some bits and not others: here those of every other byte.
+            step = 2 if self._is_cut else 1
+            self._memory[start : start + PAGE_SIZE : step] = bytes((ERASED,)) * (PAGE_SIZE // step)
+        self._end(self.read(start, PAGE_SIZE) == bytes((ERASED,)) * PAGE_SIZE)
 
     def program(self, offset: int, data: bytes, seconds: float) -> None:
         """Clear bits; FlashError if the result is not `data`, as when the place had not been erased."""
-        done = self._begin(len(data), seconds)
-        for index in range(done):
-            self._memory[offset + index] &= data[index]
+        if self._begin(seconds):
+            for index in range(len(data) // 2 if self._is_cut else len(data)):
+                self._memory[offset + index] &= data[index]
         self._end(self.read(offset, len(data)) == data)
 
     def take_busy_seconds(self) -> float:
@@ -53,20 +54,21 @@ class NorFlash:
         seconds, self._busy_seconds = self._busy_seconds, 0.0
         return seconds
 
-    def _begin(self, size: int, seconds: float) -> int:
-        """Count an operation and return how many of its bytes will be done."""
+    def _begin(self, seconds: float) -> bool:
+        """Count an operation; False if the flash controller does not carry it out."""
         self.operations += 1
         self._busy_seconds += seconds
-        if self._cut() or self._faults.flash_failures > 0:
-            return size // 2
-        return size
+        if self._faults.flash_failures > 0 and not self._is_cut:
+            self._faults.flash_failures -= 1
+            return False
+        return True
 
     def _end(self, verified: bool) -> None:
-        if self._cut():
+        if self._is_cut:
             raise PowerCutError
-        self._faults.flash_failures = max(self._faults.flash_failures - 1, 0)
         if not verified:
             raise FlashError
 
-    def _cut(self) -> bool:
+    @property
+    def _is_cut(self) -> bool:
         return self.operations == self._faults.power_cut_at_flash_operation

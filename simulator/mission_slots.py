@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Two flash slots for the mission, of which the newest valid one counts, and the configuration's page.
 
-A slot is the records' space and then a header, programmed last and with its magic number last of all: until
-then the other slot is the list. Staging needs no RAM.
+The layout is that of firmware/naze_mission.h: a header, then the records. The header is programmed after them and its
+seal last of all: until then the other slot is the list. Staging needs no RAM.
 """
 
 import struct
@@ -10,11 +10,15 @@ import zlib
 
 from protocols.mission_record import ListIdentity
 from protocols.wp_record import RECORD_SIZE
-from simulator.flash import ERASED, PAGE_SIZE, NorFlash
+from simulator.flash import ERASED, PAGE_SIZE, FlashError, NorFlash
 from simulator.options import SimOptions
 
-_HEADER = struct.Struct("<HHIII")
-_MAGIC = 0x4C50574E
+_HEADER = struct.Struct("<HHII")  # magic, count, sequence, checksum of the records
+_HEADER_CHECKSUM = struct.Struct("<I")
+_SEAL = b"\0\0"
+_SEAL_AT = _HEADER.size + _HEADER_CHECKSUM.size
+_RECORDS_AT = 32
+_MAGIC = 0x4D4E
 _CONFIG = struct.Struct("<HH")
 _SLOTS = 2
 _BLANK = bytes((ERASED,)) * PAGE_SIZE
@@ -22,7 +26,7 @@ _BLANK = bytes((ERASED,)) * PAGE_SIZE
 
 def slot_pages(capacity: int) -> int:
     """Return how many pages a slot of `capacity` records takes."""
-    return -(-(capacity * RECORD_SIZE + _HEADER.size) // PAGE_SIZE)
+    return -(-(_RECORDS_AT + capacity * RECORD_SIZE) // PAGE_SIZE)
 
 
 def flash_size(options: SimOptions) -> int:
@@ -39,7 +43,7 @@ class MissionSlots:
         self._capacity = options.capacity
         self._erase_seconds = options.flash_erase_ms / 1000 / self._pages
         self._program_seconds = options.record_program_ms / 1000
-        self._active = 0
+        self._active = _SLOTS - 1  # the first list goes into the first slot
         self.stored = ListIdentity(0, 0)
         self.writes = 0
         self.load()
@@ -48,8 +52,10 @@ class MissionSlots:
         """Find the newest valid slot, as at boot."""
         self.stored, self.writes = ListIdentity(0, 0), 0
         for slot in range(_SLOTS):
-            count, _, checksum, writes, magic = _HEADER.unpack(self._flash.read(self._header(slot), _HEADER.size))
-            if magic == _MAGIC and count <= self._capacity and writes > self.writes:
+            header = self._flash.read(self._start(slot), _SEAL_AT + len(_SEAL))
+            magic, count, writes, checksum = _HEADER.unpack_from(header)
+            is_sealed = header == _sealed(header[: _HEADER.size])
+            if magic == _MAGIC and is_sealed and count <= self._capacity and writes > self.writes:
                 identity = ListIdentity(count, checksum)
                 if self._checksum(slot, count) == checksum:
                     self._active, self.stored, self.writes = slot, identity, writes
@@ -80,8 +86,15 @@ class MissionSlots:
 
     def commit(self, identity: ListIdentity) -> None:
         """Make the staged list the stored one. FlashError, PowerCutError."""
-        header = _HEADER.pack(identity.count, 0, identity.checksum, self.writes + 1, _MAGIC)
-        self._flash.program(self._header(self._unused), header, self._program_seconds)
+        header = _sealed(_HEADER.pack(_MAGIC, identity.count, self.writes + 1, identity.checksum))
+        start = self._start(self._unused)
+        self._flash.program(start, header[:_SEAL_AT], self._program_seconds)
+        try:
+            self._flash.program(start + _SEAL_AT, _SEAL, self._program_seconds)
+        except FlashError:
+            # A seal that reads wrong now might read right at the next start.
+            self._flash.erase(self._unused_pages[0], self._erase_seconds)
+            raise
         self._active = self._unused
         self.stored = identity
         self.writes += 1
@@ -98,14 +111,18 @@ class MissionSlots:
     def _is_blank(self, page: int) -> bool:
         return self._flash.read(page * PAGE_SIZE, PAGE_SIZE) == _BLANK
 
-    def _record(self, slot: int, index: int) -> int:
-        return slot * self._pages * PAGE_SIZE + index * RECORD_SIZE
+    def _start(self, slot: int) -> int:
+        return slot * self._pages * PAGE_SIZE
 
-    def _header(self, slot: int) -> int:
-        return self._record(slot, self._capacity)
+    def _record(self, slot: int, index: int) -> int:
+        return self._start(slot) + _RECORDS_AT + index * RECORD_SIZE
 
     def _checksum(self, slot: int, count: int) -> int:
         return zlib.crc32(self._flash.read(self._record(slot, 0), count * RECORD_SIZE))
+
+
+def _sealed(header: bytes) -> bytes:
+    return header + _HEADER_CHECKSUM.pack(zlib.crc32(header)) + _SEAL
 
 
 class StoredConfig:

@@ -78,6 +78,8 @@ static bool program_half_word(sim_t *s, uint8_t *at, const uint8_t *data)
     if (cut_now(s, SIM_CUT_WITHIN)) {
         at[0] &= (uint8_t)(data[0] | random_bits(s));
         at[1] &= (uint8_t)(data[1] | random_bits(s));
+        if (at[0] == 0xFF && at[1] == 0xFF) /* none of the bits moved: that would be SIM_CUT_BEFORE */
+            memcpy(at, data, 2);
         lose_power(s);
     }
     memcpy(at, data, 2);

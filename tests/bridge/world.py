@@ -312,7 +312,8 @@ def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None
     for index, record in enumerate(records):
         slots.stage(index, record.pack())
     slots.commit(identify(records))
-    for page in range(slot_pages(options.capacity)):  # of the first slot: a new flash's first list goes into the second
+    pages = slot_pages(options.capacity)
+    for page in range(pages, 2 * pages):  # of the second slot: a new flash's first list goes into the first
         memory[page * PAGE_SIZE + PAGE_SIZE // 2] = 0
     return bytes(memory)
 

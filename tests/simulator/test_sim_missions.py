@@ -411,7 +411,7 @@ def test_the_same_radius_is_not_written_again() -> None:
 # -- power cuts ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("old", "operations"), [(0, 20 + 1), (9, 3 + 20 + 1)])
+@pytest.mark.parametrize(("old", "operations"), [(0, 20 + 2), (9, 3 + 20 + 2)])
 def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(old: int, operations: int) -> None:
     """Each erase, each record, the header: cut in the middle of it, boot, look; then push again."""
     new = mission(20, 1)
@@ -437,7 +437,7 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
         outcomes.append(bench.pull())
         assert bench.push(new).status is Status.OK
         assert bench.pull() == new
-    # Three pages that are not blank, twenty records, and the header, without which the new list does not count.
+    # Three pages that are not blank, twenty records, the header, and its seal, without which the new list does not count.
     assert outcomes == [mission(old) if old else []] * operations
     assert bench.pull() == new
 
