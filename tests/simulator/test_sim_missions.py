@@ -437,7 +437,7 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
         outcomes.append(bench.pull())
         assert bench.push(new).status is Status.OK
         assert bench.pull() == new
-    # Three pages that are not blank, twenty records, the header, and its seal, without which the new list does not count.
+    # Three pages that are not blank, twenty records, the header, its seal: without it the new list does not count.
     assert outcomes == [mission(old) if old else []] * operations
     assert bench.pull() == new
 
