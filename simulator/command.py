@@ -5,8 +5,10 @@ import asyncio
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from simulator.compiled_core import CORE_CAPACITY, load_core
+from simulator.emulated_naze.command import run_image
 from simulator.fc_kinds import KINDS
 from simulator.flash import ERASED
 from simulator.inav_boxes import BOXES
@@ -34,6 +36,21 @@ def _load_core(path: Path, capacity: int) -> BootMissions:
         return load_core(path)
     except OSError as error:
         raise click.ClickException(f"Cannot load the core: {error}. Make it with: make -C firmware sim") from error
+
+
+#: What can be chosen with --image; all else is up to the firmware.
+_IMAGE_OPTIONS = {
+    "image", "link", "tcp", "armed", "bit_errors", "lost_bytes", "seed", "hang_after", "power_cut_after", "state",
+    "control",
+}  # fmt: skip
+
+
+def _refuse_options_of_the_model() -> None:
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        if name not in _IMAGE_OPTIONS and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"{parameter.opts[0]} is for the simulated firmware: leave it out with --image.")
 
 
 def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[str, int] | None:
@@ -75,7 +92,12 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Run the firmware's own mission core out of this shared library (make -C firmware sim).",
 )
-@click.option("--state", type=_PATH, help="File that keeps the flash's contents.")
+@click.option(
+    "--image",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Emulate the chip and run this firmware (ELF). Needs naze-bridge[emulator].",
+)
+@click.option("--state", "--flash", "state", type=_PATH, help="File that keeps the flash's contents.")
 @click.option("--control", type=_PATH, help="Unix socket that takes lines from tests.")
 @click.option(
     "--play",
@@ -102,6 +124,7 @@ def sim(
     hang_after: float | None,
     power_cut_after: float | None,
     core: Path | None,
+    image: Path | None,
     state: Path | None,
     control: Path | None,
     play: Path | None,
@@ -112,6 +135,10 @@ def sim(
         raise click.UsageError("Say where: either --link PATH or --tcp HOST:PORT.")
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
     running = Running(link, tcp, control, hang_after, power_cut_after)
+    if image is not None:
+        _refuse_options_of_the_model()
+        run_image(image, faults, running, state, seed)
+        return
     if kind != "naze":
         line = MspOptions(version=inav_version, baud=int(baud), capacity=capacity or 120, seed=seed)
         run_other_board(kind, line, faults, running, state)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lines from a test in another process: switch faults, pull plugs, read the counters.
 
-    FAULT VALUE         a field of Faults and a number (switches: 0 or 1)
+    FAULT VALUE         a field of the board's faults and a number (switches: 0 or 1)
     power on|off
     plug, unplug
     stats               one line of JSON: counters, state, and the stored records in hex
@@ -17,19 +17,23 @@ from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
+from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 from simulator.far_end import FarEnd
 from simulator.flight import Craft
 from simulator.options import Counters, Faults
 from simulator.pty_link import PlugError
 
-_FAULTS = {name: type(value) for name, value in asdict(Faults()).items()}
-
 
 class ControlledBoard(FarEnd, Protocol):
     """A simulated board with switches and counters."""
 
-    faults: Faults
-    counters: Counters
+    @property
+    def faults(self) -> Faults | EmulatedFaults:
+        """The switches."""
+
+    @property
+    def counters(self) -> Counters | EmulatedCounters:
+        """What has happened so far."""
 
     @property
     def armed(self) -> bool:
@@ -48,7 +52,7 @@ class ControlledBoard(FarEnd, Protocol):
         """Return the mission that outlives a power cut."""
 
     def truth(self, now: float) -> Craft | None:
-        """Return what the craft is doing; None while no firmware runs."""
+        """Return what the craft is doing; None while no firmware runs, and from a board that only lies on a bench."""
 
     def power_on(self, now: float) -> None:
         """Supply it."""
@@ -110,9 +114,10 @@ class Control:
                     return f"error: {error}"
             case ["unplug"]:
                 self._link.unplug()
-            case [name, value] if name in _FAULTS:
+            case [name, value] if name in asdict(self._board.faults):
+                faults = self._board.faults
                 try:
-                    setattr(self._board.faults, name, _FAULTS[name](float(value)))
+                    setattr(faults, name, type(getattr(faults, name))(float(value)))
                 except ValueError:
                     return f"error: {name} takes a number, not {value!r}"
             case _:

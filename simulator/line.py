@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a UART makes of bytes that were sent at another speed."""
+"""What a wire does to bytes: a UART at another speed, and noise."""
+
+import random
 
 _FRAME_BITS = 10
 
@@ -29,3 +31,13 @@ def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
             after = wire.find(1, after)
         edge = wire.find(0, after) if after >= 0 else -1
     return bytes(received)
+
+
+def disturb(data: bytes, lost_byte_rate: float, bit_error_rate: float, dice: random.Random) -> bytes:
+    """Lose bytes and flip bits; the rates are probabilities."""
+    if not (data and (lost_byte_rate or bit_error_rate)):
+        return data
+    kept = (byte for byte in data if dice.random() >= lost_byte_rate) if lost_byte_rate else data
+    if not bit_error_rate:
+        return bytes(kept)
+    return bytes(byte ^ sum((dice.random() < bit_error_rate) << bit for bit in range(8)) for byte in kept)

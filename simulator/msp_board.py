@@ -9,6 +9,7 @@ from enum import Enum, auto
 from math import ceil, inf
 
 from simulator.flight import Craft
+from simulator.line import disturb
 from simulator.msp_firmware import Boot, BootFirmware, CrashError, MspFirmware
 from simulator.msp_options import MspOptions
 from simulator.msp_port import MspReceiver
@@ -238,10 +239,4 @@ class MspBoard:
                 self._ring.write(bytes((byte,)), at)
 
     def _disturb(self, data: bytes) -> bytes:
-        """Lose bytes and flip bits as the faults say."""
-        lost, flipped = self.faults.lost_byte_rate, self.faults.bit_error_rate
-        if not (data and (lost or flipped)):
-            return data
-        chance = self._random.random
-        kept = (byte for byte in data if chance() >= lost) if lost else data
-        return bytes(byte ^ sum((chance() < flipped) << bit for bit in range(8)) for byte in kept)
+        return disturb(data, self.faults.lost_byte_rate, self.faults.bit_error_rate, self._random)

@@ -13,6 +13,7 @@ from protocols.wp_record import RECORD_SIZE
 from simulator.firmware import Firmware, Protocol, ResetError
 from simulator.flash import ERASED, NorFlash, PowerCutError
 from simulator.flight import Craft
+from simulator.line import disturb
 from simulator.mission_commands import MissionCommands
 from simulator.mission_slots import flash_size
 from simulator.missions import Board, BootMissions
@@ -178,12 +179,4 @@ class SimulatedNaze:
         self._uart.power_off()
 
     def _disturb(self, data: bytes) -> bytes:
-        """Lose bytes and flip bits as the faults say."""
-        lost, flipped = self.faults.lost_byte_rate, self.faults.bit_error_rate
-        if not (data and (lost or flipped)):
-            return data
-        chance = self._random.random
-        kept = (byte for byte in data if chance() >= lost) if lost else data
-        if not flipped:
-            return bytes(kept)
-        return bytes(byte ^ sum((chance() < flipped) << bit for bit in range(8)) for byte in kept)
+        return disturb(data, self.faults.lost_byte_rate, self.faults.bit_error_rate, self._random)

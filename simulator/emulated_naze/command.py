@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge sim --image`: the emulated board behind its plug."""
+
+import asyncio
+from pathlib import Path
+
+import click
+
+from simulator.emulated_naze.image import FLASH_SIZE, ImageError, load_image
+from simulator.emulated_naze.switches import EmulatedFaults
+from simulator.memory_file import open_memory
+from simulator.options import Faults
+from simulator.run_board import Running, run_board
+
+#: A computer that needs longer for this much of the board's time gets a board that runs slower.
+_LONGEST_STEP_S = 0.005
+
+
+def run_image(path: Path, faults: Faults, running: Running, state: Path | None, seed: int) -> None:
+    """Run a firmware until Ctrl-C. click.ClickException."""
+    try:
+        from simulator.emulated_naze.board import EmulatedNaze  # noqa: PLC0415: needs Unicorn, which is optional
+    except ImportError as error:
+        raise click.ClickException(
+            "--image needs the emulator: pip install 'naze-bridge[emulator]' (or the package unicorn)."
+        ) from error
+    try:
+        image = load_image(path)
+    except (ImageError, OSError) as error:
+        raise click.ClickException(f"Cannot run the image: {error}.") from error
+    blank = b"\xff" * FLASH_SIZE
+    flash = open_memory(state, blank, "name another file") if state else None
+    switches = EmulatedFaults(
+        armed=faults.armed, bit_error_rate=faults.bit_error_rate, lost_byte_rate=faults.lost_byte_rate
+    )
+    board = EmulatedNaze(image, switches, flash, seed=seed, longest_step_s=_LONGEST_STEP_S)
+    asyncio.run(run_board(board, f"Naze with {path.name}", running, lambda: True))

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The flash and its controller: keys, the rules of NOR, and a core that stands still (PM0075, sections 2.3 and 3)."""
+
+import random
+from collections.abc import Callable
+
+from simulator.emulated_naze.image import FLASH_BASE, FLASH_SIZE
+
+PAGE_SIZE = 1024
+_KEYR, _SR, _CR, _AR, _OBR, _WRPR = 0x04, 0x0C, 0x10, 0x14, 0x1C, 0x20
+_KEYS = (0x4567_0123, 0xCDEF_89AB)
+_PROGRAM_ERROR, _PROTECTION_ERROR, _END = 1 << 2, 1 << 4, 1 << 5
+_PG, _PER, _MER, _STRT, _LOCK = 1, 1 << 1, 1 << 2, 1 << 6, 1 << 7
+_ERASED = 0xFFFF
+#: Data sheet DS5319, table 29: typical of a half-word, and within the range of a page.
+_PROGRAM_NS = 52_500
+_ERASE_NS = 25_000_000
+
+
+class FlashController:
+    """`memory` is the chip's contents. `stall` lets time pass in which the core does nothing.
+
+    An operation is a page erased or a half-word programmed. `tear` decides what a power cut leaves behind of one.
+    """
+
+    def __init__(self, memory: memoryview, stall: Callable[[int], None], tear: random.Random) -> None:
+        self._memory = memory
+        self._stall = stall
+        self._tear = tear
+        #: Operations until the power goes, counting the one in which it does; 0: never.
+        self.cut_after = 0
+        #: So many operations from now fail.
+        self.failures = 0
+        #: Called in the middle of the operation in which the power goes.
+        self.on_power_cut: Callable[[], None] = lambda: None
+        self.erases = self.programs = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Locked."""
+        self._control = _LOCK
+        self._status = self._address = self._keys = 0
+
+    @property
+    def operations(self) -> int:
+        """Pages erased and half-words programmed so far."""
+        return self.erases + self.programs
+
+    def read(self, offset: int) -> int:
+        """A word."""
+        match offset:
+            case 0x0C:
+                return self._status
+            case 0x10:
+                return self._control
+            case 0x1C:
+                return 0x03FF_FFFC
+            case 0x20:
+                return 0xFFFF_FFFF
+        return 0
+
+    def write(self, offset: int, value: int) -> None:
+        """Take a word."""
+        match offset:
+            case 0x04:
+                self._take_key(value)
+            case 0x0C:
+                self._status &= ~(value & (_PROGRAM_ERROR | _PROTECTION_ERROR | _END))
+            case 0x10:
+                self._write_control(value)
+            case 0x14:
+                self._address = value
+
+    def _take_key(self, key: int) -> None:
+        if key == _KEYS[self._keys]:
+            self._keys += 1
+            if self._keys == len(_KEYS):
+                self._keys = 0
+                self._control &= ~_LOCK
+        else:
+            self._keys = 0
+
+    def _write_control(self, value: int) -> None:
+        if self._control & _LOCK:
+            return
+        self._control = value & ~_STRT
+        if value & _STRT and value & _PER:
+            self._erase(self._address - FLASH_BASE & -PAGE_SIZE)
+        elif value & _STRT and value & _MER:
+            for at in range(0, FLASH_SIZE, PAGE_SIZE):
+                self._erase(at)
+
+    def _erase(self, at: int) -> None:
+        if not 0 <= at < FLASH_SIZE:
+            self._status |= _PROTECTION_ERROR
+            return
+        self.erases += 1
+        if self._loses_power():
+            self._tear_page(at)
+            self.on_power_cut()
+        elif not self._fails():
+            self._memory[at : at + PAGE_SIZE] = b"\xff" * PAGE_SIZE
+            self._status |= _END
+            self._stall(_ERASE_NS)
+
+    def program(self, at: int, size: int, value: int) -> None:
+        """A store of the core into the flash, at an offset."""
+        if not self._control & _PG or size != 2 or at % 2:
+            self._status |= _PROGRAM_ERROR
+            return
+        self.programs += 1
+        present = int.from_bytes(self._memory[at : at + 2], "little")
+        if self._loses_power():
+            kept = self._tear.getrandbits(16)
+            self._memory[at : at + 2] = (present & (value | kept)).to_bytes(2, "little")
+            self.on_power_cut()
+        elif present != _ERASED and value:
+            self._status |= _PROGRAM_ERROR
+        elif not self._fails():
+            self._memory[at : at + 2] = value.to_bytes(2, "little")
+            self._status |= _END
+            self._stall(_PROGRAM_NS)
+
+    def _loses_power(self) -> bool:
+        if not self.cut_after:
+            return False
+        self.cut_after -= 1
+        return not self.cut_after
+
+    def _tear_page(self, at: int) -> None:
+        """Leave what an erase that is cut short may leave: the old page, a blank one, or any mixture."""
+        page = self._memory[at : at + PAGE_SIZE]
+        match self._tear.randrange(4):
+            case 1:
+                page[:] = b"\xff" * PAGE_SIZE
+            case 2:
+                page[:] = bytes(byte | self._tear.getrandbits(8) for byte in page)
+            case 3:
+                page[:] = bytes(0xFF if self._tear.getrandbits(1) else byte for byte in page)
+
+    def _fails(self) -> bool:
+        if not self.failures:
+            return False
+        self.failures -= 1
+        self._status |= _PROGRAM_ERROR
+        return True

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What no protocol tells of Harakiri: read from its RAM, by the image's symbols, and from its flash."""
+
+from enum import Enum
+
+from simulator.emulated_naze.dma import Memory
+from simulator.emulated_naze.flash_controller import PAGE_SIZE
+from simulator.emulated_naze.image import Image
+from simulator.flash import NorFlash
+from simulator.mission_slots import MissionSlots, flash_size
+from simulator.options import Faults, SimOptions
+
+#: In the struct of flags `f` (mw.h of both trees), ARMED is the second.
+_FLAGS, _ARMED = "f", 1
+_PROTOCOL = "Currentprotocol"
+#: The patch's two slots (firmware/README.md, Flash map).
+_SLOTS = 0x1_DC00
+
+
+class SpokenProtocol(Enum):
+    """Values of `Currentprotocol`."""
+
+    AUTOSENSE = 0
+    MSP = 1
+    MAVLINK = 2
+
+
+class HarakiriMemory:
+    """Looks into the memory of a board that runs Harakiri; of another image it knows nothing."""
+
+    def __init__(self, image: Image, ram: Memory, flash: memoryview) -> None:
+        self._ram = ram
+        self._flags = image.symbols.get(_FLAGS)
+        self._protocol = image.symbols.get(_PROTOCOL)
+        self._flash = flash
+
+    @property
+    def armed(self) -> bool:
+        """Whether the firmware says that the craft is armed."""
+        return self._flags is not None and self._ram.load(self._flags + _ARMED, 1) == b"\1"
+
+    @property
+    def protocol(self) -> SpokenProtocol | None:
+        """What the firmware believes to be spoken."""
+        if self._protocol is None:
+            return None
+        (value,) = self._ram.load(self._protocol, 1)
+        return SpokenProtocol(value) if value < len(SpokenProtocol) else None
+
+    @property
+    def stored_records(self) -> list[bytes]:
+        """The list that the patched firmware would find at its next start."""
+        options = SimOptions()
+        pages = self._flash[_SLOTS : _SLOTS + flash_size(options) - PAGE_SIZE]
+        slots = MissionSlots(NorFlash(pages, Faults()), options)
+        return [slots.read(index, 1) for index in range(slots.stored.count)]
