@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import structlog
 
@@ -71,6 +71,7 @@ class Daemon:
 
     def __init__(self, settings: Settings) -> None:
         self._loop = asyncio.get_running_loop()
+        self._loop.set_exception_handler(self._fault)
         self.settings = settings
         self._recording = Recording(settings)
         self._signing = SigningState(settings)
@@ -230,7 +231,11 @@ class Daemon:
         traffic = self.traffic[peer.link]
         traffic.pieces_received += 1
         traffic.bytes_received += len(data)
-        self.bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram)
+        try:
+            self.bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram)
+        except Exception:
+            # A ground station must not be able to reset the line to the flight controller: only its data is dropped.
+            _log.exception("gcs.fault", peer=str(peer))
         self.flush()
 
     def gcs_gone(self, peer: Peer) -> None:
@@ -290,6 +295,17 @@ class Daemon:
         if self.bridge.session.is_searching:
             _log.info("fc.searching", fc=str(self.settings.fc))
         self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)
+
+    def _fault(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """A callback of the loop raised: log it, and set up the line to the flight controller again.
+
+        asyncio would write to standard error, and block there if nobody reads it.
+        """
+        error = context.get("exception")
+        _log.error("daemon.fault", what=context["message"], exc_info=error)
+        if error is not None and "handle" in context:
+            self.bridge.restart("internal error", self._loop.time())
+            self.flush()
 
     def _tick(self) -> None:
         self._timer = None

@@ -8,7 +8,8 @@ from pathlib import Path
 _REPOSITORY = Path(__file__).parents[1]
 _EVENT = re.compile(r"[a-z]+\.[a-z_]+")
 #: What is called with an event's name, be it the first or the second argument.
-_SPEAKERS = {"debug", "info", "warning", "error", "level", "log_event", "_log_event", "note", "_note", "_complain"}
+_LEVELS = {"debug", "info", "warning", "error", "exception", "level"}
+_SPEAKERS = _LEVELS | {"log_event", "_log_event", "note", "_note", "_complain"}
 
 
 def _events_of_the_code() -> set[str]:

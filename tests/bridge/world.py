@@ -18,6 +18,7 @@ from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.multiwii import profile as multiwii
+from bridge.controllers.table import PROFILES
 from bridge.fc.autosense import SPEEDS
 from bridge.fc.profile import Profile
 from bridge.fc.states import Mavlink, Msp
@@ -116,6 +117,7 @@ class World:
         peer: Any = None,
         late_s: float = 0.0,
         links: Mapping[str, LinkAccess] | None = None,
+        profiles: Sequence[Profile] = PROFILES,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
@@ -133,7 +135,7 @@ class World:
         self._plugged = False
         self._late_s = late_s
         self._lateness_s = 0.0
-        self.bridge = Bridge(BridgeConfig(speeds, links=links or {}), self._note, self.now)
+        self.bridge = Bridge(BridgeConfig(speeds, links=links or {}, profiles=profiles), self._note, self.now)
         if powered:
             self.naze.power_on_booted(self.now)
         if plugged:

@@ -17,7 +17,7 @@ from structlog.testing import capture_logs
 from service import daemon as daemon_module
 from service.api import ControlError, ask_daemon
 from service.daemon import Daemon
-from service.links.connection import SerialFc
+from service.links.connection import SerialFc, SimulatedFc
 from service.settings import Settings
 
 LOSSES = {"fc.lost", "fc.port_lost"}
@@ -87,3 +87,33 @@ async def test_a_search_that_finds_nobody_says_so_again_and_again(monkeypatch: p
             await running
     os.close(near)
     os.close(far)
+
+
+async def test_a_fault_in_the_bridge_is_logged_and_the_line_set_up_again(tmp_path: Path) -> None:
+    """An exception on the loop goes to the log, not past it, and telemetry goes on."""
+    with capture_logs() as events:
+        daemon = Daemon(Settings(SimulatedFc(), state_dir=tmp_path))
+        running = asyncio.create_task(daemon.run())
+
+        async def found() -> None:
+            async with asyncio.timeout(20):
+                while daemon.bridge.session.controller is None:  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+
+        await found()
+        healthy = daemon.bridge.session.tick
+
+        def faulty(_now: float) -> None:
+            daemon.bridge.session.tick = healthy  # type: ignore[method-assign]
+            raise AttributeError("link")
+
+        daemon.bridge.session.tick = faulty  # type: ignore[assignment,method-assign]
+        async with asyncio.timeout(20):
+            while daemon.bridge.session.controller is not None:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+        await found()
+        running.cancel()
+        with suppress(asyncio.CancelledError):
+            await running
+    (fault,) = [event for event in events if event["event"] == "daemon.fault"]
+    assert isinstance(fault["exc_info"], AttributeError)

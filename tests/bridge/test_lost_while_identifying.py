@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Boards that fall silent, restart, arm or change their speed at any moment of identification are found again."""
+
+import random
+
+import pytest
+from world import World
+
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.fc.states import Identifying
+from simulator.options import SimOptions, TelemetryProtocol
+
+#: From the moment at which the board can be heard again.
+FOUND_WITHIN_S = 8.0
+SPEEDS = [115200, 57600, 38400, 19200, 9600]
+MOMENTS = 12
+
+
+def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryProtocol.MSP) -> World:
+    """A world somewhere in the middle of identification."""
+    world = World(SimOptions(baud=baud, tele_prot=protocol), seed=seed)
+    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 20)
+    if seed:
+        began = world.now
+        rest = World(SimOptions(baud=baud, tele_prot=protocol), seed=seed)
+        rest.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 20)
+        rest.wait_until(lambda w: not w.bridge.session.is_searching, 20)
+        world.run((rest.now - began) * random.Random(seed).random())
+    assert isinstance(world.bridge.session.state, Identifying)
+    return world
+
+
+def is_known(world: World) -> bool:
+    return world.bridge.session.controller is not None
+
+
+@pytest.mark.parametrize("baud", SPEEDS)
+def test_power_cut(baud: int) -> None:
+    for seed in range(MOMENTS):
+        world = identifying(baud, seed)
+        world.power_off()
+        world.run(random.Random(seed).random() * 4)
+        world.power_on()
+        world.run(world.naze.options.boot_ms / 1000)
+        world.wait_until(is_known, FOUND_WITHIN_S)
+        assert world.kind is harakiri.PATCHED
+
+
+@pytest.mark.parametrize("baud", SPEEDS)
+@pytest.mark.parametrize("protocol", TelemetryProtocol)
+def test_arms(baud: int, protocol: TelemetryProtocol) -> None:
+    for seed in range(MOMENTS):
+        world = identifying(baud, seed, protocol)
+        world.faults.armed = True
+        world.wait_until(is_known, FOUND_WITHIN_S)
+        # At 9600 baud Harakiri's telemetry is more than the line carries: many a heartbeat is lost.
+        world.wait_until(lambda w: w.bridge.session.vehicle.armed is True, FOUND_WITHIN_S)
+        world.faults.armed = False
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED, FOUND_WITHIN_S)
+
+
+@pytest.mark.parametrize("baud", SPEEDS)
+def test_stands_still(baud: int) -> None:
+    for seed in range(MOMENTS):
+        world = identifying(baud, seed)
+        world.faults.hang = True
+        world.run(random.Random(seed).random() * 10)
+        world.faults.hang = False
+        world.wait_until(is_known, FOUND_WITHIN_S)
+        assert world.kind is harakiri.PATCHED

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Adding a flight controller takes one profile and one line in the table (docs/design.md)."""
+
+from conversations import Upload, waypoints
+from fake_inav import FakeInav
+from world import GroundStation, World
+
+from bridge.controllers.table import PROFILES
+from bridge.fc.interview import Interview
+from bridge.fc.profile import FlightController, Profile
+from bridge.line.conversation import Conversation
+from bridge.model.refusal import Refusal
+from protocols.mission_item import MissionResult
+
+
+def recognise(board: Interview) -> Conversation[FlightController | None]:
+    if (yield from board.variant()) != "TOYS":
+        return None
+    return FlightController(TOY, "Toy 1.0", boxes=(yield from board.box_names()))
+
+
+NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "Toys do not navigate")
+TOY = Profile("a toy", "Toy", recognise=recognise, no_missions=NO_MISSIONS)
+
+
+def test_a_profile_is_all_it_takes() -> None:
+    board = FakeInav()
+    board.answers = {2: b"TOYS", 116: b"ANGLE;ARM;"}
+    board.answer = lambda frame: (  # type: ignore[method-assign]
+        bytes(6) + b"\2\0\0\0\0" if frame.command == 101 else board.answers.get(frame.command)
+    )
+    world = World(peer=board, speeds=(115200,), profiles=(TOY, *PROFILES))
+    station = GroundStation(world)
+    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.wait_until(lambda w: w.kind is TOY, 5)
+    world.run(2)
+    assert "Found Toy 1.0" in station.texts()
+    assert station.said("HEARTBEAT")[-1].base_mode & 128, "its ARM box is the second one"
+    assert Upload(station, waypoints(3)).run() is MissionResult.UNSUPPORTED
+    assert "Toys do not navigate" in station.texts()
