@@ -15,14 +15,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from bridge.line.msp_link import RESYNC, RESYNC_REPLY_SIZE
+from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE
 from bridge.line.pending_replies import PendingReplies
 from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.heartbeat import is_plausible_heartbeat
 from protocols.msp.commands import Msp
-from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
-
-PROBE = request(Msp.IDENT)
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
 #: Tried in this order; 115200 is Harakiri's default and comes back in between, for a board that was still booting.
 SPEEDS = (115200, 57600, 38400, 115200, 19200, 9600, 4800, 2400, 1200)
@@ -35,7 +34,6 @@ _PROBE_INTERVAL_S = 0.15
 _QUICK_PROBES = 4
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
-_HEARTBEAT_SIZE = 9
 #: Harakiri sends three and more every 125 ms. By chance one of four ids and a mark in the right place: 1 in 1024 each.
 _FRSKY_EVIDENCE = 6
 
@@ -224,12 +222,3 @@ class Autosense:
     def _conclude(self, spoken: Spoken, why: str) -> None:
         self.phase = Phase.FOUND
         self.found = Found(spoken, self.speed, why, self._visit.heartbeat)
-
-
-def is_plausible_heartbeat(frame: MavlinkFrame) -> bool:
-    """Check the length, and the fields that have few legal values: type, autopilot, state, MAVLink version."""
-    payload = frame.payload
-    if frame.msgid != 0 or len(payload) != _HEARTBEAT_SIZE:
-        return False
-    vehicle_type, autopilot, _, state, version = payload[4:]
-    return version == 3 and vehicle_type <= 45 and autopilot <= 20 and state <= 8 and frame.sysid != 0

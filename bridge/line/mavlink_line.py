@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A port on which MAVLink is spoken: what comes in, and when it is over. Sans-IO."""
 
-from bridge.fc.autosense import PROBE, is_plausible_heartbeat
 from bridge.line.mavlink_sender import HarakiriSender
+from bridge.line.msp_link import PROBE
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.heartbeat import is_plausible_heartbeat
 from protocols.msp.frame import MspParser
 
 #: Other autopilots are given the time of two lost heartbeats.

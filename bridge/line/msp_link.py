@@ -48,6 +48,8 @@ _RESYNC_COMMANDS = (
     *(Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT, Msp.FC_VARIANT, Msp.IDENT, Msp.IDENT),
     *(Msp.IDENT, Msp.IDENT, Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT),
 )
+#: Asks a board of any kind for a sign of life.
+PROBE = request(Msp.IDENT)
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error; who says

@@ -11,8 +11,8 @@ import itertools
 import pytest
 from world import World
 
-from bridge.fc.autosense import PROBE, SPEEDS
-from bridge.line.msp_link import RESYNC
+from bridge.fc.autosense import SPEEDS
+from bridge.line.msp_link import PROBE, RESYNC
 from protocols.msp.hazards import HAZARDS, RUN_LENGTH, is_clean
 from simulator.line import garble
 from simulator.options import SimOptions
