@@ -104,6 +104,10 @@ class EmulatedNaze:
         """Erases and programs so far, as `faults.power_cut_at_flash_operation` counts them."""
         return self._chip.flash_controller.operations
 
+    def peek(self, address: int, size: int) -> bytes:
+        """Bytes of the chip's RAM, as a debugger would see them."""
+        return self._chip.cpu.load(address, size)
+
     def truth(self, _: float) -> Craft | None:
         """None: the board lies on a bench."""
         return None

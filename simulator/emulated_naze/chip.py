@@ -63,7 +63,7 @@ class Chip:
         self.cpu = Cpu(self.clock, nvic, lambda: rcc.core_hz, self._vectors)
         self._bus = Bus(self._pace)
         self.dma = Dma(self.cpu, nvic)
-        self.flash_controller = FlashController(flash, self._pace.spend, self._random)
+        self.flash_controller = FlashController(flash, self._stall, self._random)
         self.usart1 = Usart(self.clock, nvic, Irq.USART1, lambda: rcc.apb2_hz, self.dma.channel(5), self.dma.channel(4))
         self.usart2 = Usart(self.clock, nvic, Irq.USART2, lambda: rcc.apb1_hz)
         self.i2c2 = I2c(
@@ -153,6 +153,11 @@ class Chip:
 
     def _vectors(self) -> int:
         return self.system.vector_table or FLASH_BASE
+
+    def _stall(self, duration_ns: int) -> None:
+        """Let time pass in which the core, whose code is in the flash, stands still."""
+        self._pace.spend(duration_ns)
+        self.cpu.pause()
 
     def _request_reset(self) -> None:
         self.wants_reset = True

@@ -19,7 +19,7 @@ _LONGEST_STEP_S = 0.005
 def run_image(path: Path, faults: Faults, running: Running, state: Path | None, seed: int) -> None:
     """Run a firmware until Ctrl-C. click.ClickException."""
     try:
-        from simulator.emulated_naze.board import EmulatedNaze  # noqa: PLC0415: needs Unicorn, which is optional
+        from simulator.emulated_naze.board import EmulatedNaze  # Unicorn is optional
     except ImportError as error:
         raise click.ClickException(
             "--image needs the emulator: pip install 'naze-bridge[emulator]' (or the package unicorn)."

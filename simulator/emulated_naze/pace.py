@@ -41,6 +41,7 @@ class Pace:
 
     def look_at_time(self) -> None:
         """The firmware is about to read the time."""
+        self.charge_access()
         self._nothing_new += 1
         skip_ns = min((self._nothing_new - _PATIENCE) * _SKIP_NS, _LONGEST_SKIP_NS)
         if skip_ns > 0:

@@ -41,7 +41,8 @@ class SysTick:
                 self._on_look()
                 if not self._alarm.is_set:
                     return 0
-                return (self._alarm.at_ns - self._clock.now_ns) * self._hz() // 1_000_000_000 & _MASK
+                left = (self._alarm.at_ns - self._clock.now_ns) * self._hz() // 1_000_000_000
+                return min(left, self._reload)
         return 0
 
     def write(self, offset: int, value: int) -> None:
