@@ -5,7 +5,15 @@ import hashlib
 import re
 import shutil
 import subprocess
+import sys
+from collections.abc import Callable
+from errno import ENOSPC
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from itertools import count
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -14,8 +22,10 @@ PATCHES = sorted((FIRMWARE / "patches").glob("*.patch"))
 CORE = ("naze_mission.h", "naze_mission.c", "harakiri_mission.h", "harakiri_mission.c")
 
 PATCH = """\
+The mission extension for a tree of our own, commit 0123abc, for tests.
 base {main} src/main.c
 base {mw} src/mw.h
+base {util} src/util.c
 
 diff --git a/src/main.c b/src/main.c
 --- a/src/main.c
@@ -25,10 +35,16 @@ diff --git a/src/main.c b/src/main.c
 @@ -2,0 +4,2 @@
 +    one();
 +    two();
+diff --git a/src/util.c b/src/util.c
+--- a/src/util.c
++++ b/src/util.c
+@@ -1,0 +2 @@
++int three(void);
 """
 MAIN = b"int main(void)\n{\n    loop();\n}\n"
 PATCHED = b'#include "naze_mission.h"\nint main(void)\n{\n    one();\n    two();\n    loop();\n}\n'
 MW = b"void loop(void);\n"
+UTIL = b"int two(void);\n"
 
 
 class Workshop:
@@ -42,7 +58,9 @@ class Workshop:
             shutil.copy(FIRMWARE / name, self.firmware)
         (self.tree / "src" / "main.c").write_bytes(MAIN)
         (self.tree / "src" / "mw.h").write_bytes(MW)
-        hashes = {"main": hashlib.sha256(MAIN).hexdigest(), "mw": hashlib.sha256(MW).hexdigest()}
+        (self.tree / "src" / "util.c").write_bytes(UTIL)
+        files = {"main": MAIN, "mw": MW, "util": UTIL}
+        hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
         (self.firmware / "patches" / "Tree.patch").write_text(PATCH.format(**hashes))
 
     def run(self, *arguments: str) -> tuple[int, str]:
@@ -96,17 +114,129 @@ def test_another_tree_is_left_alone(workshop: Workshop, remove: bool, applied: b
     assert code == 1
     assert "nothing was changed" in printed
     assert re.search(r"src/main\.c: has SHA-256 [0-9a-f]{64}, expected", printed)
+    assert ("lines of this patch" in printed) is applied
     assert "src/mw.h: is not there" in printed
+    files = " -- src/main.c src/mw.h" if applied else ""
+    assert f"git -C {workshop.tree} checkout 0123abc{files}\n" in printed
     assert workshop.files() == before
 
 
-def test_dos_line_ends_are_named(workshop: Workshop) -> None:
+@pytest.mark.parametrize("remove", [False, True])
+@pytest.mark.parametrize("applied", [False, True])
+def test_a_checkout_with_dos_line_ends_is_named(workshop: Workshop, remove: bool, applied: bool) -> None:
+    if applied:
+        workshop.run()
+    for name in ("main.c", "mw.h"):
+        path = workshop.tree / "src" / name
+        path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    before = workshop.files()
+    code, printed = workshop.run(*(["--remove"] if remove else []))
+    assert code == 1
+    assert printed.startswith(f"apply: {workshop.tree} is Tree at commit 0123abc, but checked out with CRLF line ends;")
+    assert "nothing was changed" in printed
+    assert "src/main.c: has CRLF line ends" in printed
+    assert "core.autocrlf false" in printed
+    assert "SHA-256" not in printed
+    assert workshop.files() == before
+
+
+def test_dos_line_ends_of_one_file_are_named_among_other_differences(workshop: Workshop) -> None:
     main = workshop.tree / "src" / "main.c"
     main.write_bytes(MAIN.replace(b"\n", b"\r\n"))
+    (workshop.tree / "src" / "mw.h").write_bytes(b"another\n")
     code, printed = workshop.run()
     assert code == 1
     assert "src/main.c: has CRLF line ends" in printed
-    assert "mw.h" not in printed
+    assert "src/mw.h: has SHA-256" in printed
+
+
+def half_patch(workshop: Workshop) -> None:
+    """Leave what an interrupted copy leaves: a file with the patch, a file without, one of the core's files."""
+    workshop.run()
+    (workshop.tree / "src" / "util.c").write_bytes(UTIL)
+    for name in CORE[1:]:
+        (workshop.tree / "src" / name).unlink()
+
+
+def test_a_half_patched_tree_is_completed(workshop: Workshop) -> None:
+    workshop.run()
+    patched = workshop.files()
+    half_patch(workshop)
+    assert workshop.run() == (0, "Tree: brought up to date (it was half patched); build it with make\n")
+    assert workshop.files() == patched
+
+
+def test_a_half_patched_tree_is_restored(workshop: Workshop) -> None:
+    before = workshop.files()
+    half_patch(workshop)
+    assert workshop.run("--remove") == (0, "Tree: as it was before the patch (it was half patched)\n")
+    assert workshop.files() == before
+
+
+def test_a_file_that_has_a_core_files_name_is_not_overwritten(workshop: Workshop) -> None:
+    (workshop.tree / "src" / "naze_mission.c").write_text("/* my own */")
+    before = workshop.files()
+    code, printed = workshop.run()
+    assert code == 1
+    assert "nothing was changed" in printed
+    assert "src/naze_mission.c" in printed
+    assert workshop.files() == before
+
+
+def test_removing_keeps_a_file_that_it_did_not_make(workshop: Workshop) -> None:
+    workshop.run()
+    (workshop.tree / "src" / "naze_mission.c").write_text("/* changed by hand */")
+    code, printed = workshop.run("--remove")
+    assert code == 0
+    assert "kept" in printed
+    assert "src/naze_mission.c" in printed
+    assert "src/naze_mission.h" not in printed
+    assert (workshop.tree / "src" / "naze_mission.c").read_text() == "/* changed by hand */"
+    assert not (workshop.tree / "src" / "naze_mission.h").exists()
+
+
+def load_apply(workshop: Workshop) -> ModuleType:
+    loader = SourceFileLoader("firmware_apply", str(workshop.firmware / "apply"))
+    module = module_from_spec(spec_from_loader("firmware_apply", loader))  # type: ignore[arg-type]
+    sys.modules["firmware_apply"] = module  # where dataclass looks for it
+    loader.exec_module(module)
+    return module
+
+
+def failing_at(number: int, operation: Callable[..., Any]) -> Callable[..., Any]:
+    """The operation, but its n-th call fails."""
+    calls = count(1)
+
+    def call(path: Path, *args: Any, **kwargs: Any) -> Any:
+        if next(calls) == number:
+            raise OSError(ENOSPC, "No space left on device", str(path))
+        return operation(path, *args, **kwargs)
+
+    return call
+
+
+@pytest.mark.parametrize("remove", [False, True])
+@pytest.mark.parametrize("operation", ["write_bytes", "replace", "unlink"])
+def test_all_files_change_or_none(
+    workshop: Workshop, remove: bool, operation: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Let the first, second, ... write, rename or deletion fail, as on a full disk."""
+    apply = load_apply(workshop)
+    if remove:
+        workshop.run()
+    before = workshop.files()
+    arguments = ["apply", *(["--remove"] if remove else []), str(workshop.tree)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    failed = 0
+    for number in count(1):
+        with monkeypatch.context() as patching:
+            patching.setattr(Path, operation, failing_at(number, getattr(Path, operation)))
+            if apply.main() == 0:
+                break
+        failed += 1
+        assert workshop.files() == before
+    times = {"write_bytes": (8, 8), "replace": (6, 2), "unlink": (0, 4)}
+    assert failed == times[operation][remove]
 
 
 def test_no_tree_at_all(workshop: Workshop) -> None:

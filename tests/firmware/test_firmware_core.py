@@ -61,3 +61,22 @@ def test_core_stays_small() -> None:
 def test_fuzzer_finds_nothing_in_a_few_seconds() -> None:
     printed = make("fuzz", "FUZZ_SECONDS=5")
     assert not printed or "stat::number_of_executed_units" in printed
+
+
+@pytest.mark.parametrize(("pages", "compiles"), [(128, True), (64, False)])
+def test_slots_and_linker_script_cannot_part(pages: int, compiles: bool) -> None:
+    """A build for 64 KB of flash would put the slots where stm32_flash.ld lets the program go."""
+    includes = ["-I", FIRMWARE, "-I", FIRMWARE / "tests" / "harakiri"]
+    source = FIRMWARE / "harakiri_mission.c"
+    command = ["gcc", "-std=c99", "-fsyntax-only", f"-DFLASH_PAGE_COUNT={pages}", *includes, source]
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert (run.returncode == 0) is compiles
+    assert ("slots_lie_where_stm32_flash_ld_says" in run.stderr) is not compiles
+
+
+@pytest.mark.parametrize("patch", ["TestCode3", "HarakiriWebstore1"])
+def test_the_linker_scripts_limit_is_the_slots_address(patch: str) -> None:
+    source = (FIRMWARE / "harakiri_mission.c").read_text()
+    limit = re.search(r"#define LINKED_BELOW (0x[0-9A-F]{8})u", source)
+    assert limit is not None
+    assert f"<= {limit[1]}," in (FIRMWARE / "patches" / f"{patch}.patch").read_text()
