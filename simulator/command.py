@@ -80,7 +80,7 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
 @click.option("--lost-bytes", type=_RATE, default=0.0, help="Probability that a byte is lost.")
 @click.option("--flash-stall", type=_PERIOD, default=100.0, show_default=True, help="Time to erase a slot, ms.")
 @click.option("--program-stall", type=_PERIOD, default=0.45, show_default=True, help="Time to program a record, ms.")
-@click.option("--capacity", type=click.IntRange(2, 1000), help="Records that fit: 146 on a Naze, 120 on a MultiWii.")
+@click.option("--capacity", type=click.IntRange(2, 1000), help="Records that fit: 146 on a Naze, 178 on a MultiWii.")
 @click.option(
     "--wp-radius-cm", type=click.IntRange(0, 2000), default=200, show_default=True, help="gps_wp_radius, if blank."
 )
@@ -140,7 +140,7 @@ def sim(
         run_image(image, faults, running, state, seed)
         return
     if kind != "naze":
-        line = MspOptions(version=inav_version, baud=int(baud), capacity=capacity or 120, seed=seed)
+        line = MspOptions(version=inav_version, baud=int(baud), capacity=capacity or 178, seed=seed)
         run_other_board(kind, line, faults, running, state)
         return
     if play is not None:

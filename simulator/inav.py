@@ -19,11 +19,15 @@ _STEP_S = 0.05
 _STATUS_FLAGS = 32
 _SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
 _CYCLE_TIME_US = 500
+_ARMED_FLAGS = 0b1100  # armed, and armed once
+_LOAD_PERCENT = 7
+_CELLS, _BATTERY_PERCENT, _DRAWN_MAH = 3, 88, 120
 _API_VERSION = bytes((0, 2, 5))
 _FIX_3D = 2
 _HDOP_E2 = 130
 _RSSI = 920
 _LOWEST, _MIDDLE, _CRUISE, _HIGHEST = 1000, 1500, 1450, 2000
+_MISSION_SETTING = b"nav_wp_multi_mission_index\0"
 _FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
 
 
@@ -55,6 +59,11 @@ class InavCommand(IntEnum):
     MAG_CALIBRATION = 206
     SET_WP = 209
     EEPROM_WRITE = 250
+    SETTING = 0x1003
+    INAV_STATUS = 0x2000
+    INAV_ANALOG = 0x2002
+    INAV_AIR_SPEED = 0x2009
+    INAV_MIXER = 0x2010
 
 
 class InavFirmware:
@@ -64,13 +73,16 @@ class InavFirmware:
         self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
         self._version = tuple(int(part) for part in boot.options.version.split("."))
         self._boxes = BOXES[boot.options.version]
-        self.habits = PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=self._version <= (8, 0, 1))
+        channels = 34 if self._version >= (8, 0, 0) else 18
+        self._channels = channels if boot.options.receiver else 0
+        self.habits = PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=self._version <= (8, 0, 1), speaks_v2=True)
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
         self._clock = boot.now
         self._busy = 0.0
         self._armed = False
+        self._stick_loads = boot.faults.stick_loads
         self._home: tuple[int, int] | None = None
 
     @property
@@ -94,15 +106,25 @@ class InavFirmware:
     def follow_pilot(self, now: float) -> None:
         """Fly until `now`, arm and disarm. CrashError: the check before arming met a JUMP to nowhere."""
         self._fly_until(now)
+        self._follow_sticks()
         flyable = self._armed or self._mission.is_flyable()
-        if self._faults.armed and not self._armed and flyable:
+        if self._faults.armed and not self._armed and flyable and not self._faults.arming_blockers:
             self._armed = True
+            self._mission.follow_selection()
             self._home = self._craft.position
             self._navigation.arm()
         elif self._armed and not self._faults.armed:
             self._armed = False
             self._navigation.disarm()
             self._craft.rest()
+
+    def _follow_sticks(self) -> None:
+        if self._faults.selected_mission:
+            self._mission.selected = self._faults.selected_mission
+        if self._faults.stick_loads > self._stick_loads:
+            self._stick_loads = self._faults.stick_loads
+            if not self._armed:
+                self._mission.load()
 
     def craft_at(self, now: float) -> Craft:
         """Return what the sensors say."""
@@ -114,6 +136,8 @@ class InavFirmware:
             self._clock = now
         while self._clock + _STEP_S <= now:
             self._clock += _STEP_S
+            if not self._navigation.is_in_mission:
+                self._mission.follow_selection()
             self._navigation.step(_STEP_S, self._is_on(NAV_WP))
 
     def _is_on(self, box: int) -> bool:
@@ -137,6 +161,9 @@ class InavFirmware:
                 return self._set_waypoint(payload)
             case InavCommand.WP:
                 return reply(command, self._waypoint(payload))
+            case InavCommand.SETTING:
+                is_known = payload == _MISSION_SETTING
+                return reply(command, bytes((self._mission.selected,))) if is_known else error(command)
             case InavCommand.WP_GETINFO:
                 known = self._mission.known(self._armed)
                 return reply(command, bytes((0, CAPACITY, self._mission.is_valid, known)))
@@ -206,7 +233,7 @@ class InavFirmware:
             case InavCommand.RC:
                 sticks = (_MIDDLE, _MIDDLE, _MIDDLE, _CRUISE if self._armed else _LOWEST)
                 aux = (_HIGHEST if self._armed else _LOWEST, *(_MIDDLE,) * 30)
-                channels = (*sticks, *aux)[: self._options.channels]
+                channels = (*sticks, *aux)[: self._channels]
                 return struct.pack(f"<{len(channels)}H", *channels)
             case InavCommand.RAW_GPS:
                 position = (flight.lat_e7, flight.lon_e7, round(flight.altitude_m))
@@ -224,11 +251,24 @@ class InavFirmware:
                 return struct.pack("<ihi", height, round(flight.climb_ms * 100), height)
             case InavCommand.ANALOG:
                 current = 1250 if self._armed else 30
-                return struct.pack("<BHHh", round(flight.volts * 10), 120, _RSSI, current)
+                return struct.pack("<BHHh", round(flight.volts * 10), _DRAWN_MAH, _RSSI, current)
             case InavCommand.BOXNAMES:
                 return box_names(self._boxes)
             case InavCommand.BOXIDS:
                 return bytes(self._boxes)
+            case InavCommand.INAV_STATUS:
+                flags = self._faults.arming_blockers | (_ARMED_FLAGS if self._armed else 0)
+                status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, _SENSORS, _LOAD_PERCENT, 0, flags)
+                return status + craft.boxes.to_bytes(8, "little") + b"\0"
+            case InavCommand.INAV_ANALOG:
+                current = 1250 if self._armed else 30
+                volts_e2 = round(flight.volts * 100)
+                drawn = (volts_e2 * current // 100, _DRAWN_MAH, 1300)
+                return struct.pack("<BHHIIIIBH", _CELLS << 4, volts_e2, current, *drawn, 0, _BATTERY_PERCENT, _RSSI)
+            case InavCommand.INAV_AIR_SPEED:
+                return struct.pack("<I", round(flight.speed_ms * 100)) if self._options.platform else None
+            case InavCommand.INAV_MIXER:
+                return struct.pack("<BBBBBhBB", 0, 0, 0, self._options.platform, 0, -1, 12, 18)
             case InavCommand.NAV_STATUS:
                 return self._navigation.status().pack()
         return None

@@ -25,12 +25,15 @@ class InavMission:
         self._eeprom = eeprom
         # Forgotten waypoints stay where they are; the counts say which of them exist.
         self._list = [NavWaypoint(action=0, flag=0)] * CAPACITY
+        #: nav_wp_multi_mission_index: which mission of the store is flown, from 1. The pilot's sticks change it.
+        self.selected = 1
         self._forget()
 
     def _forget(self) -> None:
         self.count = 0
         self.is_valid = False
-        self._total = 0
+        self._start = self._total = 0
+        self._missions = self._loaded = 0
 
     @property
     def stored(self) -> bytes:
@@ -45,14 +48,19 @@ class InavMission:
         return self._total if self._total and not armed else self.count
 
     def __getitem__(self, index: int) -> NavWaypoint:
-        """Return a waypoint by its index from 0, as it is flown: a JUMP's p1 is an index, too."""
-        return self._list[index]
+        """A waypoint of the loaded mission by its index from 0, as it is flown: a JUMP's p1 is an index, too."""
+        return self._list[min(self._start + index, CAPACITY - 1)]
+
+    @property
+    def lands_after_rth(self) -> bool:
+        """Whether a mission's RTH ends on the ground. The last waypoint's p1 decides, whatever its action is."""
+        return self[self.count - 1].p1 > 0
 
     def read(self, number: int, armed: bool) -> NavWaypoint:
         """Return waypoint 1..255 as MSP_WP does: a fake one where there is none."""
         if not 1 <= number <= min(self.known(armed), CAPACITY):
             return FAKE
-        waypoint = self._list[number - 1]
+        waypoint = self._list[number - 1 + (self._start if armed else 0)]
         return replace(waypoint, p1=wrap16(waypoint.p1 + 1)) if waypoint.action == Action.JUMP else waypoint
 
     def write(self, number: int, waypoint: NavWaypoint) -> None:
@@ -76,25 +84,37 @@ class InavMission:
         for number in range(1, CAPACITY + 1):
             start = (number - 1) * WAYPOINT_SIZE
             self._eeprom[start : start + WAYPOINT_SIZE] = self.read(number, armed=False).pack(number)
+        self.selected = 1
         return True
 
     def load(self) -> bool:
-        """Copy the EEPROM's list into RAM. A blank EEPROM changes nothing, and is an error only if RAM is empty."""
-        missions = 0
+        """Copy the EEPROM's missions into RAM. A blank EEPROM changes nothing, and is an error only if RAM is empty."""
         for number in range(1, CAPACITY + 1):
             saved = self._saved(number)
             self.write(number, saved)
             if saved.flag == FLAG_LAST:
-                missions += 1
+                self._missions += 1
                 after = self._saved(number + 1) if number < CAPACITY else None
                 if after and (after.flag, after.action) == (FLAG_LAST, Action.RTH):
                     break
         self._total = self.count
-        # The first of several missions is the one that is flown.
-        self.count = next((index for index in range(CAPACITY) if self[index].flag == FLAG_LAST), 0) + 1
+        if self.selected > self._missions:
+            self.selected = 1
+        self._load_selected()
         if not (self.is_valid and self.count):
             self._forget()
         return self.is_valid
+
+    def follow_selection(self) -> None:
+        """Load the selected mission, which an armed INAV does outside of its waypoint mode."""
+        if self._missions >= 2 and self._loaded != self.selected:
+            self._load_selected()
+
+    def _load_selected(self) -> None:
+        ends = [index for index in range(CAPACITY) if self._list[index].flag == FLAG_LAST]
+        self._loaded = self.selected
+        self._start = ends[self.selected - 2] + 1 if self.selected > 1 else 0
+        self.count = ends[self.selected - 1] + 1 - self._start if len(ends) >= self.selected else 0
 
     def is_flyable(self) -> bool:
         """Tell whether INAV lets the pilot arm with these JUMPs; it looks whenever it is disarmed. CrashError."""
@@ -127,7 +147,7 @@ class InavMission:
 
     def set_jump(self, index: int, repeats: int) -> None:
         """Set the counter of one JUMP."""
-        self._list[index] = replace(self[index], p3=repeats)
+        self._list[self._start + index] = replace(self[index], p3=repeats)
 
     def _saved(self, number: int) -> NavWaypoint:
         start = (number - 1) * WAYPOINT_SIZE

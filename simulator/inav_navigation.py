@@ -98,8 +98,7 @@ class InavNavigation:
                 self._craft.hover(self._craft.height_m, seconds)
             case Phase.RTH_ENROUTE:
                 if self._craft.fly_to(self._home, _RTH_HEIGHT_M, _CRUISE_MS, seconds):
-                    lands = self._mission[self.index].p1 > 0
-                    self.phase = Phase.RTH_LANDING if lands else Phase.RTH_HOVER
+                    self.phase = Phase.RTH_LANDING if self._mission.lands_after_rth else Phase.RTH_HOVER
 
     def _begin(self) -> None:
         if self._restarts or self.index == 0:

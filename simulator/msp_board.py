@@ -13,6 +13,7 @@ from simulator.line import disturb
 from simulator.msp_firmware import Boot, BootFirmware, CrashError, MspFirmware
 from simulator.msp_options import MspOptions
 from simulator.msp_port import MspReceiver
+from simulator.msp_v2 import MspReceiverV2
 from simulator.options import Counters, Faults
 from simulator.serial_ring import SerialRing
 
@@ -165,7 +166,8 @@ class MspBoard:
             """Nobody listened while it booted."""
         self.power = MspPower.RUNNING
         self._firmware = self._boot_firmware(self._boot_at(at))
-        self._receiver = MspReceiver(self._firmware.habits.buffer_size)
+        habits = self._firmware.habits
+        self._receiver = (MspReceiverV2 if habits.speaks_v2 else MspReceiver)(habits.buffer_size)
         self._pending = None
         self._next_task = self._next_look = self._last_byte = at
 

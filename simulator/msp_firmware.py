@@ -9,9 +9,11 @@ from typing import Protocol
 from protocols.msp.frame import Direction, MspFrame
 from simulator.flight import Craft
 from simulator.msp_options import MspOptions
+from simulator.msp_v2 import frame_v2
 from simulator.options import Counters, Faults
 
 _JUMBO = 255
+_HIGHEST_V1_COMMAND = 255
 
 
 class CrashError(Exception):
@@ -24,12 +26,14 @@ class PortHabits:
 
     `buffer_size`: the largest payload. `cli_guard_s`: the silence after a '#' that opens the CLI; None without a CLI.
     `obeys_r`: an 'R' restarts it into its bootloader. `writes_first`: an answer waits until the EEPROM is written.
+    `speaks_v2`: it understands MSP v2, too.
     """
 
     buffer_size: int
     cli_guard_s: float | None = None
     obeys_r: bool = False
     writes_first: bool = False
+    speaks_v2: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +78,8 @@ BootFirmware = Callable[[Boot], MspFirmware]
 
 def reply(command: int, payload: bytes = b"") -> bytes:
     """Encode a reply frame; from 255 bytes on it is a jumbo frame: size 255, command, the real size as 16 bits."""
+    if command > _HIGHEST_V1_COMMAND:
+        return frame_v2(">", command, payload)
     if len(payload) < _JUMBO:
         return MspFrame(Direction.REPLY, command, payload).encode()
     body = struct.pack("<BBH", _JUMBO, command, len(payload)) + payload
@@ -85,4 +91,6 @@ def reply(command: int, payload: bytes = b"") -> bytes:
 
 def error(command: int) -> bytes:
     """Encode an error frame."""
+    if command > _HIGHEST_V1_COMMAND:
+        return frame_v2("!", command)
     return MspFrame(Direction.ERROR, command).encode()

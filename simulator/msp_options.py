@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MspOptions:
-    """`baud` None: a socket. `version` is INAV's. `channels`: how many MSP_RC tells; 0 without a receiver.
+    """`baud` None: a socket. `version` is INAV's. `receiver`: whether MSP_RC has channels.
 
+    `platform`: INAV's platform_type (mixer_profile.h), 0 a multirotor, 1 an aeroplane.
     `serial_task_ms`: how often MSP is served, one request at a time: INAV's simulator 0.5, its boards 10.
     `ring_size`: bytes that fit in before the next run: a UART's 256, INAV's simulator 2048.
     `capacity`: of MultiWii's EEPROM, waypoints. `seed`: of the random faults.
@@ -15,10 +16,11 @@ class MspOptions:
 
     version: str = "9.1.0"
     baud: int | None = 115200
-    channels: int = 16
+    receiver: bool = True
+    platform: int = 0
     serial_task_ms: float = 0.5
     ring_size: int = 256
     boot_ms: float = 1500.0
     eeprom_write_ms: float = 100.0
-    capacity: int = 120
+    capacity: int = 178
     seed: int = 0

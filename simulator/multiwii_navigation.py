@@ -11,6 +11,8 @@ from simulator.waypoint_craft import WaypointCraft
 
 _CRUISE_MS = 3.0
 _HOVER_HEIGHT_M = 10.0
+#: NAV_CONFIG's rth_altitude: the way home is flown no lower than this, or than the step says.
+_RTH_HEIGHT_M = 20.0
 _NO_JUMP = -10
 
 
@@ -23,7 +25,7 @@ class MultiWiiNavigation:
         self._error = Error.NONE
         self._next_step = 1
         self._jumps = _NO_JUMP
-        self._held_s = 0.0
+        self._held_s = self._rth_height_m = 0.0
         self.home = craft.position
         self.state = State.NONE
         self.step = NavWaypoint(action=0, flag=0)
@@ -56,9 +58,11 @@ class MultiWiiNavigation:
             case State.WP_ENROUTE:
                 self._fly_leg(seconds)
             case State.RTH_START:
-                self.state = State.RTH_ENROUTE
+                self._craft.hover(self._rth_height_m, seconds)
+                if self._craft.height_m >= self._rth_height_m:
+                    self.state = State.RTH_ENROUTE
             case State.RTH_ENROUTE:
-                if self._craft.fly_to(self.home, self._craft.height_m, _CRUISE_MS, seconds):
+                if self._craft.fly_to(self.home, self._rth_height_m, _CRUISE_MS, seconds):
                     self.state = State.LAND_IN_PROGRESS if self.step.p1 else State.HOLD_INFINIT
             case State.HOLD_TIMED:
                 self._hold(seconds)
@@ -84,6 +88,7 @@ class MultiWiiNavigation:
             case Action.WAYPOINT | Action.POSHOLD_TIME | Action.POSHOLD_UNLIM | Action.LAND:
                 self.state = State.WP_ENROUTE
             case Action.RTH:
+                self._rth_height_m = max(self._craft.height_m, self.step.alt_cm / 100 or _RTH_HEIGHT_M)
                 self.state = State.RTH_START
             case Action.JUMP if 0 < self.step.p1 < self.number:
                 self._jumps = self.step.p2 if self._jumps == _NO_JUMP else self._jumps
@@ -122,8 +127,9 @@ class MultiWiiNavigation:
             self.state = State.PROCESS_NEXT
 
     def _hold(self, seconds: float) -> None:
+        """1000 * p1 is counted in the AVR's 16 bits."""
         self._held_s += seconds
         self._craft.hover(self._craft.height_m, seconds)
-        if self._held_s >= self.step.p1:
+        if self._held_s >= (1000 * self.step.p1 % 0x10000) / 1000:
             self._error = Error.TIMEWAIT
             self.state = State.PROCESS_NEXT

@@ -51,6 +51,8 @@ class Faults:
     it while a configuration write is scheduled. `boxes`: the other switches, one bit for each of BOXNAMES.
     `extension` counts from the next boot. Without `msp` only MAVLink is answered. The power goes in the middle of
     that flash operation (page erases and 16-byte programs, from 1; 0: never), or so many of them fail.
+    `arming_blockers`: INAV's flags (runtime_config.h) of what keeps it from arming. `stick_loads`: how often the pilot
+    has made INAV load its saved missions by the sticks. `selected_mission`: the one that he chose; 0: none.
     """
 
     bit_error_rate: float = 0.0
@@ -63,6 +65,9 @@ class Faults:
     msp: bool = True
     power_cut_at_flash_operation: int = 0
     flash_failures: int = 0
+    arming_blockers: int = 0
+    stick_loads: int = 0
+    selected_mission: int = 0
 
 
 @dataclass(slots=True)

@@ -31,11 +31,15 @@ class TelemetryCommand(IntEnum):
     BOXIDS = 119
 
 
+_ABOUT_GPS = (TelemetryCommand.RAW_GPS, TelemetryCommand.COMP_GPS)
+
+
 @dataclass(frozen=True, slots=True)
 class Dialect:
     """What tells one from another. `tails`: what follows a command's usual payload.
 
-    `constants`: the whole payload of commands that always answer the same. `boxes`: names by permanent id.
+    `constants`: the whole payload of commands that always answer the same. `boxes`: names by permanent id. `has_gps`:
+    Betaflight, as its own simulator is built, has no GPS and no messages about one.
     """
 
     habits: PortHabits
@@ -44,21 +48,27 @@ class Dialect:
     channels: int
     tails: Mapping[int, bytes]
     heading_from: int
+    has_gps: bool = True
 
 
 #: Its STATUS goes on with load, gyro cycle, no further flags, and what keeps it from arming; ANALOG with 0.01 V.
 BETAFLIGHT = Dialect(
     PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=True),
     {1: bytes((0, 1, 46)), 2: b"BTFL", 3: bytes((4, 5, 0)), 102: struct.pack("<9h", 0, 0, 512, 0, 0, 0, 0, 0, 0)},
-    {0: _ARM, 1: "ANGLE", 2: "HORIZON", 27: "FAILSAFE", 46: "GPS RESCUE", 13: "BEEPER", 19: "OSD DISABLE"},
+    {
+        0: _ARM, 1: "ANGLE", 2: "HORIZON", 6: "HEADFREE", 7: "HEADADJ", 13: "BEEPER", 19: "OSD DISABLE",
+        20: "TELEMETRY", 26: "BLACKBOX", 27: "FAILSAFE", 28: "AIR MODE", 30: "FPV ANGLE MIX", 31: "BLACKBOX ERASE",
+        35: "FLIP OVER AFTER CRASH", 36: "PREARM", 47: "ACRO TRAINER", 49: "LAUNCH CONTROL",
+        51: "STICK COMMANDS DISABLE",
+    },
     16,
     {
         TelemetryCommand.STATUS: struct.pack("<HHBBIBH", 12, 0, 0, 29, 0, 0, 35),
-        TelemetryCommand.RAW_GPS: struct.pack("<H", 130),
         TelemetryCommand.ANALOG: struct.pack("<H", 1260),
     },
     0,
-)
+    has_gps=False,
+)  # fmt: skip
 BASEFLIGHT = Dialect(
     PortHabits(buffer_size=128, cli_guard_s=0.0, obeys_r=True),
     {
@@ -121,6 +131,8 @@ class TelemetryFirmware:
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """Return the reply's frame: an error for what is not known."""
+        if command in _ABOUT_GPS and not self._dialect.has_gps:
+            return error(command)
         answer = self._dialect.constants.get(command, self._read(command, self.craft_at(now)))
         if answer is None:
             return error(command)

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from bridge.model.mission_log import ArrivedMission, Conclusion
 from protocols.mavlink.codec import Packed
 from protocols.mission_record import ListIdentity
-from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
+from protocols.msp.frame import MspFrame, frame_size
 
 
 class LinkLost(Exception):
@@ -99,7 +99,7 @@ Conversation = Generator[Effect, Any, T]
 
 def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = False) -> Conversation[None]:
     """Send a request whose reply has `reply_payload` payload bytes."""
-    yield Send(frame, command, reply_payload + FRAME_OVERHEAD, exclusive)
+    yield Send(frame, command, frame_size(command, reply_payload), exclusive)
 
 
 def receive(*commands: int) -> Conversation[MspFrame | None]:

@@ -14,7 +14,7 @@ from math import inf
 from bridge.line.conversation import Send
 from bridge.line.msp_link import MspLink
 from protocols.msp.commands import Msp
-from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, request
+from protocols.msp.frame import Direction, MspFrame, frame_size, request
 
 #: What telemetry may take of the line, both directions added.
 _LINE_SHARE = 0.6
@@ -135,7 +135,8 @@ class PollSchedule:
         self._quality = 1.0
         self._lost_before = 0
         self._slots = {
-            poll.command: _Slot(poll, frozenset((poll.command,)), poll.reply_payload + FRAME_OVERHEAD) for poll in polls
+            poll.command: _Slot(poll, frozenset((poll.command,)), frame_size(poll.command, poll.reply_payload))
+            for poll in polls
         }
         self._fit()
 
@@ -183,7 +184,7 @@ class PollSchedule:
         if frame.direction is Direction.ERROR:
             slot.refusals += 1
         else:
-            slot.size, slot.refusals = len(frame.payload) + FRAME_OVERHEAD, 0
+            slot.size, slot.refusals = frame_size(frame.command, len(frame.payload)), 0
         if known != (slot.size, slot.refusals):
             self._fit()
         elif is_bent:

@@ -1,14 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MSP v1 frames: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c)."""
+"""MSP frames in both versions.
 
+v1, which all speak: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c). v2, for INAV's commands
+above 255: `$X` direction flag command size payload crc, command and size 16 bits little-endian, DVB-S2's CRC of 8 bits.
+"""
+
+import struct
 from dataclasses import dataclass
 from enum import Enum
 from functools import reduce
 from operator import xor
 
-_PREAMBLE = b"$M"
-_HEADER_SIZE = 5
-FRAME_OVERHEAD = _HEADER_SIZE + 1
+_START = b"$"
+_V1, _V2 = ord("M"), ord("X")
+_V2_HEADER = struct.Struct("<BHH")
+_V1_OVERHEAD, _V2_OVERHEAD = 6, 9
+#: Bytes of a v1 frame without its payload.
+FRAME_OVERHEAD = _V1_OVERHEAD
+_HIGHEST_V1_COMMAND = 0xFF
+#: A v2 header that announces more than this is noise: no reply that is asked for is half as long.
+_MAX_PAYLOAD = 255
 
 
 class Direction(Enum):
@@ -24,16 +35,20 @@ _DIRECTIONS = {direction.value: direction for direction in Direction}
 
 @dataclass(frozen=True, slots=True)
 class MspFrame:
-    """One frame. `command` 0..255, `payload` at most 255 bytes."""
+    """One frame. `payload` has at most 255 bytes; a `command` above 255 makes it a v2 frame."""
 
     direction: Direction
     command: int
     payload: bytes = b""
 
     def encode(self) -> bytes:
-        """Return the frame's bytes, checksum included."""
+        """The frame's bytes, checksum included."""
+        direction = bytes((self.direction.value,))
+        if self.command > _HIGHEST_V1_COMMAND:
+            body = _V2_HEADER.pack(0, self.command, len(self.payload)) + self.payload
+            return b"$X" + direction + body + bytes((_crc8(body),))
         body = bytes((len(self.payload), self.command)) + self.payload
-        return b"$M" + bytes((self.direction.value,)) + body + bytes((reduce(xor, body),))
+        return b"$M" + direction + body + bytes((reduce(xor, body),))
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
@@ -41,8 +56,13 @@ def request(command: int, payload: bytes = b"") -> bytes:
     return MspFrame(Direction.REQUEST, command, payload).encode()
 
 
+def frame_size(command: int, payload_size: int) -> int:
+    """Bytes of a whole frame."""
+    return payload_size + (_V2_OVERHEAD if command > _HIGHEST_V1_COMMAND else _V1_OVERHEAD)
+
+
 class MspParser:
-    """Finds frames in a byte stream. Never raises: what is not a frame is counted and skipped.
+    """Finds frames in a byte stream. Never raises: bytes that belong to no frame are counted and skipped.
 
     After a bad checksum the search goes on one byte later, so a frame hidden behind a false header is still found.
     A frame that stays incomplete keeps its bytes until more come: call `reset` when the line has been silent.
@@ -60,42 +80,26 @@ class MspParser:
         frames: list[MspFrame] = []
         start = 0
         while True:
-            found = buffer.find(_PREAMBLE, start)
-            if found < 0:
-                # Keep a last '$': its 'M' may be the next byte to come.
-                keep = 1 if buffer.endswith(b"$") else 0
-                self.skipped_bytes += max(len(buffer) - keep - start, 0)
-                start = max(len(buffer) - keep, start)
-                break
+            found = buffer.find(_START, start)
+            found = len(buffer) if found < 0 else found
             self.skipped_bytes += found - start
             start = found
-            if len(buffer) - start < _HEADER_SIZE:
-                if len(buffer) - start >= 3 and buffer[start + 2] not in _DIRECTIONS:
-                    self.skipped_bytes += 1
-                    start += 1
-                    continue
+            end = _frame_end(buffer, start)
+            if end is None or len(buffer) < end:
                 break
-            direction = _DIRECTIONS.get(buffer[start + 2])
-            if direction is None:
+            frame = _decode(buffer[start:end]) if end > start else None
+            if frame is None:
+                self.bad_checksums += end > start
                 self.skipped_bytes += 1
                 start += 1
-                continue
-            end = start + FRAME_OVERHEAD + buffer[start + 3]
-            if len(buffer) < end:
-                break
-            if reduce(xor, buffer[start + 3 : end]):
-                self.bad_checksums += 1
-                self.skipped_bytes += 1
-                start += 1
-                continue
-            payload = bytes(buffer[start + _HEADER_SIZE : end - 1])
-            frames.append(MspFrame(direction, buffer[start + 4], payload))
-            start = end
+            else:
+                frames.append(frame)
+                start = end
         del buffer[:start]
         return frames
 
     def reset(self) -> list[MspFrame]:
-        """Give up on an incomplete frame and return the frames that its bytes were hiding."""
+        """Give up on an incomplete frame; the frames that its bytes were hiding."""
         frames: list[MspFrame] = []
         while self._buffer:
             self.skipped_bytes += 1
@@ -103,3 +107,48 @@ class MspParser:
             self._buffer.clear()
             frames += self.feed(rest)
         return frames
+
+
+def _frame_end(buffer: bytearray, start: int) -> int | None:
+    """Where the frame at `start` ends: None if its header is still incomplete, `start` if it cannot be a frame."""
+    size = len(buffer) - start
+    if size >= 2 and buffer[start + 1] not in (_V1, _V2):
+        return start
+    if size >= 3 and buffer[start + 2] not in _DIRECTIONS:
+        return start
+    if size < _V1_OVERHEAD - 1:
+        return None
+    if buffer[start + 1] == _V1:
+        return start + _V1_OVERHEAD + buffer[start + 3]
+    if size < _V2_OVERHEAD - 1:
+        return None
+    flag, command, payload_size = _V2_HEADER.unpack_from(buffer, start + 3)
+    if flag or command <= _HIGHEST_V1_COMMAND or payload_size > _MAX_PAYLOAD:
+        return start
+    return start + _V2_OVERHEAD + int(payload_size)
+
+
+def _decode(frame: bytearray) -> MspFrame | None:
+    """Decode a whole frame; None if its checksum is wrong."""
+    direction, body = _DIRECTIONS[frame[2]], frame[3:-1]
+    if frame[1] == _V1:
+        return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(body[2:]))
+    if _crc8(body) != frame[-1]:
+        return None
+    return MspFrame(direction, int.from_bytes(body[1:3], "little"), bytes(body[_V2_HEADER.size :]))
+
+
+def _crc8(data: bytes | bytearray) -> int:
+    crc = 0
+    for byte in data:
+        crc = _CRC_TABLE[crc ^ byte]
+    return crc
+
+
+def _crc_of_byte(byte: int) -> int:
+    for _ in range(8):
+        byte = (byte << 1) ^ 0xD5 if byte & 0x80 else byte << 1
+    return byte & 0xFF
+
+
+_CRC_TABLE = bytes(map(_crc_of_byte, range(256)))

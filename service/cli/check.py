@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USUAL_WP_RADIUS_CM
-from bridge.controllers.nav.rules import NAV_CAPACITY
+from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MissionRules, check_list
@@ -50,7 +50,8 @@ class ExitCode(IntEnum):
 @click.option(
     "--capacity",
     type=click.IntRange(2, 65535),
-    help=f"Records that it holds; without: Harakiri {USUAL_CAPACITY}, home included, others {NAV_CAPACITY}.",
+    help=f"Records that it holds; without: Harakiri {USUAL_CAPACITY}, home included, INAV {INAV_CAPACITY}, "
+    f"MultiWii {MULTIWII_CAPACITY}.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each file.")
 @click.pass_context

@@ -11,13 +11,16 @@ from protocols.msp.frame import Direction, MspFrame, MspParser, request
 
 MEGABYTE = 1 << 20
 
-frames = st.builds(MspFrame, st.sampled_from(Direction), st.integers(0, 255), st.binary(max_size=40))
+commands = st.one_of(st.integers(0, 255), st.integers(256, 65535))
+frames = st.builds(MspFrame, st.sampled_from(Direction), commands, st.binary(max_size=40))
 encoded = frames.map(MspFrame.encode)
 pieces = st.one_of(
     encoded,
     encoded.flatmap(lambda frame: st.integers(1, len(frame) - 1).map(lambda size: frame[:size])),
     encoded.flatmap(lambda frame: st.integers(1, len(frame) - 1).map(lambda start: frame[start:])),
-    st.sampled_from([b"$", b"$M", b"$M>", b"$M>\xff", b"$M!\x00", b"$$M", b"$M$", b"$M>\x03d"]),
+    st.sampled_from(
+        [b"$", b"$M", b"$M>", b"$M>\xff", b"$M!\x00", b"$$M", b"$X", b"$X>\x00\x00\x20\xff\x00", b"$M$", b"$M>\x03d"]
+    ),
     st.binary(max_size=30),
 )
 streams = st.lists(pieces, max_size=12).map(b"".join)
@@ -67,6 +70,12 @@ def test_a_frame_survives_the_way_there_and_back(frame: MspFrame) -> None:
     assert MspParser().feed(frame.encode()) == [frame]
 
 
+def test_a_v2_frame_is_the_bytes_of_inav() -> None:
+    """A question for MSP2_INAV_STATUS, and INAV 9.1's answer to one for nav_wp_multi_mission_index."""
+    assert request(0x2000) == bytes.fromhex("24583c000020000032")
+    assert MspParser().feed(bytes.fromhex("24583e000310010001f7")) == [MspFrame(Direction.REPLY, 0x1003, b"\x01")]
+
+
 @given(frames, st.data())
 def test_a_flipped_bit_in_what_the_checksum_covers_is_seen(frame: MspFrame, data: st.DataObject) -> None:
     damaged = bytearray(frame.encode())
@@ -86,11 +95,19 @@ def test_a_reply_behind_a_false_header_comes_with_the_reset_or_the_next_bytes() 
 
 def test_a_megabyte_of_anything_costs_a_bounded_amount_of_work() -> None:
     draw = random.Random(1)
-    for alphabet in (bytes(range(256)), b"$", b"$M", b"$M>", b"$M>\xff", bytes(range(256)) + b"$M>" * 85):
+    for alphabet in (
+        bytes(range(256)),
+        b"$",
+        b"$M",
+        b"$M>",
+        b"$M>\xff",
+        b"$X>\0\x20",
+        bytes(range(256)) + b"$M>$X<" * 85,
+    ):
         data = bytes(draw.choices(alphabet, k=MEGABYTE))
         parser = MspParser()
         for start in range(0, len(data), 4096):
             parser.feed(data[start : start + 4096])
-            assert len(parser._buffer) < 6 + 255
+            assert len(parser._buffer) < 9 + 255
         parser.reset()
         assert parser._buffer == b""

@@ -243,7 +243,7 @@ def test_as_many_records_fit_as_the_flight_controller_says() -> None:
     assert len(kept(*(WP,) * 120)) == 120
     assert len(kept(*(speed(5), WP, speed(6), WP) * 60)) == 120
     assert check_count(242, INAV) is not None
-    assert check_count(122, MULTIWII) is not None
+    assert check_count(180, MULTIWII) is not None
 
 
 def test_home_is_no_record_and_may_be_anywhere() -> None:

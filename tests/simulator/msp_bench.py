@@ -6,7 +6,7 @@ from functools import reduce
 from operator import xor
 from typing import NamedTuple
 
-from protocols.msp.frame import request
+from protocols.msp.frame import Direction, MspParser, request
 from simulator.fc_kinds import make_board
 from simulator.msp_options import MspOptions
 from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint, unpack_waypoint
@@ -65,6 +65,13 @@ class MspBench:
         frame = self.ask(command, payload)
         assert frame is not None
         assert (frame.direction, frame.command) == (">", command)
+        return frame.payload
+
+    def payload_v2(self, command: int, payload: bytes = b"") -> bytes:
+        """The payload of a reply in MSP v2."""
+        self.send(request(command, payload))
+        (frame,) = MspParser().feed(self.run(0.2))
+        assert (frame.direction, frame.command) == (Direction.REPLY, command)
         return frame.payload
 
     def write(self, number: int, waypoint: NavWaypoint) -> None:

@@ -139,6 +139,13 @@ def test_a_return_home_ends_above_it_or_on_it(p1: int, state: int) -> None:
     assert flight.modes() == {"ARM", "ANGLE", "NAV RTH", "NAV ALTHOLD"}
 
 
+@pytest.mark.parametrize(("rth", "last", "state"), [(1, 0, 13), (0, 500, 10)])
+def test_whether_it_lands_after_a_return_is_the_last_waypoints_p1(rth: int, last: int, state: int) -> None:
+    flight = Flight(waypoint(10), waypoint(action=Action.RTH, p1=rth), waypoint(20, p1=last))
+    flight.until(lambda status: status[1] == state)
+    assert flight.numbers() == [1, 2]
+
+
 def test_a_landing_ends_the_mission_on_the_ground() -> None:
     flight = Flight(waypoint(10), waypoint(14, Action.LAND))
     flight.until(is_finished)

@@ -35,6 +35,9 @@ def test_the_example_of_the_specification_is_acknowledged() -> None:
     assert bench.read(1).lat_e7 == 521234567
 
 
+SELECTED = b"nav_wp_multi_mission_index\0"
+
+
 @pytest.mark.parametrize(
     ("number", "wrong"),
     [
@@ -258,6 +261,60 @@ def test_save_and_load_are_errors_while_armed(command: int) -> None:
     bench.faults.armed = True
     bench.run(0.5)
     assert answer(bench, command) == "!"
+
+
+# -- several missions in one store -------------------------------------------------------------------------------
+
+
+def several() -> MspBench:
+    """Missions of one, two and three waypoints, saved and loaded."""
+    bench = MspBench("inav", faults=Faults(boxes=0))
+    ends = (1, 3, 6)
+    for number in range(1, 7):
+        bench.write(number, waypoint(10 * number, flag=FLAG_LAST if number in ends else 0))
+    assert (answer(bench, SAVE), answer(bench, LOAD)) == (">", ">")
+    return bench
+
+
+def test_disarmed_all_missions_are_counted_and_armed_the_one_that_is_selected() -> None:
+    bench = several()
+    assert bench.info() == (120, True, 6)
+    bench.faults.selected_mission = 3
+    bench.faults.armed = True
+    bench.run(0.5)
+    assert bench.info() == (120, True, 3)
+    assert [bench.read(number) for number in (1, 2, 3)] == [
+        waypoint(40),
+        waypoint(50),
+        waypoint(60, flag=FLAG_LAST),
+    ]
+
+
+def test_the_selected_mission_is_told_as_a_setting_and_save_goes_back_to_the_first() -> None:
+    bench = several()
+    bench.faults.selected_mission = 2
+    assert bench.payload_v2(0x1003, SELECTED) == b"\2"
+    bench.faults.selected_mission = 0
+    assert answer(bench, SAVE) == ">"
+    assert bench.payload_v2(0x1003, SELECTED) == b"\1"
+
+
+def test_a_new_list_wipes_the_others_with_the_next_save() -> None:
+    bench = several()
+    bench.upload([waypoint(70)])
+    assert answer(bench, SAVE) == ">"
+    bench.restart()
+    assert answer(bench, LOAD) == ">"
+    assert bench.info() == (120, True, 1)
+
+
+def test_the_sticks_load_what_is_saved() -> None:
+    bench = several()
+    bench.restart()
+    assert bench.info() == (120, False, 0)
+    bench.faults.stick_loads += 1
+    bench.run(0.1)
+    assert bench.info() == (120, True, 6)
 
 
 # -- the port ----------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import struct
 import pytest
 from msp_bench import MspBench, waypoint
 
+from protocols.msp.frame import request
 from simulator.msp_options import MspOptions
 from simulator.options import Faults
 
@@ -56,10 +57,29 @@ def test_the_names_of_the_modes_need_a_jumbo_frame(version: str) -> None:
     assert len(names) == len(bench.payload(119)) + 1
 
 
-@pytest.mark.parametrize("channels", [0, 8, 18, 34])
-def test_channels(channels: int) -> None:
-    bench = MspBench("inav", MspOptions(channels=channels))
+@pytest.mark.parametrize(
+    ("version", "receiver", "channels"), [("7.1.2", True, 18), ("8.0.1", True, 34), ("9.1.0", False, 0)]
+)
+def test_channels(version: str, receiver: bool, channels: int) -> None:
+    bench = MspBench("inav", MspOptions(version=version, receiver=receiver))
     assert len(bench.payload(105)) == 2 * channels
+
+
+def test_msp_v2_beside_v1() -> None:
+    """Lengths as INAV 9.1.0's own simulator has them."""
+    bench = MspBench("inav", MspOptions(platform=1), Faults(arming_blockers=1 << 18))
+    lengths = {command: len(bench.payload_v2(command)) for command in (0x2000, 0x2002, 0x2009, 0x2010)}
+    assert lengths == {0x2000: 22, 0x2002: 24, 0x2009: 4, 0x2010: 9}
+    assert struct.unpack_from("<I", bench.payload_v2(0x2000), 9)[0] == 1 << 18
+    assert bench.payload_v2(0x2010)[3] == 1
+    assert bench.payload(2) == b"INAV"
+
+
+def test_a_cut_v2_frame_swallows_the_next_request() -> None:
+    bench = MspBench("inav")
+    bench.send(request(0x2000)[:8])
+    assert bench.ask(2) is None
+    assert bench.payload(2) == b"INAV"
 
 
 @pytest.mark.parametrize("armed", [False, True])

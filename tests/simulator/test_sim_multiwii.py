@@ -127,3 +127,54 @@ def test_a_jump_goes_back_or_ends_the_mission(target: int, error: int) -> None:
     bench.faults.armed, bench.faults.boxes = True, MISSION
     bench.run(120)
     assert status(bench)[4] == error
+
+
+def flown_numbers(bench: MspBench, seconds: float) -> list[int]:
+    """The waypoints in the order in which they were active."""
+    bench.faults.armed, bench.faults.boxes = True, MISSION
+    numbers: list[int] = []
+    end = bench.now + seconds
+    while bench.now < end:
+        bench.run(0.25)
+        number = status(bench)[3]
+        if numbers[-1:] != [number]:
+            numbers.append(number)
+    return numbers
+
+
+@pytest.mark.parametrize(("hold", "seconds"), [(65, 65), (66, 0.5), (70, 4.5)])
+def test_a_hold_is_counted_in_16_bits(hold: int, seconds: float) -> None:
+    bench = MspBench("multiwii", faults=Faults(boxes=0))
+    bench.upload([waypoint(0, Action.POSHOLD_TIME, p1=hold), waypoint(5)])
+    bench.faults.armed, bench.faults.boxes = True, MISSION
+    while status(bench)[1] != 4:
+        bench.run(0.05)
+    began = bench.now
+    while status(bench)[3] != 2:
+        bench.run(0.05)
+    assert bench.now - began == pytest.approx(seconds, abs=0.5)
+
+
+@pytest.mark.parametrize("action", [Action.SET_POI, Action.SET_HEAD])
+def test_the_end_is_overlooked_on_what_is_no_place(action: int) -> None:
+    bench = MspBench("multiwii", faults=Faults(boxes=0))
+    bench.upload([waypoint(number) for number in range(1, 6)])
+    bench.upload([waypoint(1), waypoint(2), waypoint(3, action)])
+    assert flown_numbers(bench, 60)[-1] == 5
+
+
+def test_a_jump_within_a_jump_never_ends() -> None:
+    jumps = [waypoint(action=Action.JUMP, p1=1, p2=1)] * 2
+    bench = MspBench("multiwii", faults=Faults(boxes=0))
+    bench.upload([waypoint(1), waypoint(2), *jumps, waypoint(3)])
+    assert 5 not in flown_numbers(bench, 300)
+
+
+@pytest.mark.parametrize(("alt_cm", "height_m"), [(0, 20), (5000, 50)])
+def test_the_way_home_has_a_least_height(alt_cm: int, height_m: int) -> None:
+    bench = MspBench("multiwii", faults=Faults(boxes=0))
+    bench.upload([waypoint(5, alt_cm=1000), waypoint(action=Action.RTH, alt_cm=alt_cm)])
+    flown_numbers(bench, 120)
+    truth = bench.board.truth(bench.now)
+    assert truth is not None
+    assert truth.flight.height_m == pytest.approx(height_m, abs=0.5)

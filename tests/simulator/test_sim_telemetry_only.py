@@ -9,7 +9,7 @@ from msp_bench import MspBench, waypoint
 from simulator.options import Faults
 
 LENGTHS = {
-    "betaflight": {1: 3, 2: 4, 3: 3, 101: 24, 102: 18, 105: 32, 106: 18, 107: 5, 108: 6, 109: 6, 110: 9},
+    "betaflight": {1: 3, 2: 4, 3: 3, 101: 24, 102: 18, 105: 32, 108: 6, 109: 6, 110: 9, 116: 200, 119: 18},
     "baseflight": {100: 7, 101: 11, 102: 18, 105: 16, 106: 16, 107: 5, 108: 6, 109: 6, 110: 7},
 }
 KINDS = tuple(LENGTHS)
@@ -19,6 +19,13 @@ KINDS = tuple(LENGTHS)
 def test_lengths(kind: str) -> None:
     bench = MspBench(kind)
     assert {command: len(bench.payload(command)) for command in LENGTHS[kind]} == LENGTHS[kind]
+
+
+@pytest.mark.parametrize("command", [106, 107])
+def test_a_betaflight_without_gps_has_no_messages_about_one(command: int) -> None:
+    frame = MspBench("betaflight").ask(command)
+    assert frame is not None
+    assert frame.direction == "!"
 
 
 @pytest.mark.parametrize("kind", KINDS)

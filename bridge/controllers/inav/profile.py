@@ -4,7 +4,7 @@
 from bridge.controllers.inav.mission_store import InavMissions
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NavCraft
-from bridge.controllers.nav.rules import NAV_CAPACITY, inav_profile
+from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
 from bridge.fc.interview import Interview
 from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
 from bridge.line.conversation import Conversation
@@ -30,7 +30,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
 
 
 def _rules(settings: RuleSettings) -> NavRules:
-    return NavRules(inav_profile(settings.capacity or NAV_CAPACITY))
+    return NavRules(inav_profile(settings.capacity or INAV_CAPACITY))
 
 
 def _open_store(controller: FlightController, view: VehicleView, _settings: RuleSettings) -> AnyFcMissionStore:

@@ -4,7 +4,7 @@
 from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NavCraft
-from bridge.controllers.nav.rules import NAV_CAPACITY, multiwii_profile
+from bridge.controllers.nav.rules import MULTIWII_CAPACITY, multiwii_profile
 from bridge.fc.interview import Interview
 from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
 from bridge.line.conversation import Conversation
@@ -29,7 +29,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
 
 
 def _rules(settings: RuleSettings) -> NavRules:
-    return NavRules(multiwii_profile(settings.capacity or NAV_CAPACITY))
+    return NavRules(multiwii_profile(settings.capacity or MULTIWII_CAPACITY))
 
 
 def _open_store(controller: FlightController, view: VehicleView, _settings: RuleSettings) -> AnyFcMissionStore:

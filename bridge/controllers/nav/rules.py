@@ -11,8 +11,9 @@ from protocols.msp.nav import NavAction
 
 #: POSHOLD_TIME with this time stands for a hold without end, which INAV does not know: nine hours.
 ENDLESS_S = 32767
-#: INAV's; MultiWii's hangs on its EEPROM.
-NAV_CAPACITY = 120
+#: Records that fit: on every INAV, and on the navigation build of MultiWii, whose board reports it.
+INAV_CAPACITY = 120
+MULTIWII_CAPACITY = 178
 #: Speeds below this are none to INAV, cm/s.
 LEAST_SPEED_CMS = 50
 ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
@@ -42,7 +43,7 @@ class NavProfile:
         return (2 if self.leg_speed else 1) * self.capacity + 1
 
 
-def inav_profile(capacity: int = NAV_CAPACITY) -> NavProfile:
+def inav_profile(capacity: int = INAV_CAPACITY) -> NavProfile:
     """INAV. It stores no POSHOLD_UNLIM."""
     return NavProfile(
         "INAV",
@@ -55,7 +56,7 @@ def inav_profile(capacity: int = NAV_CAPACITY) -> NavProfile:
     )
 
 
-def multiwii_profile(capacity: int = NAV_CAPACITY) -> NavProfile:
+def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
     """MultiWii 2.4 NAV."""
     return NavProfile(
         "MultiWii",
