@@ -18,9 +18,12 @@ from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from service.links.connection import FcAddress, GcsAddress, SerialFc
-from service.links.fc_port import STOPPED
+from service.host import Host
+from service.links.connection import AutoFc, FcAddress, GcsAddress, SerialFc
+from service.links.fc_device import device_opener
+from service.links.fc_port import MOVED_ON, STOPPED
 from service.links.gcs_links import GcsLink, LinkError, open_link
+from service.links.port_finder import PortFinder
 from service.links.signing_state import SigningState
 from service.mission_data import Json
 from service.recording.recorder import Recording
@@ -69,7 +72,7 @@ class Follower(Protocol):
 class Daemon:
     """Feeds the bridge and carries out what it wants. Must be made on a running event loop."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, host: Host | None = None) -> None:
         self._loop = asyncio.get_running_loop()
         self._loop.set_exception_handler(self._fault)
         self.settings = settings
@@ -90,12 +93,17 @@ class Daemon:
         self.store = StoreWorker(settings.state_dir)
         #: Set when ground stations can connect.
         self.started = asyncio.Event()
-        self._port = self._recording.port(settings.fc, self._fc_opened, self._fc_data, self._fc_closed)
+        self._finder = PortFinder(host or Host(), settings.state_dir) if isinstance(settings.fc, AutoFc) else None
+        open_device = device_opener(settings.fc) if self._finder is None else self._finder.open
+        self._port = self._recording.port(open_device, self._fc_opened, self._fc_data, self._fc_closed)
         self._links: dict[str, GcsLink] = {}
         #: By link; the flight controller's port has the name "fc".
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
         self._fc_traffic = self.traffic["fc"]
         self._followers: list[Follower] = []
+        if self._finder is not None:
+            self._finder.move_on = self._port.move_on
+            self._followers.append(self._finder)
         self._timer: asyncio.TimerHandle | None = None
         self._search_report: asyncio.TimerHandle | None = None
 
@@ -103,6 +111,11 @@ class Daemon:
     def fc_trouble(self) -> str:
         """Why the flight controller's port cannot be opened; empty if it could be."""
         return self._port.trouble
+
+    @property
+    def fc_where(self) -> str:
+        """The flight controller's port or address; while no port is open, what is searched."""
+        return str(self.settings.fc) if self._finder is None else self._finder.where
 
     @property
     def recording(self) -> list[str]:
@@ -140,6 +153,8 @@ class Daemon:
             for timer in (self._timer, self._search_report):
                 if timer is not None:
                     timer.cancel()
+            if self._finder is not None:
+                self._finder.close()
             for link in self._links.values():
                 link.close()
             self.store.close()
@@ -262,6 +277,8 @@ class Daemon:
         self._fc_traffic.pieces_received += 1
         self._fc_traffic.bytes_received += len(data)
         bridge = self.bridge
+        if self._finder is not None:
+            self._finder.received(data)
         bridge.fc_received(data, self._loop.time())
         if bridge.is_passing_through:
             # Then it makes datagrams and nothing else: no more is looked at, thousands of times a second.
@@ -272,7 +289,7 @@ class Daemon:
             self.flush()
 
     def _fc_closed(self, why: str) -> None:
-        self.bridge.fc_closed(self._loop.time(), None if why == STOPPED else why)
+        self.bridge.fc_closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
         self.flush()
 
     def _tell_followers(self) -> None:
@@ -293,7 +310,7 @@ class Daemon:
         if self._search_report is not None:
             self._search_report.cancel()
         if self.bridge.session.is_searching:
-            _log.info("fc.searching", fc=str(self.settings.fc))
+            _log.info("fc.searching", fc=self.fc_where)
         self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)
 
     def _fault(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -321,6 +338,8 @@ class Daemon:
 
 
 def _speeds(address: FcAddress) -> Sequence[int | None]:
+    if isinstance(address, AutoFc):
+        return SPEEDS
     if not isinstance(address, SerialFc):
         return (None,)
     return SPEEDS if address.baud is None else (address.baud,)

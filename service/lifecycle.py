@@ -94,7 +94,7 @@ def link_line(daemon: Daemon) -> str:
     if daemon.fc_trouble:
         where = daemon.fc_trouble
     elif session.controller is None:
-        where = f"looking for a flight controller on {daemon.settings.fc}"
+        where = f"looking for a flight controller on {daemon.fc_where}"
     else:
         speed = "" if session.speed is None else f", {session.speed} baud"
         armed = {None: "", True: ", armed", False: ", disarmed"}[session.vehicle.armed]

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from service.api import ControlError, MissionJobs, ask_daemon
 from service.cli.printing import fail
 from service.daemon import Daemon
-from service.links.connection import AddressError, FcAddress, parse_fc
+from service.links.connection import AddressError, AutoFc, FcAddress, parse_fc
 from service.log_setup import set_up_logging
 from service.mission_data import Json
 from service.settings import Settings, SettingsError
@@ -22,6 +22,8 @@ from storage.store_error import StoreError
 
 #: An unknown speed is found within 8 s.
 _SEARCH_PATIENCE_S = 12.0
+#: With `auto`: the header and two on USB.
+_PORTS_SEARCHED = 3
 #: A round of telemetry takes a second; at 9600 baud two.
 _TELEMETRY_PATIENCE_S = 3.0
 _INTERVAL_S = 0.05
@@ -79,11 +81,13 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
     jobs = MissionJobs(daemon)
     running = asyncio.create_task(daemon.run())
     try:
-        await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.controller), _SEARCH_PATIENCE_S)
+        patience_s = _SEARCH_PATIENCE_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
+        await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.controller), patience_s)
         if daemon.fc_trouble:
             raise ControlError(daemon.fc_trouble)
         if daemon.bridge.session.controller is None:
-            raise ControlError(f"no flight controller answers on {fc}: check its power, the wiring and the speed")
+            where = daemon.fc_where
+            raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # Who it is comes before what it tells of itself, and some controllers never tell all of it.
         if request == STATUS:
             await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)

@@ -14,7 +14,7 @@ from service.cli.daemon_client import STATUS, ask_directly
 from service.cli.printing import print_json
 from service.doctor.checked import Checked, Grade
 from service.doctor.examination import examine
-from service.doctor.host import Host
+from service.host import Host
 from service.mission_data import Json
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE

@@ -2,26 +2,32 @@
 """The list of checks, in the order in which a pilot mends things."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from service.doctor.checked import Checked, Grade
 from service.doctor.flight_controller import check_flight_controller
-from service.doctor.host import Host
 from service.doctor.machine import check_clock, check_database, check_disk, check_versions
 from service.doctor.network import check_ports, check_wifi
 from service.doctor.port import (
+    check_candidates,
     check_console,
     check_holder,
     check_modem_manager,
+    check_no_port,
     check_permission,
     check_port,
     holder_of_port,
 )
 from service.doctor.zenoh import check_zenoh
+from service.host import Host
+from service.links.connection import AutoFc, FcAddress
 from service.mission_data import Json
 from service.settings import Settings
+
+_ON_PORT = (check_port, check_permission, check_console, check_holder)
 
 
 def examine(
@@ -29,11 +35,16 @@ def examine(
 ) -> Iterator[Checked]:
     """Yield what each check finds. The port is listened to only if nothing stands in the way of that."""
     fc = settings.fc
-    on_port = [check(host, fc) for check in (check_port, check_permission, check_console, check_holder)]
-    told = [*(found for found in on_port if found is not None), check_modem_manager(host, fc)]
+    ports: Sequence[FcAddress] = check_candidates(host) if isinstance(fc, AutoFc) else [fc]
+    told = [found for port in ports for check in _ON_PORT if (found := check(host, port)) is not None]
+    if len(ports) > 1:
+        # A flight controller on one of them is enough.
+        told = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in told]
+    told.append(check_modem_manager(host, ports[0]) if ports else check_no_port(host))
     yield check_versions(host)
     yield from told
-    is_free = not any(found.grade is Grade.PROBLEM for found in told) and holder_of_port(host, fc) is None
+    is_free = not any(found.grade is Grade.PROBLEM for found in told)
+    is_free = is_free and all(holder_of_port(host, port) is None for port in ports)
     yield from check_flight_controller(fc, ask_running, ask_port if is_free else None)
     yield from check_wifi(host, settings.gcs)
     yield from check_ports(host, settings.gcs)

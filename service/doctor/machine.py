@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 
 from service.doctor.checked import Checked, note, ok, problem
-from service.doctor.host import Host
+from service.host import Host
 from service.store_worker import DATABASE_NAME
 from service.version import version
 

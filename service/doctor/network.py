@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 
 from service.doctor.checked import Checked, note, ok, problem
-from service.doctor.host import Host
+from service.host import Host
 from service.links.connection import GcsAddress
 
 #: Of /proc/net/tcp, where only a listening socket has a port to itself.

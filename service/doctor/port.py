@@ -7,8 +7,10 @@ import stat
 from pathlib import Path
 
 from service.doctor.checked import Checked, note, ok, problem
-from service.doctor.host import Host, Process
+from service.host import Host, Process
 from service.links.connection import FcAddress, SerialFc
+from service.links.serial_ports import serial_ports
+from service.raspberry_pi import pi_model
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"
@@ -23,16 +25,33 @@ def check_port(host: Host, fc: FcAddress) -> Checked:
     if not isinstance(fc, SerialFc):
         return ok("port", f"{fc}, no serial port")
     device = host.resolve(fc.path)
+    model = pi_model(host)
+    if model is not None and fc.path == "/dev/serial0" and str(device) == "/dev/ttyAMA10":
+        found = f"/dev/serial0 is the debug socket on a {model.name}: the header's pins are {model.header_uart}"
+        return problem("port", found, f'set fc = "{model.header_uart}", or leave fc out')
     if host.path(device).exists():
         return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
     there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
     if fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
-        remedy = "switch the UART on and reboot: sudo raspi-config nonint do_serial_hw 0"
+        remedy = "switch the UART on the header on: sudo naze-bridge setup"
     else:
         remedy = "plug the flight controller in"
     if there:
         remedy += f"; or set fc to a port that is there: {', '.join(there)}"
     return problem("port", f"{fc.path} is missing", remedy)
+
+
+def check_candidates(host: Host) -> list[SerialFc]:
+    """The ports on which `fc = "auto"` looks; on a Pi without a USB port the UART on the header even if it is off."""
+    ports = [SerialFc(port.path, None) for port in serial_ports(host)]
+    model = pi_model(host)
+    return ports or ([SerialFc(model.header_uart, None)] if model else [])
+
+
+def check_no_port(host: Host) -> Checked:
+    """Say that there is none at all."""
+    remedy = "plug the flight controller into USB, or name its port: fc in the settings"
+    return problem("port", "there is no serial port on which a flight controller may be", remedy)
 
 
 def check_permission(host: Host, fc: FcAddress) -> Checked | None:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Connection strings, as pymavlink and MAVProxy users know them."""
+"""Connection strings, as users of pymavlink, MAVProxy, MAVSDK and mavp2p know them."""
 
+import re
 import socket
 from dataclasses import dataclass
 
@@ -23,6 +24,14 @@ class SerialFc:
 
 
 @dataclass(frozen=True, slots=True)
+class AutoFc:
+    """A flight controller on whichever serial port it is found."""
+
+    def __str__(self) -> str:
+        return "auto"
+
+
+@dataclass(frozen=True, slots=True)
 class TcpFc:
     """A flight controller behind TCP: a simulator, or a Wi-Fi serial adapter."""
 
@@ -41,7 +50,7 @@ class SimulatedFc:
         return "sim:"
 
 
-FcAddress = SerialFc | TcpFc | SimulatedFc
+FcAddress = AutoFc | SerialFc | TcpFc | SimulatedFc
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,36 +67,80 @@ class GcsAddress:
 
 
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
-_FC_FORMS = "write /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:"
+#: Other programs' words for the same: mavp2p's, and pymavlink's for broadcast.
+_GCS_ALIASES = {
+    "udps": "udpin",
+    "udpc": "udpout",
+    "udpcl": "udpout",
+    "udpb": "udpbcast",
+    "udpbroadcast": "udpbcast",
+    "tcps": "tcpin",
+}
+_EVERY_ADDRESS = ("", "0.0.0.0", "[::]")  # noqa: S104  # ground stations may come over any network
+_FC_FORMS = "write auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:"
 _GCS_FORMS = "write udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT or tcpin:HOST:PORT"
-_PORT_NAMES = ("tty", "serial", "rfcomm")
+_PORT_NAMES = ("tty", "serial", "rfcomm", "naze")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
+_NEXT_LINK = re.compile(r",\s*(?=[A-Za-z]+:)")
 
 
 def parse_fc(text: str) -> FcAddress:
     """Read the --fc string; AddressError if it makes no sense."""
-    if text == "sim:":
-        return SimulatedFc()
-    if text.startswith("tcp:"):
-        host, port = parse_host_port(text, text.removeprefix("tcp:"), _FC_FORMS)
-        return TcpFc(host, port)
-    path, comma, baud = text.partition(",")
+    kind, colon, rest = text.strip().partition(":")
+    match kind.lower():
+        case "auto" if not rest:
+            return AutoFc()
+        case "sim" if not rest:
+            return SimulatedFc()
+        case "tcp" if colon:
+            return TcpFc(*parse_host_port(text, rest.removeprefix("//"), _FC_FORMS))
+        case "serial" if colon:
+            return _parse_serial(text, rest.removeprefix("//") if rest.startswith("///") else rest)
+    return _parse_serial(text, text.strip())
+
+
+def _parse_serial(text: str, port: str) -> SerialFc:
+    """Read "PATH", "PATH,BAUD" or "PATH:BAUD"; paths of /dev/serial/by-path have colons of their own."""
+    path, separator, baud = port.partition(",")
+    if not separator:
+        before, separator, after = port.rpartition(":")
+        if separator and "/by-" not in before:
+            path, baud = before, after
+        else:
+            separator = ""
     if not path.startswith("/"):
-        hint = f"did you mean /dev/{text}? Else " if path.startswith(_PORT_NAMES) else ""
+        hint = f"did you mean /dev/{port}? Else " if path.startswith(_PORT_NAMES) else ""
         raise AddressError(f"{text!r} is no flight controller connection: {hint}{_FC_FORMS}")
-    if not comma:
+    if not separator:
         return SerialFc(path, None)
     if not baud.isdecimal() or not _MIN_BAUD <= int(baud) <= _MAX_BAUD:
-        raise AddressError(f"{text!r}: {baud!r} is no speed in baud; leave it out to have it sensed")
+        raise AddressError(f"{text!r}: {baud!r} is not a baud rate; omit it to auto-detect")
     return SerialFc(path, int(baud))
 
 
+def split_gcs(text: str) -> list[str]:
+    """Split "udpin:14550,tcpin:5760" into its links."""
+    return _NEXT_LINK.split(text)
+
+
 def parse_gcs(text: str) -> GcsAddress:
-    """Read one --gcs string; AddressError if it makes no sense."""
-    kind, _, rest = text.partition(":")
-    if kind not in _GCS_KINDS:
+    """Read one --gcs string; AddressError if it makes no sense, or could mean two things."""
+    word, colon, rest = text.strip().partition(":")
+    kind = _GCS_ALIASES.get(word.lower(), word.lower())
+    rest = rest.removeprefix("//")
+    host, _, port = rest.replace(",", ":").rpartition(":")
+    if colon and kind in ("udp", "tcp"):
+        # pymavlink listens at udp:, MAVSDK listens or sends, and everybody's tcp: connects, as we do not.
+        if host not in _EVERY_ADDRESS:
+            port = port if port.isdecimal() else "14550"
+            sending = f"udpout:{host}:{port} to send there, " if kind == "udp" else ""
+            raise AddressError(f"{text!r}: write {sending}{kind}in:0.0.0.0:{port} to listen for ground stations")
+        kind += "in"
+    if not colon or kind not in _GCS_KINDS:
         raise AddressError(f"{text!r} is no ground station connection: {_GCS_FORMS}")
-    return GcsAddress(kind, *parse_host_port(text, rest, _GCS_FORMS))
+    if kind in ("udpin", "tcpin") and not host and port.isdecimal():
+        host = "0.0.0.0"  # noqa: S104  # as above
+    return GcsAddress(kind, *parse_host_port(text, f"{host}:{port}" if host else rest, _GCS_FORMS))
 
 
 def family_of(host: str) -> socket.AddressFamily:

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import serial
 
-from service.links.connection import UNKNOWN_HOST_HINT, FcAddress, SerialFc, TcpFc, family_of
+from service.links.connection import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 from service.links.port_holder import explain_port_error, find_console
 
 _TCP_PATIENCE_S = 3.0
@@ -32,9 +32,15 @@ class PortError(Exception):
 
 
 def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
-    """Return what opens the device, and opens it again after it was lost."""
+    """Return what opens the device, and opens it again after it was lost. For AutoFc see PortFinder."""
+    assert not isinstance(address, AutoFc)
     if isinstance(address, SerialFc):
-        return lambda: _open_serial(address.path)
+        path = address.path
+
+        async def open_path() -> serial.Serial:
+            return open_serial(path)
+
+        return open_path
     if isinstance(address, TcpFc):
         return lambda: _open_tcp(address.host, address.port)
     # Only here, because a daemon on a real flight controller need not carry a simulated one in its memory.
@@ -55,8 +61,8 @@ def acknowledge(device: Device) -> None:
             device.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
 
 
-async def _open_serial(path: str) -> serial.Serial:
-    """Open a serial port for us alone."""
+def open_serial(path: str) -> serial.Serial:
+    """Open a serial port for us alone; PortError if that is impossible."""
     console = find_console(path)
     if console is not None:
         raise PortError(

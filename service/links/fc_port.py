@@ -4,16 +4,16 @@
 import asyncio
 import os
 import termios
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 import serial
 import structlog
 
-from service.links.connection import FcAddress
-from service.links.fc_device import Device, PortError, acknowledge, device_opener
+from service.links.fc_device import Device, PortError, acknowledge
 
 #: What `on_close` is told when the port is closed because it is needed no more.
 STOPPED = "the daemon stops"
+MOVED_ON = "the flight controller is looked for on another port"
 
 _READ_SIZE = 4096
 _RETRY_S = 0.25
@@ -28,19 +28,21 @@ _log = structlog.get_logger()
 
 
 class FcPort:
-    """Keeps the port open. `on_open`, `on_data` and `on_close` are called from the event loop.
+    """Keeps the port open. `open_device` raises PortError if that is impossible now.
+
+    `on_open`, `on_data` and `on_close` are called from the event loop.
 
     The first failure to open is a warning, the same one again is not told twice.
     """
 
     def __init__(
         self,
-        address: FcAddress,
+        open_device: Callable[[], Awaitable[Device]],
         on_open: Callable[[], None],
         on_data: Callable[[bytes], None],
         on_close: Callable[[str], None],
     ) -> None:
-        self._open = device_opener(address)
+        self._open = open_device
         self._on_open = on_open
         self._on_data = on_data
         self._on_close = on_close
@@ -76,6 +78,10 @@ class FcPort:
                 await self._closed.wait()
         finally:
             self._shut(STOPPED)
+
+    def move_on(self) -> None:
+        """Close the port. It is opened again at once, and `open_device` may take another one."""
+        self._shut(MOVED_ON)
 
     def set_speed(self, baud: int | None) -> None:
         """Run the port at another speed, baud. What still waits is dropped: at this one it would be other bytes."""

@@ -3,8 +3,11 @@
 
 import errno
 import os
+import re
 import termios
 from pathlib import Path
+
+from service.host import Host
 
 _LOGIN_PROGRAMS = ("agetty", "getty", "login")
 
@@ -64,6 +67,22 @@ def find_holder(path: str) -> str | None:
                     return f"{(process / 'comm').read_text().strip()} (pid {process.name})"
         except OSError:
             continue
+    return None
+
+
+def find_user(host: Host, path: str) -> str | None:
+    """Name another program that has the port open, or was started with its name; None if there seems to be none.
+
+    A service may not see what root's programs have open, but their command lines: `gpsd /dev/ttyUSB0`.
+    """
+    links = [name for name in host.names("/dev") if str(host.resolve(f"/dev/{name}")) == path]
+    names = "|".join(re.escape(name) for name in {Path(path).name, *links})
+    named = re.compile(rf"(?:^|[=,:])(?:/dev/)?(?:{names})(?:$|[,:])")
+    for process in host.processes():
+        if process.pid in (os.getpid(), os.getppid()) or not process.name:
+            continue
+        if any(named.search(argument) for argument in process.arguments[1:]) or host.has_open(process, path):
+            return f"{process.name} (pid {process.pid})"
     return None
 
 

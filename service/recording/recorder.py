@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a daemon records of itself: telemetry logs always, the UART if it is asked to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 from bridge.gcs.ground import Tap
-from service.links.connection import FcAddress
+from service.links.fc_device import Device
 from service.links.fc_port import FcPort
 from service.recording.tlog_recorder import TlogRecorder
 from service.recording.uart_recorder import RecordedPort, UartRecorder
@@ -26,15 +26,15 @@ class Recording:
 
     def port(
         self,
-        address: FcAddress,
+        open_device: Callable[[], Awaitable[Device]],
         on_open: Callable[[], None],
         on_data: Callable[[bytes], None],
         on_close: Callable[[str], None],
     ) -> FcPort:
         """Return the flight controller's port, recorded if that is wanted."""
         if self._uart is None:
-            return FcPort(address, on_open, on_data, on_close)
-        return RecordedPort(address, on_open, on_data, on_close, self._uart)
+            return FcPort(open_device, on_open, on_data, on_close)
+        return RecordedPort(open_device, on_open, on_data, on_close, self._uart)
 
     def describe(self) -> list[str]:
         """Tell what is recorded, and where; or why not any more."""

@@ -3,14 +3,14 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
 import structlog
 
 from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, is_capture
-from service.links.connection import FcAddress
+from service.links.fc_device import Device
 from service.links.fc_port import FcPort
 from service.recording.disk_writer import DiskWriter
 
@@ -83,7 +83,7 @@ class RecordedPort(FcPort):
 
     def __init__(
         self,
-        address: FcAddress,
+        open_device: Callable[[], Awaitable[Device]],
         on_open: Callable[[], None],
         on_data: Callable[[bytes], None],
         on_close: Callable[[str], None],
@@ -101,7 +101,7 @@ class RecordedPort(FcPort):
             recorder.note(UartDeed.CLOSE, self._recorded_speed, text=why)
             on_close(why)
 
-        super().__init__(address, opened, received, closed)
+        super().__init__(open_device, opened, received, closed)
         self._recorder = recorder
         self._recorded_speed: int | None = None
 

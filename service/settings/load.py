@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from service.links.connection import FcAddress, GcsAddress, SerialFc, parse_gcs
+from service.links.connection import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.links.write_access import WriteAccess
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import Unfit
@@ -55,11 +55,6 @@ def load_settings(
     }
     given |= {name: Given(value, f"--{name.replace('_', '-')}") for name, value in flags.items() if value is not None}
     values = _read_values(given, problems)
-    if "fc" not in given:
-        where = "" if config is None else str(config)
-        problems.append(
-            Problem(where, "name the flight controller: --fc /dev/serial0, or --fc sim: to try it without one")
-        )
     links: Sequence[tuple[GcsAddress, WriteAccess]] = values.get("gcs", ())
     addresses = _named_links(gcs, problems) or [address for address, _ in links] or [parse_gcs(DEFAULT_GCS)]
     tlog = _tlog_limits(values, given, problems)
@@ -75,9 +70,7 @@ def load_settings(
         problems += _zenoh_problems(zenoh, given)
     if problems:
         raise SettingsError(problems)
-    chosen: FcAddress = values["fc"]
     return Settings(
-        fc=chosen,
         gcs=addresses,
         # A link that is named by a flag, too, stays as safe as the file says.
         access={str(address): access for address, access in links if not access.is_open},
@@ -89,7 +82,7 @@ def load_settings(
     )
 
 
-_AS_THEY_ARE = ("sysid", "takeoff_max_m", "autopilot", "record_uart", "log_level")
+_AS_THEY_ARE = ("fc", "sysid", "takeoff_max_m", "autopilot", "record_uart", "log_level")
 
 
 def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -> dict[str, Given]:
@@ -124,7 +117,7 @@ def _read_values(given: Mapping[str, Given], problems: list[Problem]) -> dict[st
 
 def _named_links(gcs: Sequence[str], problems: list[Problem]) -> list[GcsAddress]:
     links: list[GcsAddress] = []
-    for text in gcs:
+    for text in (link for named in gcs for link in split_gcs(named)):
         try:
             links.append(parse_gcs(text))
         except ValueError as error:

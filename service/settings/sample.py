@@ -21,7 +21,7 @@ _WIDTH = 100
 
 
 def sample() -> str:
-    """Return the file. Only `fc` is set."""
+    """Return the file; nothing in it is set."""
     lines = [_comment(line) for line in _HEAD]
     table = ""
     for key in KEYS:
@@ -31,7 +31,7 @@ def sample() -> str:
             lines += ["", _comment(TABLES[table]), f"#[{table}]"]
         note = " (live)" if key.is_live else ""
         value = key.default or key.example
-        lines += ["", _comment(key.meaning + note), f"{'' if key.name == 'fc' else '#'}{name} = {value}"]
+        lines += ["", _comment(key.meaning + note), f"#{name} = {value}"]
     return "\n".join(lines) + "\n"
 
 

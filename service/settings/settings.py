@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.fc.states import Autopilot
-from service.links.connection import FcAddress, GcsAddress
+from service.links.connection import AutoFc, FcAddress, GcsAddress
 from service.links.write_access import WriteAccess
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings
@@ -34,7 +34,7 @@ class Settings:
     joined. `web` None: no status page is served. `log_level`: debug, info, warning or error.
     """
 
-    fc: FcAddress
+    fc: FcAddress = AutoFc()  # noqa: RUF009  # frozen
     gcs: Sequence[GcsAddress] = ()
     state_dir: Path | None = None
     sysid: int = DEFAULT_SYSID

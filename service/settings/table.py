@@ -39,9 +39,9 @@ KEYS = (
     Key(
         "fc",
         Text(parse=parse_fc),
-        "The flight controller: /dev/serial0 (its speed is sensed), /dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim: "
-        "for a simulated one.",
-        example='"/dev/serial0"',
+        "The flight controller: auto looks for it on the header's UART and on USB; /dev/ttyAMA0 (its speed is sensed), "
+        "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim: for a simulated one.",
+        default='"auto"',
     ),
     Key(
         "gcs",

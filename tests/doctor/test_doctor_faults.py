@@ -18,7 +18,7 @@ from service.doctor.machine import check_clock, check_database, check_disk
 from service.doctor.network import check_ports, check_wifi
 from service.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
 from service.doctor.zenoh import check_zenoh
-from service.links.connection import SerialFc, parse_gcs
+from service.links.connection import AutoFc, SerialFc, parse_gcs
 from service.settings import Settings
 from service.zenoh_link.settings import ZenohSettings
 from storage.mission_store import open_store
@@ -83,12 +83,33 @@ def test_a_healthy_pi(pi: FaultyMachine, tmp_path: Path) -> None:
 
 def test_a_port_that_is_missing(pi: FaultyMachine) -> None:
     pi.path("/dev/serial0").unlink()
-    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "do_serial_hw 0")
+    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup")
     pi.write("/dev/ttyUSB0")
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "set fc to a port that is there: /dev/ttyUSB0")
     assert_problem(check_port(pi, SerialFc("/dev/naze", None)), "/dev/naze is missing", "plug the flight controller in")
     # There is nothing to say of what is not there.
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
+
+
+def test_serial0_is_the_wrong_port_on_a_pi_5(pi: FaultyMachine) -> None:
+    pi.write("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0\0")
+    pi.write("/dev/ttyAMA10")
+    pi.path("/dev/serial0").unlink()
+    pi.path("/dev/serial0").symlink_to("ttyAMA10")
+    assert_problem(check_port(pi, PORT), "debug socket on a Raspberry Pi 5", 'fc = "/dev/ttyAMA0"')
+
+
+def test_every_port_is_looked_at_if_none_is_named(pi: FaultyMachine, tmp_path: Path) -> None:
+    def checked() -> dict[str, Checked]:
+        return {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), nobody, lambda: STATUS)}
+
+    assert_ok(checked()["flight controller"], "Harakiri")
+    pi.runs(412, "/sbin/agetty", "ttyAMA0")
+    assert_problem(checked()["console"], "serial-getty@ttyAMA0 runs there", "disable --now")
+    pi.path("/dev/serial0").unlink()
+    assert_problem(checked()["port"], "there is no serial port", "plug the flight controller")
+    pi.write("/proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.4\0")
+    assert_problem(checked()["port"], "/dev/serial0 is missing", "sudo naze-bridge setup")
 
 
 def test_a_port_that_the_group_may_not_use(pi: FaultyMachine) -> None:

@@ -13,6 +13,7 @@ from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from service.links.connection import SerialFc
+from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
 
 PATIENCE_S = 20.0
@@ -47,7 +48,9 @@ class Line:
         self.reads = 0
 
     def start(self) -> FcPort:
-        self.port = FcPort(SerialFc(str(self.path), None), self._on_open, self._on_data, self.lost.append)
+        self.port = FcPort(
+            device_opener(SerialFc(str(self.path), None)), self._on_open, self._on_data, self.lost.append
+        )
         self._task = asyncio.get_running_loop().create_task(self.port.run())
         return self.port
 

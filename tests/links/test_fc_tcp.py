@@ -8,6 +8,7 @@ import struct
 import termios
 
 from service.links.connection import TcpFc
+from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
 
 PATIENCE_S = 20.0
@@ -25,7 +26,7 @@ async def test_what_was_read_is_acknowledged_before_the_next_byte_is_awaited() -
         listener.setblocking(False)
         heard: asyncio.Queue[int] = asyncio.Queue()
         port = FcPort(
-            TcpFc("127.0.0.1", listener.getsockname()[1]),
+            device_opener(TcpFc("127.0.0.1", listener.getsockname()[1])),
             lambda: None,
             lambda data: heard.put_nowait(unacknowledged(board)),
             lambda _: None,

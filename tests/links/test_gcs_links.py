@@ -12,7 +12,7 @@ from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from service.links import tcp_link, udp_link
-from service.links.connection import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs
+from service.links.connection import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs, split_gcs
 from service.links.fc_device import device_opener
 from service.links.gcs_links import GcsLink, open_link
 
@@ -244,6 +244,62 @@ def test_addresses_are_written_as_they_are_read(text: str, host: str, port: int)
     address = parse_gcs(text)
     assert (address.host, address.port, str(address)) == (host, port, text)
     assert isinstance(address, GcsAddress)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("UDPIN:14550", "udpin:0.0.0.0:14550"),
+        ("udp:14550", "udpin:0.0.0.0:14550"),
+        ("udp://:14550", "udpin:0.0.0.0:14550"),
+        ("udpin://0.0.0.0:14550", "udpin:0.0.0.0:14550"),
+        ("udps:0.0.0.0:14550", "udpin:0.0.0.0:14550"),
+        ("udpc:pc.local:14550", "udpout:pc.local:14550"),
+        ("udpout:pc.local,14550", "udpout:pc.local:14550"),
+        ("udpb:192.168.4.255:14560", "udpbcast:192.168.4.255:14560"),
+        ("tcp:0.0.0.0:5760", "tcpin:0.0.0.0:5760"),
+        ("tcpin:5760", "tcpin:0.0.0.0:5760"),
+    ],
+)
+def test_other_programs_words_are_understood(text: str, meant: str) -> None:
+    assert str(parse_gcs(text)) == meant
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("udp:192.168.4.20:14550", "write udpout:192.168.4.20:14550 to send there, udpin:0.0.0.0:14550 to listen"),
+        ("tcp:192.168.4.20:5760", "write tcpin:0.0.0.0:5760 to listen"),
+        ("udpin", "write udpin:0.0.0.0:14550"),
+        ("udpout:14550", "needs a host and a port"),
+        ("/dev/ttyUSB0:57600", "is no ground station connection: write udpin"),
+    ],
+)
+def test_what_could_mean_two_things_is_answered_with_its_spelling(text: str, words: str) -> None:
+    with pytest.raises(AddressError) as caught:
+        parse_gcs(text)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("AUTO", "auto"),
+        ("sim", "sim:"),
+        ("SIM:", "sim:"),
+        ("/dev/ttyAMA0:57600", "/dev/ttyAMA0,57600"),
+        ("serial:/dev/ttyAMA0:57600", "/dev/ttyAMA0,57600"),
+        ("serial:///dev/ttyAMA0", "/dev/ttyAMA0"),
+        ("/dev/serial/by-path/pci-0:1:1.0-port0", "/dev/serial/by-path/pci-0:1:1.0-port0"),
+        ("tcp://127.0.0.1:5760", "tcp:127.0.0.1:5760"),
+    ],
+)
+def test_flight_controllers_by_other_programs_words(text: str, meant: str) -> None:
+    assert str(parse_fc(text)) == meant
+
+
+def test_several_links_in_one_word() -> None:
+    assert split_gcs("udpin:14550,tcpin:5760, udpout:pc,14551") == ["udpin:14550", "tcpin:5760", "udpout:pc,14551"]
 
 
 def test_ipv6_without_brackets_is_explained() -> None:

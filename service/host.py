@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The machine as the checks see it: files below a root, which tests make with faults in it."""
+"""The machine as doctor, setup and the search for a port see it: files below a root, which tests make."""
 
 import fcntl
 import os
@@ -66,14 +66,15 @@ class Host:
 
     def holder(self, link: str) -> Process | None:
         """Return who has a file or socket open, by what its descriptor leads to ("/dev/ttyS0", "socket:[4711]")."""
-        for process in self.processes():
-            try:
-                open_files = list(self.path(f"/proc/{process.pid}/fd").iterdir())
-                if any(os.readlink(descriptor) == link for descriptor in open_files):
-                    return process
-            except OSError:
-                continue
-        return None
+        return next((process for process in self.processes() if self.has_open(process, link)), None)
+
+    def has_open(self, process: Process, link: str) -> bool:
+        """Whether a program has it open, as far as we may see it."""
+        try:
+            open_files = list(self.path(f"/proc/{process.pid}/fd").iterdir())
+            return any(os.readlink(descriptor) == link for descriptor in open_files)
+        except OSError:
+            return False
 
     def address(self, interface: str) -> str | None:
         """Return a network card's IPv4 address. This is the kernel's word, not a file's."""

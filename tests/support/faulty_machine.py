@@ -5,7 +5,7 @@ import grp
 import os
 from pathlib import Path
 
-from service.doctor.host import Host
+from service.host import Host
 from service.links.connection import SerialFc
 
 PORT = SerialFc("/dev/serial0", None)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Listens to a serial port before anything is sent there: is it a GPS receiver, or a telemetry radio? Sans-IO.
+
+A GPS receiver sends at least once a second. A SiK radio puts RADIO_STATUS of its own (system 51, component 68) between
+the frames of the other end, which is a ground station. Both are told from a flight controller by whole frames only.
+What stays silent, or is not understood at any speed, may be a flight controller: autosense goes on with it.
+"""
+
+from protocols.gps_receiver import GpsWatch
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+
+#: The first one is that of most flight controllers; the others are tried only if something is heard.
+LISTENING_SPEEDS = (115200, 9600, 57600, 38400, 230400, 19200, 4800)
+#: GPS receivers and heartbeats come once a second.
+_LISTEN_S = 1.2
+#: Shorter noise comes from plugging in.
+_NOISE_SIZE = 8
+_HEARTBEAT, _RADIO_STATUS = 0, 109
+_GROUND_STATION = 6  # MAV_TYPE_GCS
+_SIK_SENDER = (51, 68)
+
+
+class OtherDeviceWatch:
+    """Feed bytes; `what` names the device once it has shown that it is no flight controller."""
+
+    def __init__(self) -> None:
+        self.what = ""
+        #: A MAVLink vehicle was heard: that is one.
+        self.is_vehicle = False
+        self._gps = GpsWatch()
+        self._mavlink = MavlinkSplitter()
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes as they come."""
+        self._gps.feed(data)
+        if self._gps.heard:
+            self.what = f"a GPS receiver ({self._gps.heard})"
+        for frame in self._mavlink.feed(data):
+            self._mavlink_frame(frame)
+
+    def _mavlink_frame(self, frame: MavlinkFrame) -> None:
+        if frame.msgid == _RADIO_STATUS and (frame.sysid, frame.compid) == _SIK_SENDER:
+            self.what = "a SiK telemetry radio"
+        elif frame.msgid == _HEARTBEAT and frame.payload[4:5] == bytes((_GROUND_STATION,)):
+            self.what = "a telemetry radio with a ground station at its other end"
+        elif frame.msgid == _HEARTBEAT:
+            self.is_vehicle = True
+
+
+class PortListener:
+    """One port. Set it to `speed`, feed bytes and time until `is_done`; `what` is empty if it may be asked."""
+
+    def __init__(self, now: float) -> None:
+        self._speeds = iter(LISTENING_SPEEDS)
+        self.speed = next(self._speeds)
+        self.is_done = False
+        self.what = ""
+        self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        self._watch = OtherDeviceWatch()
+        self._size = 0
+        self.ends = now + _LISTEN_S
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes that were read at the present `speed`."""
+        self._watch.feed(data)
+        self._size += len(data)
+        self.what = self._watch.what
+        # A SiK radio passes on the vehicle's heartbeats of its other end, too: the whole time is listened.
+        self.is_done = bool(self.what)
+
+    def tick(self, now: float) -> None:
+        """Move on to the next speed, or end."""
+        if self.is_done or now < self.ends:
+            return
+        speed = None if self._size < _NOISE_SIZE or self._watch.is_vehicle else next(self._speeds, None)
+        if speed is None:
+            self.is_done = True
+        else:
+            self.speed = speed
+            self._begin(now)

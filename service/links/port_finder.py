@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fc = "auto"`: opens one serial port after the other, until a flight controller has been found on one.
+
+Only the port on which the flight controller was last, or one that was listened to first, is handed on to be asked. A
+port that another program uses is not opened, one that has shown itself as a GPS receiver's or radio's not again.
+"""
+
+import asyncio
+import os
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import serial
+import structlog
+
+from bridge.fc.port_listener import OtherDeviceWatch, PortListener
+from bridge.missions.mission_service import Delivery
+from bridge.model.events import Level
+from bridge.model.mission_log import ArrivedMission
+from bridge.model.vehicle_groups import Group
+from service.host import Host
+from service.links.fc_device import PortError, open_serial
+from service.links.port_holder import find_user
+from service.links.port_memory import PortMemory
+from service.links.serial_ports import SerialPort, serial_ports
+from service.mission_data import Json
+
+#: Autosense visits all speeds within this time.
+_SEARCH_S = 9.0
+#: A flight controller that was here is waited for: a Harakiri that looks for its GPS boots for 25 s.
+_RETURN_S = 40.0
+_RETRY_S = 1.0
+_READ_SIZE = 4096
+
+_log = structlog.get_logger()
+
+
+class PortFinder:
+    """Hands out ports (`open`), is told what comes of them as a follower of the daemon, and moves on if nothing does.
+
+    `move_on()` must close the present port, so that `open` is called again.
+    """
+
+    def __init__(self, host: Host, state_dir: Path | None) -> None:
+        self._host = host
+        self._loop = asyncio.get_running_loop()
+        self._memory = PortMemory(state_dir)
+        self._present: SerialPort | None = None
+        self._tried: set[str] = set()
+        self._watch: OtherDeviceWatch | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        #: Why a port was passed over, by its path.
+        self._passed: dict[str, str] = {}
+        self.move_on: Callable[[], None] = lambda: None
+
+    @property
+    def where(self) -> str:
+        """The port that is open, or what is looked for."""
+        return "the serial ports" if self._present is None else self._present.path
+
+    async def open(self) -> serial.Serial:
+        """Open the next port on which there may be a flight controller; PortError if there is none now."""
+        self._leave()
+        for port in self._in_turn():
+            self._tried.add(port.key)
+            device = await self._try(port)
+            if device is not None:
+                self._present = port
+                self._watch = OtherDeviceWatch()
+                self._wait(_RETURN_S if port.key == self._memory.flight_controller else _SEARCH_S)
+                return device
+        self._tried.clear()
+        await asyncio.sleep(_RETRY_S)
+        if self._passed:
+            raise PortError("; ".join(self._reasons()))
+        raise PortError("there is no serial port: plug the flight controller in, or switch the UART on the header on")
+
+    def received(self, data: bytes) -> None:
+        """Look at what comes while it is not known yet who is there: a GPS receiver may have been switched on."""
+        if self._watch is not None:
+            self._watch.feed(data)
+            if self._watch.what and self._present is not None:
+                self._leave_alone(self._present, self._watch.what)
+                self.move_on()
+
+    def close(self) -> None:
+        """End."""
+        self._leave()
+
+    # What a follower of the daemon is told (service.daemon.Follower).
+
+    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
+        """Remember the port once a flight controller is found, and wait for one that is lost to come back."""
+        if self._present is None:
+            return
+        if event == "fc.found":
+            self._stop_waiting()
+            self._watch = None
+            self._passed.pop(self._present.path, None)
+            self._memory.found_flight_controller(self._present.key)
+        elif event == "fc.lost":
+            self._watch = OtherDeviceWatch()
+            self._wait(_RETURN_S)
+
+    def telemetry(self, groups: frozenset[Group]) -> None:
+        """Nothing is done about it."""
+
+    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+        """Nothing is done about it."""
+
+    def status(self) -> Json:
+        """The port in use, and those that were passed over, with the reasons."""
+        return {
+            "port": None if self._present is None else self._present.path,
+            "ports_passed_over": self._reasons(),
+        }
+
+    def _reasons(self) -> list[str]:
+        return [f"{path}: {why}" for path, why in sorted(self._passed.items()) if path != self._path]
+
+    @property
+    def _path(self) -> str:
+        return "" if self._present is None else self._present.path
+
+    def _in_turn(self) -> list[SerialPort]:
+        """The ports not tried in this round; the flight controller's last one comes first."""
+        ports = serial_ports(self._host)
+        there = {port.path for port in ports}
+        self._passed = {path: why for path, why in self._passed.items() if path in there}
+        left = [port for port in ports if port.key not in self._tried]
+        if not left:
+            self._tried.clear()
+            left = ports
+        return sorted(left, key=lambda port: port.key != self._memory.flight_controller)
+
+    async def _try(self, port: SerialPort) -> serial.Serial | None:
+        other = self._memory.others.get(port.key)
+        if other is not None:
+            self._pass_over(port, f"{other} was heard there")
+            return None
+        user = find_user(self._host, port.path)
+        if user is not None:
+            self._pass_over(port, f"{user} uses it")
+            return None
+        try:
+            device = open_serial(str(self._host.path(port.path)))
+        except PortError as error:
+            self._pass_over(port, str(error))
+            return None
+        handed_on = False
+        try:
+            what = "" if port.key == self._memory.flight_controller else await self._listen(device)
+            if what:
+                self._leave_alone(port, what)
+                return None
+            handed_on = True
+            return device
+        except OSError as error:
+            self._pass_over(port, error.strerror or str(error))
+            return None
+        finally:
+            if not handed_on:
+                device.close()
+
+    async def _listen(self, device: serial.Serial) -> str:
+        """What shows itself on the port as no flight controller; empty if nothing does. Nothing is sent."""
+        listener = PortListener(self._loop.time())
+        readable = asyncio.Event()
+        self._loop.add_reader(device.fileno(), readable.set)
+        try:
+            while not listener.is_done:
+                if device.baudrate != listener.speed:
+                    device.baudrate = listener.speed
+                try:
+                    async with asyncio.timeout_at(listener.ends):
+                        await readable.wait()
+                except TimeoutError:
+                    pass
+                else:
+                    readable.clear()
+                    with suppress(BlockingIOError):
+                        listener.receive(_read(device))
+                listener.tick(self._loop.time())
+        finally:
+            self._loop.remove_reader(device.fileno())
+        return listener.what
+
+    def _leave_alone(self, port: SerialPort, what: str) -> None:
+        self._memory.found_other(port.key, what)
+        self._pass_over(port, f"{what} was heard there")
+
+    def _pass_over(self, port: SerialPort, why: str) -> None:
+        if self._passed.get(port.path) != why:
+            self._passed[port.path] = why
+            _log.info("fc.port_passed_over", port=port.path, device=port.description, why=why)
+
+    def _wait(self, seconds: float) -> None:
+        self._stop_waiting()
+        self._timer = self._loop.call_later(seconds, self._waited)
+
+    def _waited(self) -> None:
+        self._timer = None
+        if self._present is None:
+            return
+        others = [port for port in serial_ports(self._host) if port.key not in self._memory.others]
+        if [port.key for port in others] == [self._present.key]:
+            self._wait(_SEARCH_S)
+            return
+        self._pass_over(self._present, "no flight controller answers")
+        self.move_on()
+
+    def _stop_waiting(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _leave(self) -> None:
+        self._stop_waiting()
+        self._present = None
+        self._watch = None
+
+
+def _read(device: serial.Serial) -> bytes:
+    data = os.read(device.fileno(), _READ_SIZE)
+    if not data:
+        raise OSError("it was unplugged")
+    return data

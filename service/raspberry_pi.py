@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Raspberry Pi models: which device is the UART on GPIO 14 and 15, and which line of config.txt switches it on."""
+
+from dataclasses import dataclass
+
+from service.host import Host
+
+#: Bookworm and later, and before.
+BOOT_FOLDERS = ("/boot/firmware", "/boot")
+
+
+@dataclass(frozen=True, slots=True)
+class PiModel:
+    """`name` as the device tree has it; `header_uart`: the device on pins 8 and 10; `config_line`: switches it on."""
+
+    name: str
+    header_uart: str
+    config_line: str
+
+
+def pi_model(host: Host) -> PiModel | None:
+    """The Raspberry Pi this is; None on other machines.
+
+    On a Pi 5 /dev/serial0 is the debug socket between the HDMI plugs (ttyAMA10); the header has ttyAMA0. On earlier
+    models serial0 is the header's: ttyS0 where Bluetooth has the better UART, else ttyAMA0.
+    """
+    name = host.read("/proc/device-tree/model").rstrip("\0\n")
+    if not name.startswith("Raspberry Pi"):
+        return None
+    if name.startswith(("Raspberry Pi 5", "Raspberry Pi Compute Module 5")):
+        return PiModel(name, "/dev/ttyAMA0", "dtparam=uart0=on")
+    return PiModel(name, "/dev/serial0", "enable_uart=1")
+
+
+def boot_file(host: Host, name: str) -> str | None:
+    """Path of config.txt or cmdline.txt; None if there is none."""
+    paths = [f"{folder}/{name}" for folder in BOOT_FOLDERS]
+    return next((path for path in paths if host.path(path).exists()), None)

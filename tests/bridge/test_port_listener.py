@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a port shows of itself before anything is sent there: GPS receivers and radios are told from the rest."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.fc.port_listener import LISTENING_SPEEDS, OtherDeviceWatch, PortListener
+from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.dialect import messages as m
+from protocols.msp.commands import Msp
+from protocols.msp.frame import request
+
+NMEA = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"
+RADIO_STATUS = FrameWriter(51, 68).frame(pack(m.MAVLink_radio_status_message(0, 0, 100, 0, 0, 0, 0)), 1)
+
+
+def heartbeat(kind: int, autopilot: int, sysid: int = 1) -> bytes:
+    return FrameWriter(sysid, 1).frame(pack(m.MAVLink_heartbeat_message(kind, autopilot, 0, 0, 4, 3)), 1)
+
+
+def ubx(payload: bytes) -> bytes:
+    body = b"\x01\x07" + len(payload).to_bytes(2, "little") + payload
+    first = second = 0
+    for byte in body:
+        first = (first + byte) % 256
+        second = (second + first) % 256
+    return b"\xb5\x62" + body + bytes((first, second))
+
+
+@pytest.mark.parametrize(
+    ("sent", "named"),
+    [
+        (NMEA, "GPS receiver (NMEA)"),
+        (ubx(bytes(92)), "GPS receiver (UBX)"),
+        (RADIO_STATUS, "SiK telemetry radio"),
+        (heartbeat(6, 8, 255), "ground station"),
+    ],
+)
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_what_is_no_flight_controller_is_named(sent: bytes, named: str, size: int) -> None:
+    watch = OtherDeviceWatch()
+    data = b"\x00\xff" + sent + sent
+    for start in range(0, len(data), size):
+        watch.feed(data[start : start + size])
+    assert named in watch.what
+
+
+@pytest.mark.parametrize("sent", [heartbeat(2, 3), request(Msp.IDENT), b"$M>\x07\x64\xd3\x03\x00\x00\x00\x00\x80\x37"])
+def test_a_flight_controller_is_not(sent: bytes) -> None:
+    watch = OtherDeviceWatch()
+    watch.feed(sent * 3)
+    assert not watch.what
+
+
+def test_a_damaged_sentence_proves_nothing() -> None:
+    watch = OtherDeviceWatch()
+    watch.feed(NMEA.replace(b"123519", b"123518") + ubx(bytes(92))[:-1] + b"\x00")
+    assert not watch.what
+
+
+@given(st.lists(st.binary(max_size=64), max_size=20))
+def test_noise_neither_raises_nor_is_a_radio(chunks: list[bytes]) -> None:
+    watch = OtherDeviceWatch()
+    for chunk in chunks:
+        watch.feed(chunk)
+    assert "radio" not in watch.what
+
+
+def listen(sent_at: dict[int, bytes]) -> tuple[str, list[int]]:
+    """Run a listener on a line where something comes every second; return what it says, and the speeds it was at."""
+    now = 0.0
+    speeds: list[int] = []
+    listener = PortListener(now)
+    while not listener.is_done:
+        if not speeds or speeds[-1] != listener.speed:
+            speeds.append(listener.speed)
+        # At another speed than the sender's the same bits make other bytes.
+        listener.receive(sent_at.get(listener.speed, b"\x00\xfe\x80" * 10 if sent_at else b""))
+        now = max(now + 0.5, now)
+        listener.tick(now)
+    return listener.what, speeds
+
+
+def test_a_silent_port_is_listened_to_at_one_speed() -> None:
+    assert listen({}) == ("", [115200])
+
+
+def test_a_gps_receiver_is_found_at_its_own_speed() -> None:
+    assert listen({9600: NMEA}) == ("a GPS receiver (NMEA)", [115200, 9600])
+
+
+def test_a_vehicle_at_the_first_speed_ends_it() -> None:
+    assert listen({115200: heartbeat(2, 3)}) == ("", [115200])
+
+
+def test_what_is_not_understood_was_listened_to_at_every_speed() -> None:
+    assert listen({1: b""}) == ("", list(LISTENING_SPEEDS))
