@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--fc", metavar="FC", help="/dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:")
+@click.option("--fc", metavar="FC", help="auto (the default), /dev/ttyAMA0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim")
 @click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; several at once. Default: {DEFAULT_GCS}")
 @click.option(
     "--config",

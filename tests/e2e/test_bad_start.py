@@ -20,12 +20,11 @@ UNKNOWN = {
     "no such device name": (["--fc", "naze"], "/dev/serial0"),
     "a device without its folder": (["--fc", "ttyUSB0,57600"], "did you mean /dev/ttyUSB0,57600?"),
     "a host that cannot be": (["--fc", "tcp:naze..local:5760"], "no host's name"),
-    "no speed": (["--fc", "/dev/ttyUSB0,fast"], "no speed in baud"),
+    "no speed": (["--fc", "/dev/ttyUSB0,fast"], "not a baud rate"),
     "tcp without a port": (["--fc", "tcp:naze.local"], "needs a host and a port"),
     "no such link": (["--fc", "sim:", "--gcs", "serial:/dev/ttyS0"], "udpin:0.0.0.0:14550"),
     "a port of words": (["--fc", "sim:", "--gcs", "udpin:0.0.0.0:mavlink"], "no port number"),
     "a port out of range": (["--fc", "sim:", "--gcs", "udpout:10.0.0.1:70000"], "no port number"),
-    "no flight controller": ([], "--fc"),
 }
 
 
