@@ -16,12 +16,12 @@ def single(value: float) -> float:
 
 
 def is_single(value: float, shown: float) -> bool:
-    """Tell whether `shown` is what single precision makes of `value`, so that a MISSION_ITEM cannot tell them apart."""
+    """True if a MISSION_ITEM, which has single precision, would carry both values as the same number."""
     return value == shown or (abs(value) < _LARGEST and single(value) == single(shown))
 
 
 def neighbours(value: float) -> tuple[float, float, float]:
-    """Return a single-precision number other than 0, and the ones beside it."""
+    """A non-zero single-precision number with its neighbours below and above."""
     (bits,) = _BITS.unpack(_FLOAT.pack(value))
     low, mid, high = (_FLOAT.unpack(_BITS.pack(bits + step))[0] for step in (-1, 0, 1))
     return low, mid, high

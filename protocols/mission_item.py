@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One mission item as a ground station sends it, whatever message or file it came in."""
+"""One mission item as a ground station sends it, by message or in a file."""
 
 import math
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class MissionItem:
     """An item of a mission list, as sent (any value is possible) or as stored.
 
     `lat_e7` and `lon_e7` are degrees * 1e7; 0 and None (not a finite number) both mean "missing".
-    `alt_m` is metres above whatever `frame` says. Parameters may be NaN: "not given".
+    `alt_m` is in metres above the datum of `frame`. A parameter that was not given is NaN.
     """
 
     seq: int

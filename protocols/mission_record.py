@@ -8,7 +8,7 @@ from typing import Protocol
 
 
 class MissionRecord(Protocol):
-    """One stored record of whatever flight controller; its number is its position in the list."""
+    """One record as a flight controller stores it; its number is its position in the list."""
 
     def pack(self) -> bytes:
         """Return the bytes; struct.error if a field does not fit, which is a bug in the caller."""

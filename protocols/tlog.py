@@ -49,7 +49,7 @@ def tlog_record(frame: bytes, at_us: int) -> bytes:
 
 
 def read_tlog(data: bytes) -> Iterator[TlogRecord]:
-    """Yield the records of a log. What is no whole record (a torn last one, a damaged block) is skipped."""
+    """Yield the records of a log. Incomplete and damaged records are skipped."""
     at = 0
     while at < len(data) - _STAMP_SIZE:
         start = at + _STAMP_SIZE
@@ -66,7 +66,7 @@ def heartbeat_type(frame: bytes) -> int | None:
     found = MavlinkFrame(frame)
     if found.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
         return None
-    # MAVLink 2 leaves trailing zeros out: what is not there is 0.
+    # MAVLink 2 omits trailing zeros.
     return found.payload.ljust(_HEARTBEAT_SIZE, b"\0")[_HEARTBEAT_TYPE]
 
 
@@ -88,7 +88,7 @@ def _frame_at(data: bytes, start: int) -> MavlinkFrame | None:
 
 
 def _without_signature(frame: bytes) -> bytes:
-    """Clear the flag, cut the signature, and compute the CRC anew: it covers the flags."""
+    """Clear the flag, cut the signature, and recompute the CRC, which covers the flags."""
     checked = frame[1:2] + bytes((frame[2] & ~_SIGNED,)) + frame[3 : -_SIGNATURE_SIZE - _CRC_SIZE]
     crc = mcrf4xx(checked + bytes((CRC_EXTRA[int.from_bytes(frame[_MSGID], "little")],)))
     return frame[:1] + checked + crc.to_bytes(_CRC_SIZE, "little")

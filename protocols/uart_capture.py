@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UART captures (.uart): what was read from and written to a flight controller's port, when, and at which speed.
+"""UART captures (.uart): the bytes read from and written to a flight controller's port, with time and speed.
 
 One JSON object a line, each line for itself, so a capture may be appended to, cut with head and tail, and torn:
 
@@ -69,14 +69,14 @@ def capture_line(event: UartEvent) -> bytes:
 
 
 def is_capture(beginning: bytes) -> bool:
-    """Tell whether a file that begins so is a capture that may be appended to."""
+    """True if a file that starts with these bytes is a capture that may be appended to."""
     return beginning.startswith(f'{{"{_MARK}":'.encode())
 
 
 def read_capture(data: bytes) -> list[UartEvent]:
-    """Return the events of all recordings in a file, in order, the first at 0. What is no line of ours is skipped.
+    """The events of all recordings in a file, in order, the first at time 0. Other lines are skipped.
 
-    Between two recordings a pause takes the place of the time that nobody knows; a port that was not closed when
+    Between two recordings a pause replaces the unknown time; a port that was not closed when
     the first one ended (the daemon was killed) is closed there.
     """
     events: list[UartEvent] = []
@@ -91,7 +91,7 @@ def read_capture(data: bytes) -> list[UartEvent]:
         at = float(line["t"])
         if first_at is None:
             first_at = at
-        # Time never runs back, whatever is in the file.
+        # Time never runs backwards, even in a damaged file.
         earliest = events[-1].at if events else 0.0
         event = _event(line, max(began_at + at - first_at, earliest))
         if event is not None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may be done to a flight controller on the ground: calibrations, and writing its settings to flash.
+"""Commands for the ground: calibrations, and writing the settings to flash.
 
-The firmware looks neither whether it flies nor whether it is asked twice (serial.c): a calibration freezes it for
-seconds, writing flash for a tenth of one. So it is asked whether it is armed right before, twice, and told once.
+The firmware checks neither whether it is flying nor whether a command is repeated (serial.c): a calibration stalls it
+for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ SAVE_SETTINGS = FcAction(MspAction.EEPROM_WRITE, Sensor(0), freezes=False)
 
 
 class ActionResult(Enum):
-    """What came of an action, as the pilot is told (at most 50 characters)."""
+    """The result of an action, as text for the pilot (at most 50 characters)."""
 
     DONE = "Done"
     FREEZES = "Calibrating: it restarts when done (up to 5 min)"
@@ -49,7 +49,7 @@ class ActionResult(Enum):
 
 
 class FcActions:
-    """Does one action at a time, and never beside a mission transfer."""
+    """Runs one action at a time, and none during a mission transfer."""
 
     def __init__(self, session: FcSession, missions: MissionService, runner: Runner) -> None:
         self._session = session
@@ -59,14 +59,14 @@ class FcActions:
 
     @property
     def present(self) -> FcAction | None:
-        """What is being done."""
+        """The action in progress."""
         return self._present
 
     def start(self, action: FcAction, on_done: Callable[[ActionResult], None], now: float) -> None:
-        """Do it; `on_done` is told what came of it, perhaps at once."""
+        """Start an action; `on_done` gets the result, possibly before this returns."""
         controller = self._session.controller
         if controller is None or controller.arm_bit is None:
-            # Nothing is done to a craft of which it cannot be told whether it flies.
+            # Without an arm flag it is unknown whether the craft is flying.
             on_done(ActionResult.NO_LINK)
             return
         if self._runner.is_busy or self._missions.acquire(self) is not None:

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds out what speaks on a serial port, and at which speed. Sans-IO.
+"""Finds the protocol and speed of a serial port. Sans-IO.
 
-The other side (harakiri.md, "Protocol switching"): a disarmed Harakiri sends MAVLink heartbeats until it is spoken
-to, and answers either protocol; armed, it may speak MAVLink only. So both are listened for, but MSP is asked for and
-preferred.
+A disarmed Harakiri sends MAVLink heartbeats until it receives something, and answers both protocols; armed, it may
+speak MAVLink only. So the search listens for both, but probes for MSP and prefers it.
 
-Each visit to a speed runs through the phases below. Evidence is two matching MSP answers to our own questions, or a
-heartbeat whose every field is plausible: noise does not produce either (tests/bridge/test_autosense_noise.py).
+Each visit to a speed runs through the phases below. Evidence is two matching MSP replies to our own probes, or a
+heartbeat with plausible fields; noise produces neither (tests/bridge/test_autosense_noise.py).
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives other bytes than we send;
 tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
 """
@@ -23,14 +22,14 @@ from protocols.mavlink.heartbeat import is_plausible_heartbeat
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
-#: Tried in this order; 115200 is Harakiri's default and comes back in between, for a board that was still booting.
+#: Tried in this order; 115200, Harakiri's default, comes twice, for a board that was still booting.
 SPEEDS = (115200, 57600, 38400, 115200, 19200, 9600, 4800, 2400, 1200)
-#: At these a MAVLink heartbeat a second is waited for; elsewhere only an answer to one of two probes.
+#: At these speeds a visit lasts long enough for a 1 Hz heartbeat; at others for the replies to two probes.
 _HEARTBEAT_SPEEDS = (115200, 57600)
 _FULL_VISIT_S = 1.1
 _LISTEN_S = 0.1
 _PROBE_INTERVAL_S = 0.15
-#: So many are asked in this interval, and more at longer ones: who stands still may answer all of them at once.
+#: This many probes go out at the interval above, later ones more slowly: a stalled board may answer all at once.
 _QUICK_PROBES = 4
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
@@ -39,16 +38,16 @@ _FRSKY_EVIDENCE = 6
 
 
 class Phase(Enum):
-    """Where a visit to one speed stands."""
+    """The phases of a visit to one speed."""
 
     LISTEN = auto()  # nothing is sent
-    PROBE = auto()  # IDENT is asked, listening goes on
-    CONFIRM = auto()  # one MSP answer was heard; a second, equal one is wanted
+    PROBE = auto()  # IDENT is sent, listening continues
+    CONFIRM = auto()  # one MSP reply was heard; a second, equal one is needed
     FOUND = auto()
 
 
 class Spoken(Enum):
-    """What a flight controller speaks."""
+    """The protocols that a flight controller may speak."""
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
@@ -57,7 +56,7 @@ class Spoken(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The verdict, and the evidence in words. `speed` is None where the line has none; `heard`: a MAVLink frame."""
+    """The result, and the evidence in words. `speed` in baud, None if the line has none; `heard`: a MAVLink frame."""
 
     spoken: Spoken
     speed: int | None
@@ -68,7 +67,7 @@ class Found:
 def visit_order(
     known: int | None, speeds: Sequence[int | None], first: Sequence[int | None] = ()
 ) -> Iterator[int | None]:
-    """Yield speeds for ever; the last good one takes every other turn: a rebooting board comes back to it."""
+    """Yield speeds for ever; every other one is the last good speed, to which a rebooting board returns."""
     yield from first
     others = [speed for speed in speeds if speed != known] or [known]
     while True:
@@ -80,7 +79,7 @@ def visit_order(
 
 @dataclass(slots=True)
 class _Visit:
-    """What was heard at one speed, and when the present phase and the whole visit end."""
+    """What was heard at one speed, and the ends of the phase and of the visit."""
 
     phase_ends: float
     ends: float
@@ -94,10 +93,7 @@ class _Visit:
 
 
 class Autosense:
-    """One search. Feed bytes and time until `found` is set.
-
-    `speed` is what the port must be set to; `take_output` what must be written to it.
-    """
+    """One search. Feed bytes and time until `found` is set. The port must run at `speed`."""
 
     def __init__(
         self,
@@ -116,12 +112,12 @@ class Autosense:
         self._visit = self._new_visit(now)
 
     def take_output(self) -> list[bytes]:
-        """Return what is to be written, in order."""
+        """The bytes to be written, in order."""
         output, self._output = self._output, []
         return output
 
     def next_deadline(self) -> float | None:
-        """Return when `tick` has something to do."""
+        """The time of the next `tick`; None once something is found."""
         return None if self.found else min(self._visit.phase_ends, self._visit.ends)
 
     def receive(self, data: bytes, now: float) -> None:
@@ -134,7 +130,7 @@ class Autosense:
             self._visit.frsky.feed(data)
 
     def tick(self, now: float) -> None:
-        """Move on when a phase or a visit is over."""
+        """Move on at the end of a phase or visit."""
         visit = self._visit
         if self.found:
             return
@@ -159,15 +155,15 @@ class Autosense:
         return _Visit(listened, now + _FULL_VISIT_S if full else listened + self._two_probes_s())
 
     def _two_probes_s(self) -> float:
-        """Return how long it takes to ask both ways and to hear the answers."""
+        """The time for both kinds of probe and their replies."""
         return self._on_wire_s(PROBE) + self._on_wire_s(RESYNC) + 2 * _PROBE_INTERVAL_S
 
     def _probe(self, now: float) -> float:
-        """Ask, if there is room for the answer; return how long to wait for it."""
+        """Send a probe if there is room for its reply; return the time to wait for it."""
         room = self.pending.room(self.speed, now)
         waiting = self.pending.questions(self.speed, now)
         interval_s = _PROBE_INTERVAL_S * max(waiting / _QUICK_PROBES, 1)
-        # Each second probe also fills a parser that was left in mid-frame.
+        # Every second probe also fills a parser that is stuck in the middle of a frame.
         if self._visit.probes % 2 and room >= RESYNC_REPLY_SIZE:
             return self._ask(RESYNC, RESYNC_REPLY_SIZE, now) + interval_s
         if room >= _ANSWER_SIZE:
@@ -175,14 +171,14 @@ class Autosense:
         return interval_s
 
     def _ask(self, frame: bytes, reply_size: int, now: float) -> float:
-        """Send; return how long the question and its answer are on the wire."""
+        """Send a probe; return the time that it and its reply take on the wire."""
         self._visit.probes += 1
         self.pending.add(self.speed, reply_size, now)
         self._output.append(frame)
         return self._on_wire_s(frame)
 
     def _on_wire_s(self, frame: bytes) -> float:
-        """Return how long a question and one answer take: at 1200 baud that is long."""
+        """The time of a probe and one reply on the wire: long at 1200 baud."""
         return (len(frame) + _ANSWER_SIZE) * 10 / self.speed if self.speed else 0.0
 
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
@@ -196,7 +192,7 @@ class Autosense:
             return
         visit.answer = frame
         self.phase = Phase.CONFIRM
-        # Without room for one more, the answers that are owed will do.
+        # Without room for one more, the pending replies must do.
         has_room = self.pending.room(self.speed, now) >= _ANSWER_SIZE
         visit.phase_ends = now + (self._ask(PROBE, _ANSWER_SIZE, now) if has_room else 0.0) + _CONFIRM_S
         visit.ends = max(visit.ends, visit.phase_ends)
@@ -216,7 +212,7 @@ class Autosense:
             visit.heartbeat = frame
             if self.phase is Phase.LISTEN:
                 visit.phase_ends = now
-            # MSP still has its chance, and an answer that is being confirmed all of its time.
+            # MSP keeps its chance, and a reply that is being confirmed its full time.
             visit.ends = max(now + self._two_probes_s(), visit.phase_ends)
 
     def _conclude(self, spoken: Spoken, why: str) -> None:

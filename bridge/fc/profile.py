@@ -37,7 +37,7 @@ class VehicleView:
 
 @dataclass(frozen=True, slots=True)
 class RuleSettings:
-    """What the mission rules depend on beside the firmware. capacity: records, None for the firmware's usual number."""
+    """The inputs of the mission rules. None stands for the firmware's default. capacity: records."""
 
     takeoff_max_m: int
     wp_radius_cm: int | None = None

@@ -138,7 +138,7 @@ class FcSession:
             self._handle(event, now)
 
     def tick(self, now: float) -> None:
-        """Do what is due."""
+        """Run the timers of the present state."""
         event = self.state.tick(now)
         if event is not None:
             self._handle(event, now)
@@ -148,7 +148,7 @@ class FcSession:
         return self.state.deadline()
 
     def take_output(self) -> list[bytes]:
-        """What is to be written to the port at the present `speed`."""
+        """The bytes to be written to the port at the present `speed`."""
         return self.state.take_output()
 
     def send_mavlink(self, frame: bytes) -> None:
@@ -176,11 +176,11 @@ class FcSession:
             self._welcome(self.state.controller, event, now)
 
     def _leave(self, state: State, event: Event, now: float) -> None:
-        """Forget the flight controller, and end what was asked of it."""
+        """Forget the flight controller and end its conversations."""
         self.state = Closed(self._port, state.speed)
         if not isinstance(state, MspLine) and state.controller is None:
             return
-        # These stay the same whatever it speaks next.
+        # These do not depend on the protocol.
         before = self._port.vehicle
         home = before.home_or_position()
         self._port.vehicle = VehicleState(mixer=before.mixer, home=None if home is None else HomePoint(*home))

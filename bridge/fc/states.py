@@ -107,7 +107,7 @@ Event = PortOpened | PortClosed | MspFound | MavlinkFound | FrskyFound | Identif
 
 @dataclass(slots=True)
 class Port:
-    """What outlives a state: the settings, what was learned about the port, and the shared parts of the bridge."""
+    """Everything that outlives a state: settings, knowledge about the port, and shared parts of the bridge."""
 
     speeds: Sequence[int | None]
     autopilot: Autopilot
@@ -143,7 +143,7 @@ class State(ABC):
 
     @abstractmethod
     def tick(self, now: float) -> Event | None:
-        """Do what is due."""
+        """Run the timers."""
 
     @abstractmethod
     def deadline(self) -> float:
@@ -290,7 +290,7 @@ class MspLine(State):
 
     @property
     def _is_foreign(self) -> bool:
-        """True if more arrived than the damaged replies to what was asked."""
+        """True if more bytes arrived than damaged replies could explain."""
         return self._foreign.size >= self.link.outstanding_bytes + _FOREIGN_SIZE
 
     def _silence(self, now: float) -> Event | None:
@@ -384,7 +384,7 @@ class Msp(MspLine):
         return event
 
     def deadline(self) -> float:
-        """The next poll, or what is due on any MSP line."""
+        """The next poll, or the next deadline of any MSP line."""
         poll = self.port.polls.next_deadline(self.link)
         check_at = inf if self.port.runner.is_busy else self._check_at
         return min(super().deadline(), check_at, inf if poll is None else poll)
@@ -497,7 +497,7 @@ class _Foreign:
         self._splitter = MavlinkSplitter()
 
     def note(self, data: bytes, link: MspLink, *, is_msp: bool) -> None:
-        """Look at what was just received."""
+        """Examine received bytes."""
         skipped, self._skipped_before = link.skipped_bytes - self._skipped_before, link.skipped_bytes
         if is_msp:
             if self.size:

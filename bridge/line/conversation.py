@@ -17,18 +17,18 @@ from protocols.msp.frame import MspFrame, frame_size
 
 
 class LinkLost(Exception):
-    """The flight controller is not reachable (any more)."""
+    """The flight controller cannot be reached."""
 
 
 class Stopped(LinkLost):
-    """The bridge is about to end. The flight controller can still be reached, to leave it in order."""
+    """The bridge is stopping. The line is still up, to leave the flight controller in a clean state."""
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Send a request frame. `reply_size` is the whole reply's size in bytes, for the bound on outstanding replies.
+    """Send a request frame. `reply_size`: the size of the whole reply frame, bytes, for the bound on pending replies.
 
-    While an `exclusive` request is unanswered nothing else is sent: the flight controller may be writing flash.
+    While an `exclusive` request is pending nothing else is sent: the flight controller may be writing flash.
     """
 
     frame: bytes
@@ -39,21 +39,21 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Receive:
-    """Wait for the next reply to one of `commands`. Answer: the frame, or None on time-out."""
+    """Wait for the next reply to one of `commands`. Answer: the frame, or None on timeout."""
 
     commands: frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
 class Transmit:
-    """Send a MAVLink message. Answer: False if no frame of it is safe to send."""
+    """Send a MAVLink message. Answer: False if no frame of it is free of hazard bytes."""
 
     packed: Packed
 
 
 @dataclass(frozen=True, slots=True)
 class Await:
-    """Wait for the next MAVLink frame with one of these message ids. Answer: the frame, or None on time-out."""
+    """Wait for the next MAVLink frame with one of these message ids. Answer: the frame, or None on timeout."""
 
     msgids: frozenset[int]
     seconds: float
@@ -68,14 +68,14 @@ class Pause:
 
 @dataclass(frozen=True, slots=True)
 class Save:
-    """Store a mission that came in. Answer: its number, or None if it could not be stored in time."""
+    """Store a received mission. Answer: its number, or None if that failed or timed out."""
 
     mission: ArrivedMission
 
 
 @dataclass(frozen=True, slots=True)
 class Conclude:
-    """Store what became of mission `number`. Answer: whether that worked."""
+    """Store the outcome of mission `number`. Answer: True if stored."""
 
     number: int
     conclusion: Conclusion
@@ -83,7 +83,7 @@ class Conclude:
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """Look up how records of a stored list were sent, if they do not tell. Answer: record number -> MAV_CMD number."""
+    """Look up the commands that a stored list was sent with. Answer: record number -> MAV_CMD, where they differ."""
 
     identity: ListIdentity
 
@@ -103,7 +103,7 @@ def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = Fa
 
 
 def receive(*commands: int) -> Conversation[MspFrame | None]:
-    """Wait for a reply to one of `commands`; None on time-out."""
+    """Wait for a reply to one of `commands`; None on timeout."""
     answer: MspFrame | None = yield Receive(frozenset(commands))
     return answer
 
@@ -111,7 +111,7 @@ def receive(*commands: int) -> Conversation[MspFrame | None]:
 def ask(
     frame: bytes, command: int, reply_payload: int, *, tries: int = 3, exclusive: bool = False
 ) -> Conversation[MspFrame | None]:
-    """Send a request and wait for its reply, repeating it; None if no try was answered."""
+    """Send a request and wait for its reply, with retries; None if none was answered."""
     for _ in range(tries):
         yield from send(frame, command, reply_payload, exclusive=exclusive)
         reply = yield from receive(command)
@@ -121,7 +121,7 @@ def ask(
 
 
 def ask_surely(frame: bytes, command: int, reply_payload: int) -> Conversation[MspFrame | None]:
-    """Ask until two answers in a row are equal; None if they never are, or if one stays out.
+    """Ask until two replies in a row are equal; None if they never are, or if a reply is missing.
 
     The checksum of 8 bits lets a pair of flipped bits through: at one wrong bit in a thousand one INFO reply in 500,
     and one BOXNAMES reply in 25. An error frame is an answer too.
@@ -141,18 +141,18 @@ def pause(seconds: float) -> Conversation[None]:
 
 
 def save(mission: ArrivedMission) -> Conversation[int | None]:
-    """Store a mission that came in; its number, or None if the store failed."""
+    """Store a received mission; its number, or None if the store failed."""
     number: int | None = yield Save(mission)
     return number
 
 
 def conclude(number: int, conclusion: Conclusion) -> Conversation[bool]:
-    """Store what became of a mission; whether that worked."""
+    """Store the outcome of a mission; True if stored."""
     done: bool | None = yield Conclude(number, conclusion)
     return bool(done)
 
 
 def recall(identity: ListIdentity) -> Conversation[Mapping[int, int]]:
-    """Return the commands, by record number, with which records that do not tell were sent; empty if unknown."""
+    """The commands that ambiguous records were sent with, by record number; empty if unknown."""
     commands: Mapping[int, int] | None = yield Recall(identity)
     return commands or {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A port on which an armed Harakiri sends FrSky telemetry (tele_prot 1): nothing to read, only to be waited out."""
+"""A port on which an armed Harakiri sends FrSky telemetry (tele_prot 1): watched only for its end."""
 
 from protocols.frsky import FrskyWatch
 
@@ -8,7 +8,7 @@ _SILENCE_S = 1.0
 
 
 class FrskyLine:
-    """Feed bytes and time until `ended` says why it is over."""
+    """Feed bytes and time; `ended` is set to the reason when the telemetry stops."""
 
     def __init__(self, now: float) -> None:
         self._watch = FrskyWatch()
@@ -27,5 +27,5 @@ class FrskyLine:
             self.ended = f"no FrSky telemetry for {_SILENCE_S} s"
 
     def next_deadline(self) -> float:
-        """Return when `tick` has something to do."""
+        """The time of the next `tick`."""
         return self._heard_at + _SILENCE_S

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A port on which MAVLink is spoken: what comes in, and when it is over. Sans-IO."""
+"""A port that carries MAVLink: its frames, and the moment it ends. Sans-IO."""
 
 from bridge.line.mavlink_sender import HarakiriSender
 from bridge.line.msp_link import PROBE
@@ -8,20 +8,20 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.heartbeat import is_plausible_heartbeat
 from protocols.msp.frame import MspParser
 
-#: Other autopilots are given the time of two lost heartbeats.
+#: Two lost heartbeats, for autopilots other than Harakiri.
 _SILENCE_S = 2.5
 #: An armed Harakiri sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
 _HARAKIRI_ARMED_SILENCE_S = 0.8
-#: Harakiri is asked for MSP now and then: it answers again once it is disarmed.
+#: Harakiri is probed for MSP, which it answers again once it is disarmed.
 _PROBE_INTERVAL_S = 1.0
-#: After so long without a byte nothing more comes of a frame that has begun.
+#: After this long without a byte, an incomplete frame is given up.
 _LINE_SILENCE_S = 0.1
-#: A heartbeat's base_mode: where it is, and its bit for "armed".
+#: The offset of base_mode in HEARTBEAT, and its armed bit.
 _BASE_MODE, _SAFETY_ARMED = 6, 0x80
 
 
 class MavlinkLine:
-    """Feed bytes and time until `ended` says why it is over."""
+    """Feed bytes and time; `ended` is set to the reason when MAVLink stops."""
 
     def __init__(self, *, is_harakiri: bool, now: float) -> None:
         self._is_harakiri = is_harakiri
@@ -37,7 +37,7 @@ class MavlinkLine:
 
     @property
     def bad_frames(self) -> int:
-        """Frames whose checksum was wrong."""
+        """Frames with a wrong checksum."""
         return self._splitter.bad_frames
 
     def receive(self, data: bytes, now: float) -> list[MavlinkFrame]:
@@ -60,7 +60,7 @@ class MavlinkLine:
                 self.armed = armed
 
     def send(self, packed: Packed) -> bool:
-        """Send a message to a Harakiri; False if there is no safe way to."""
+        """Send a message to a Harakiri; False if none of its frames would be free of hazard bytes."""
         frame = self._sender.frame(packed)
         if frame is None:
             return False
@@ -68,23 +68,23 @@ class MavlinkLine:
         return True
 
     def take_output(self) -> list[bytes]:
-        """Return what is to be written. To other autopilots goes nothing but what ground stations send."""
+        """The bytes to be written. Other autopilots get nothing but the frames of ground stations."""
         output, self._output = self._output, []
         return output
 
     def tick(self, now: float, *, is_conversing: bool) -> list[MavlinkFrame]:
-        """Ask for MSP when that is due, but not amidst a conversation; notice silence.
+        """Probe for MSP when due, but not during a conversation; notice silence.
 
-        Return frames that a false header was hiding: it is believed no longer once the line is quiet.
+        Returns frames that were hidden behind a false header, which is dropped once the line is quiet.
         """
         frames: list[MavlinkFrame] = []
         if self._splitter.is_waiting and now >= self._last_byte_at + _LINE_SILENCE_S:
             frames = self._splitter.reset()
             self._note(frames, now)
-        # Looked at ten times a second rather than after each byte: a timer for each would cost more than the frames.
+        # Checked ten times a second rather than after each byte: a timer per byte would cost more than the frames.
         self._look_at = now + _LINE_SILENCE_S
         if now >= self._silent_at:
-            self.ended = f"no MAVLink for {self._patience_s} s"
+            self.ended = f"no MAVLink for {self._timeout_s} s"
         elif self._is_harakiri and now >= self._probe_due:
             self._probe_due = now + _PROBE_INTERVAL_S
             if not is_conversing:
@@ -92,14 +92,14 @@ class MavlinkLine:
         return frames
 
     def next_deadline(self) -> float:
-        """Return when `tick` has something to do."""
+        """The time of the next `tick`."""
         deadline = min(self._silent_at, self._probe_due) if self._is_harakiri else self._silent_at
         return min(deadline, self._look_at) if self._splitter.is_waiting else deadline
 
     @property
-    def _patience_s(self) -> float:
+    def _timeout_s(self) -> float:
         return _HARAKIRI_ARMED_SILENCE_S if self._is_harakiri and self.armed else _SILENCE_S
 
     @property
     def _silent_at(self) -> float:
-        return self._heard_at + self._patience_s
+        return self._heard_at + self._timeout_s

@@ -4,7 +4,7 @@
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.msp.hazards import HAZARDS, RUN_LENGTH
 
-#: Who speaks: any ground station's ids; Harakiri answers to whoever asks.
+#: The ids of an ordinary ground station; Harakiri answers any sender.
 _SYSID, _COMPID = 255, 190
 _RUNS = tuple(bytes((hazard,)) * RUN_LENGTH for hazard in sorted(HAZARDS))
 

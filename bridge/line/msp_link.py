@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The request side of an MSP line: what may be sent when, how long to wait, what is still unanswered.
+"""The request side of an MSP line: when a request may be sent, how long to wait, which replies are pending.
 
-Harakiri's send ring holds 255 bytes and has no overflow check, so the sum of the replies that are still to come
-is bounded. A flight controller that stood still answers all at once what was asked meanwhile, so a request that timed
-out counts until something that was asked later is answered: requests are answered in their order.
-Waiting time follows the measured round trip, as in TCP: 7/8 old + 1/8 measured, doubled on a loss.
+Harakiri's send ring holds 255 bytes and has no overflow check, so the total size of pending replies is bounded. After
+a stall a flight controller answers all requests at once, in order, so a request that timed out stays pending until a
+later one is answered. The timeout follows the measured round trip, as in TCP: 7/8 old + 1/8 measured, doubled on a
+loss.
 """
 
 from collections import deque
@@ -17,29 +17,29 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from protocols.msp.hazards import is_clean
 
-#: Harakiri's ring less one heartbeat (25 bytes) that it may send of its own accord in AUTOSENSE, and some air.
+#: Harakiri's ring, less one heartbeat (25 bytes) that it may send unasked in AUTOSENSE, and a margin.
 MAX_OUTSTANDING_BYTES = 224
-#: The same at the speed of FrSky telemetry, which an armed Harakiri puts into the ring as well: 13 bytes eight times a
-#: second, and with GPS, barometer and time up to 85. While these bytes leave the ring two of its frames may join them.
+#: The same at the speed of FrSky telemetry, which an armed Harakiri puts into the same ring: 13 bytes eight times a
+#: second, up to 85 with GPS, barometer and time. Two of these frames may join the ring while the replies leave it.
 _OUTSTANDING_BESIDE_FRSKY = 140
 MIN_TIMEOUT_S = 0.06
 MAX_TIMEOUT_S = 1.0
-#: BEGIN and COMMIT erase and write flash: 100 ms and more during which the board does nothing else.
+#: BEGIN and COMMIT erase and write flash: the board stalls for 100 ms and more.
 EXCLUSIVE_TIMEOUT_S = 1.0
-#: Who stands still for longer is taken to have lost what it was asked: reset, or without power.
+#: After a longer stall, pending requests are assumed lost: the board was reset or lost power.
 LONGEST_STALL_S = 3.0
-#: What may be outstanding while it is not known whether it stands still: a resync and what follows need the rest.
+#: The limit while the board may be stalled: the rest of the ring is kept for a resync and what follows.
 _OUTSTANDING_IN_DOUBT = 64
 _FIRST_GUESS_S = 0.03
-#: After so long without a byte nothing more comes of a frame that has begun.
+#: After this long without a byte, an incomplete frame is given up.
 _LINE_SILENCE_S = 0.05
 _ANY_SIZE = 1 << 16
 _NO_COMMAND = -1
-#: An INAV that lost a frame's header reads the rest as typed by hand: a '#' and then silence for 100 ms opens its
-#: command line, an 'R' its boot loader. So after such a frame the line is not left silent: a harmless question follows.
+#: An INAV that lost a frame's header takes the rest for typed characters: '#' followed by 100 ms of silence opens its
+#: command line. So after a frame with such a byte the line is not left silent: a harmless request follows.
 _FOLLOW_UP_S = 0.04
 
-#: Of a Harakiri, which does not know the second one; others are not so short of room.
+#: On Harakiri, which does not know the second command; other boards have larger rings.
 _REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: FRAME_OVERHEAD}
 #: Fills a parser that waits for the rest of a cut frame (64 payload bytes and a checksum on an unpatched Harakiri),
 #: with whole harmless frames. Their order has no period: eleven times the same, read by a receiver at a twelfth of the
@@ -52,14 +52,14 @@ _RESYNC_COMMANDS = (
 PROBE = request(Msp.IDENT)
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
-#: Asked for nothing but the order of its answer, so nobody else may ask it. Harakiri answers with an error; who says
-#: nothing to what it does not know was never identified.
+#: Sent only for the order of its reply, so no other code may use it. Harakiri answers with an error frame; a board that
+#: ignores unknown commands is never identified.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 
 
 @dataclass(slots=True)
 class _Request:
-    """A request that was sent. No longer `awaited`, it may still be answered until the deadline."""
+    """A request that was sent. Once it is no longer `awaited`, a reply may still arrive until the deadline."""
 
     command: int
     reply_size: int
@@ -72,7 +72,7 @@ class _Request:
 class MspLink:
     """One MSP line. `baud` is None where the line has no speed (TCP, the built-in simulator).
 
-    `owed`: bytes of answers to others that may still come first.
+    `owed`: bytes of earlier replies that may still arrive first.
     """
 
     def __init__(self, baud: int | None, now: float, owed: int = 0) -> None:
@@ -93,9 +93,9 @@ class MspLink:
         self._resync_due = False
         self._last_byte_at = now
         self.last_heard_at = now
-        #: Set from the flight controller's INFO; 0: its parser never gives up on a cut frame.
+        #: From the flight controller's INFO; 0 if its parser never gives up on a cut frame.
         self.receiver_timeout_s = 0.0
-        #: Set where a frame may hold what a Harakiri must not be sent even in frames.
+        #: Set for boards that accept any byte inside a frame.
         self.any_byte = False
         self._follow_up_at: float | None = None
         self._risky: int | None = None  # the command of the frame that is followed up
@@ -105,37 +105,37 @@ class MspLink:
 
     @property
     def outstanding_bytes(self) -> int:
-        """Reply bytes that may still come."""
+        """The total size of the pending replies, bytes."""
         return sum(sent.reply_size for sent in self._sent)
 
     def unanswered(self) -> list[tuple[float, int]]:
-        """Return when what may still be answered was asked, and the sizes of the replies."""
+        """The pending replies: when each was requested, and its size."""
         return [(sent.sent_at, sent.reply_size) for sent in self._sent]
 
     @property
     def round_trip_s(self) -> float:
-        """Smoothed time from a request's last byte on the wire to its reply."""
+        """The smoothed time from a request's last byte on the wire to its reply."""
         return self._round_trip_s
 
     @property
     def skipped_bytes(self) -> int:
-        """Bytes that belonged to no frame."""
+        """Bytes outside any frame."""
         return self._parser.skipped_bytes
 
     @property
     def bad_checksums(self) -> int:
-        """Frames that came in damaged."""
+        """Frames that arrived damaged."""
         return self._parser.bad_checksums
 
     def awaits(self, commands: frozenset[int]) -> bool:
-        """Tell whether a reply to one of `commands` is waited for, or will be when there is room to ask."""
+        """True if a reply to one of `commands` is awaited, or its request is queued."""
         return any(sent.awaited and sent.command in commands for sent in self._sent) or any(
             message.command in commands for message in self._waiting
         )
 
     @property
     def room(self) -> int:
-        """How long the reply to a request that goes out now may be."""
+        """The largest reply that a request may have to be sent now, bytes."""
         if not self._sent and not self._waiting:
             return _ANY_SIZE
         if self._waiting or self._is_exclusive():
@@ -145,23 +145,23 @@ class MspLink:
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""
         if not (self.any_byte or is_clean(message.frame)):
-            # By construction this cannot happen (protocols.msp.hazards); if it did, silence is the safe answer.
+            # Impossible by construction (protocols.msp.hazards); if it did happen, sending nothing is safe.
             raise AssertionError(f"frame with a hazard byte: {message.frame.hex()}")
         self._waiting.append(message)
         self._flush(now)
 
     def take_output(self) -> list[bytes]:
-        """Return what is to be written to the port, in order."""
+        """The bytes to be written to the port, in order."""
         output, self._output = self._output, []
         return output
 
     def receive(self, data: bytes, now: float) -> list[MspFrame]:
-        """Take bytes from the port; return the replies found, matched with their requests."""
+        """Take bytes from the port; return the replies, matched with their requests."""
         self._last_byte_at = now
         return self._take(self._parser.feed(data), now)
 
     def tick(self, now: float) -> list[MspFrame]:
-        """Give up on requests whose time is over; return replies that were hidden behind a false header."""
+        """Time out requests; return replies that were hidden behind a false header."""
         if self._follow_up_at is not None and now >= self._follow_up_at:
             self._ask(_QUESTION, now)
         if not any(now >= sent.deadline for sent in self._sent):
@@ -183,13 +183,13 @@ class MspLink:
         return replies
 
     def reply_deadline(self, commands: frozenset[int], now: float) -> float:
-        """Return when to stop waiting for a reply to one of `commands`."""
+        """The time at which a reply to one of `commands` counts as lost."""
         deadlines = [sent.deadline for sent in self._sent if sent.awaited and sent.command in commands]
         queued = any(message.command in commands for message in self._waiting)
         return max(deadlines, default=now + self._timeout_s() if queued else now)
 
     def next_deadline(self) -> float | None:
-        """Return when `tick` has something to do."""
+        """The time of the next `tick`; None while nothing is pending."""
         deadlines = [sent.deadline for sent in self._sent]
         if self._follow_up_at is not None:
             deadlines.append(self._follow_up_at)
@@ -222,7 +222,7 @@ class MspLink:
                 return
             if not self._has_room(message.reply_size):
                 if not any(sent.awaited for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
-                    # Only what was given up is in the way: the answer to a short question behind it says it is over.
+                    # Only abandoned requests block this one: the reply to a short request behind them clears them.
                     self._ask(_QUESTION, now)
                 return
             self._waiting.popleft()
@@ -233,9 +233,9 @@ class MspLink:
         if self.any_byte and not is_clean(message.frame):
             self._risky = message.command
             self._follow_up_at = self._line_free_at + _FOLLOW_UP_S
-        patience = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
+        timeout_s = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
         reply_time = (self.outstanding_bytes + message.reply_size) * self._byte_s
-        deadline = self._line_free_at + reply_time + patience
+        deadline = self._line_free_at + reply_time + timeout_s
         self._sent.append(
             _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
         )
@@ -256,7 +256,7 @@ class MspLink:
         self._output.append(data)
 
     def _take(self, frames: list[MspFrame], now: float) -> list[MspFrame]:
-        """Settle replies; a request that is heard is our own, from a line that is looped back."""
+        """Match the replies; requests are our own, from a looped-back line."""
         replies = [frame for frame in frames if frame.direction is not Direction.REQUEST]
         for reply in replies:
             self.last_heard_at = now
@@ -266,7 +266,7 @@ class MspLink:
         return replies
 
     def _settle(self, reply: MspFrame, now: float) -> None:
-        """Match a reply with its request. What was sent before that one is not answered any more."""
+        """Match a reply with its request. Earlier requests will not be answered any more."""
         alike = [sent for sent in self._sent if sent.command == reply.command]
         if not alike:
             return
@@ -282,7 +282,7 @@ class MspLink:
         self._losses_in_a_row = 0
         self._backoff = 1.0
         if answered is not oldest:
-            # Either may have been answered: this one is not waited for any more, and counts on.
+            # Either of them may have been answered: this one is no longer awaited, but stays pending.
             answered.awaited = False
         elif not answered.exclusive:
             measured = max(now - answered.sent_at, 0.0)

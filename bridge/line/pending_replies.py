@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a flight controller that stands still may answer all at once when it goes on. Sans-IO.
+"""Replies that a stalled flight controller may send all at once when it resumes. Sans-IO.
 
-Harakiri's send ring has no overflow check (bridge.msp_link). Whoever is silent is searched for, and each question that
-it is asked at its own speed may still be answered: with what was asked before, they must fit the ring.
+Harakiri's send ring has no overflow check (bridge.line.msp_link). While a silent board is searched for, it may still
+answer each probe at its own speed later: together with earlier requests, these replies must fit the ring.
 """
 
 from bridge.line.msp_link import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES
@@ -19,15 +19,15 @@ class PendingReplies:
         self._owed.setdefault(speed, []).append((asked_at + LONGEST_STALL_S, size))
 
     def room(self, speed: int | None, now: float) -> int:
-        """Return how long the reply to another question may be."""
+        """The largest reply that still fits, bytes."""
         return MAX_OUTSTANDING_BYTES - self.size(speed, now)
 
     def size(self, speed: int | None, now: float) -> int:
-        """Return how many bytes may still come."""
+        """The bytes that may still arrive."""
         return sum(size for _, size in self._present(speed, now))
 
     def questions(self, speed: int | None, now: float) -> int:
-        """Return how many questions may still be answered."""
+        """The number of requests that may still be answered."""
         return len(self._present(speed, now))
 
     def heard(self, speed: int | None, size: int, now: float) -> None:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which telemetry question is asked when. Sans-IO.
+"""The schedule of telemetry polls. Sans-IO.
 
-Each poll has an interval at which it is wanted: what ground stations asked for, or what the bridge itself needs. The
-line bends these intervals: questions and replies together may take a share of its bytes (missions and commands have
-the rest), and lost replies slow all polls down until they come again. A question is asked again only when its reply
-has come or is given up, so a long round trip slows the fast ones down by itself.
+Each poll has a requested interval: the fastest that a ground station asked for or the bridge itself needs. The line
+may stretch it: requests and replies together get a share of its bytes (missions and commands have the rest), and lost
+replies slow all polls down until they arrive again. A poll is repeated only after its reply has arrived or timed out,
+so a long round trip slows the fast ones down by itself.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,28 +16,28 @@ from bridge.line.msp_link import MspLink
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, frame_size, request
 
-#: What telemetry may take of the line, both directions added.
+#: Telemetry's share of the line, both directions added.
 _LINE_SHARE = 0.6
-#: Questions may come so close together that they take their share of this time at once.
+#: Requests may use their share of this time in one burst.
 _BURST_S = 0.05
-#: What STATUS gets of that, if it needs it: arming must be noticed at any speed.
+#: The part of that share reserved for STATUS: arming must be noticed at any speed.
 _STATUS_SHARE = 0.25
-#: A line without a speed (TCP) has an UART behind it somewhere: Harakiri's default.
+#: For a line without a speed (TCP), which has a UART behind it somewhere: Harakiri's default.
 _ASSUMED_BAUD = 115200
-#: While a mission is under way telemetry goes on at this part of its rates.
+#: The factor for all rates during a mission transfer.
 _BESIDE_MISSIONS = 0.2
-#: No poll is slowed down beyond this.
+#: No poll gets slower than this.
 _SLOWEST_S = 5.0
-#: Questions that are due within so short a time go out together: each wake-up has its price.
+#: Requests due within this time go out together: every wake-up costs CPU time.
 _GATHER_S = 0.01
-#: A lost reply costs a tenth of the rates, each one that comes gives a little back: 1 % lost changes nothing, 10 % cost
-#: half the rates.
+#: A lost reply reduces all rates by a tenth, each received one restores a little: 1 % losses change nothing, 10 % halve
+#: the rates.
 _LOSS_FACTOR = 0.9
 _RECOVERY = 0.005
 _WORST_QUALITY = 0.1
-#: So many unanswered questions in a row, while others are answered, are no bad luck: then it is asked less and less.
-_PATIENCE = 4
-#: So many error frames in a row say that the flight controller does not know the command: one may be line noise.
+#: After this many unanswered requests in a row, while others are answered, a poll backs off.
+_TOLERATED_MISSES = 4
+#: After this many error frames in a row the command is unknown to the board; one alone may be line noise.
 _REFUSALS = 2
 _MAX_DOUBLINGS = 6
 _HALVINGS = 12
@@ -46,7 +46,7 @@ _LEAST_SCALE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Poll:
-    """One telemetry question: its frame, the longest reply's payload, and the interval that the bridge itself needs."""
+    """One telemetry request. reply_payload: the longest, bytes. needed_s: the interval that the bridge itself needs."""
 
     command: Msp
     frame: bytes
@@ -54,7 +54,7 @@ class Poll:
     needed_s: float
 
 
-#: STATUS comes most often: arming must be noticed while a mission transfer runs.
+#: STATUS comes most often: arming must be noticed during a mission transfer.
 POLLS = (
     Poll(Msp.STATUS, request(Msp.STATUS), 11, 0.25),
     Poll(Msp.ATTITUDE, request(Msp.ATTITUDE), 8, 1.0),
@@ -66,13 +66,13 @@ POLLS = (
     Poll(Msp.WP, request(Msp.WP, b"\0"), 21, 2.0),
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
 )
-#: Asked where a mission is flown.
+#: For boards that report their progress in a mission.
 NAV_POLL = Poll(Msp.NAV_STATUS, request(Msp.NAV_STATUS), 7, 0.5)
 
 
 @dataclass(slots=True)
 class _Slot:
-    """One poll's place in the schedule. `size`: bytes of its reply, guessed until one was seen."""
+    """One poll in the schedule. `size`: bytes of its reply, estimated until one was seen."""
 
     poll: Poll
     commands: frozenset[int]
@@ -87,32 +87,32 @@ class _Slot:
 
     @property
     def cost(self) -> int:
-        """Bytes of a question and its reply."""
+        """The bytes of a request and its reply."""
         return len(self.poll.frame) + self.size
 
     def set_interval(self, interval_s: float) -> None:
-        """Ask it so often from now on."""
+        """Change the interval."""
         self.interval_s = interval_s
         self.due = inf if interval_s == inf else self.asked_at + interval_s
 
     def asked(self, now: float) -> None:
-        """Take note that it is asked. The next time counts from when it was due, unless that is long past."""
+        """The request was sent. The next is due one interval after this one was due, unless that is long past."""
         self.is_asked = True
         self.asked_at = now if now >= self.due + self.interval_s else self.due
         self.due = self.asked_at + self.interval_s
 
     def may_be_asked_at(self, link: MspLink, room: int) -> float:
-        """Return when, if the link does not change before; infinity: not before it does."""
+        """The time at which the link would take it; infinity if the link must change first."""
         if self.is_asked and link.awaits(self.commands):
             return inf
         if self.size <= room:
             return self.due
-        # The link has a queue: a STATUS that is late is put into it, before what a mission has still to say.
+        # A late STATUS joins the link's queue, ahead of later mission requests.
         return self.due + self.interval_s if self.poll.command is Msp.STATUS else inf
 
 
 class PollSchedule:
-    """The schedule of one line: `begin` when a flight controller is found, then `ask` whenever time has passed."""
+    """The schedule of one line: `begin` when a flight controller is found, then `ask` at each deadline."""
 
     def __init__(self) -> None:
         self._wanted: Mapping[Msp, float] = {}
@@ -126,11 +126,11 @@ class PollSchedule:
 
     @property
     def quality(self) -> float:
-        """What losses leave of the rates, 0.1..1."""
+        """The factor that losses apply to the rates, 0.1..1."""
         return self._quality
 
     def begin(self, baud: int | None, polls: Sequence[Poll] = POLLS) -> None:
-        """A flight controller is there: ask it everything once, then as often as wanted."""
+        """Start polling a flight controller: everything once, then at the requested intervals."""
         self._budget = (baud or _ASSUMED_BAUD) / 10 * _LINE_SHARE
         self._quality = 1.0
         self._lost_before = 0
@@ -141,18 +141,18 @@ class PollSchedule:
         self._fit()
 
     def want(self, wanted: Mapping[Msp, float]) -> None:
-        """Set what ground stations want, seconds by command; the bridge's own needs are added."""
+        """Set the requested intervals, seconds by command; the bridge's own needs are added."""
         if wanted != self._wanted:
             self._wanted = wanted
             self._fit()
 
     def interval_s(self, command: Msp) -> float | None:
-        """Return how often it is asked at present; None: not at all."""
+        """The present interval of a poll, seconds; None if it is not polled."""
         slot = self._slots.get(command)
         return None if slot is None or slot.interval_s == inf else slot.interval_s
 
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
-        """Send what is due, as long as the link has room for it."""
+        """Send the requests that are due, as far as the link has room."""
         self._look_at(link, beside_missions)
         limit = now
         while now >= self._free_at:
@@ -172,12 +172,12 @@ class PollSchedule:
             limit = now + _GATHER_S
 
     def answered(self, frame: MspFrame) -> None:
-        """Take note of a reply."""
+        """Take a reply."""
         slot = self._slots.get(frame.command)
         if slot is None:
             return
         slot.is_asked = False
-        is_bent = slot.misses > _PATIENCE or self._quality < 1
+        is_bent = slot.misses > _TOLERATED_MISSES or self._quality < 1
         slot.misses = 0
         self._quality = min(self._quality + _RECOVERY, 1.0)
         known = slot.size, slot.refusals
@@ -191,7 +191,7 @@ class PollSchedule:
             self._bend()
 
     def next_deadline(self, link: MspLink) -> float | None:
-        """Return when `ask` has something to send; None: not before a reply."""
+        """The time of the next request; None if a reply must arrive first."""
         room = link.room
         earliest = inf
         for slot in self._slots.values():
@@ -207,7 +207,7 @@ class PollSchedule:
             self._bend()
 
     def _fit(self) -> None:
-        """Find the part of the wanted rates that the line bears."""
+        """Scale the requested rates to the line."""
         for slot in self._slots.values():
             wanted_s = min(self._wanted.get(slot.poll.command, inf), slot.poll.needed_s)
             slot.wanted_s = wanted_s if slot.refusals < _REFUSALS else inf
@@ -232,5 +232,5 @@ class PollSchedule:
     def _interval(self, slot: _Slot, scale: float) -> float:
         is_status = slot.poll.command is Msp.STATUS
         slowest = slot.cost / (self._budget * _STATUS_SHARE) if is_status else _SLOWEST_S
-        patience = 2.0 ** min(max(slot.misses - _PATIENCE, 0), _MAX_DOUBLINGS)
+        patience = 2.0 ** min(max(slot.misses - _TOLERATED_MISSES, 0), _MAX_DOUBLINGS)
         return min(slot.wanted_s / scale * patience, max(slot.wanted_s, slowest))

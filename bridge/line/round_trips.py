@@ -8,7 +8,7 @@ BOUNDS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 
 class RoundTrips:
-    """`counts`: by class, the last one for what took longer than all bounds. `sum_s`: all of them together."""
+    """A histogram. `counts`: one per bound, and a last one for longer times. `sum_s`: the total, seconds."""
 
     def __init__(self) -> None:
         self.counts = [0] * (len(BOUNDS_S) + 1)

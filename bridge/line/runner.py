@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Carries out conversations, one at a time: two conversations about missions never mix on the wire."""
+"""Runs conversations one at a time, so that two of them never mix on the wire."""
 
 from collections import deque
 from collections.abc import Callable
@@ -22,8 +22,8 @@ from bridge.line.msp_link import MspLink
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
 
-#: A dying SD card may hang for ever, and what is asked of the flight controller waits behind it. Mission Planner waits
-#: for its final ack for 5 s.
+#: A failing SD card may hang for ever, and the flight controller's conversations wait behind it. Mission Planner waits
+#: 5 s for its final ack.
 _STORE_PATIENCE_S = 3.0
 
 
@@ -42,7 +42,7 @@ class Task(Generic[T]):
 class Runner:
     """Runs conversations in the order in which they were started. Time is passed in.
 
-    `on_store` is called with each effect that is meant for the store; its answer comes back by `store_answered`.
+    `on_store` gets each effect for the store; the reply comes back through `store_answered`.
     """
 
     def __init__(self, on_store: Callable[[StoreEffect], None]) -> None:
@@ -57,7 +57,7 @@ class Runner:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a conversation is under way."""
+        """True while a conversation is running."""
         return self._current is not None
 
     def start(
@@ -83,38 +83,38 @@ class Runner:
         self._mavlink = line
 
     def link_down(self, now: float) -> None:
-        """Tell the running conversation that its partner is gone."""
+        """The line is down: LinkLost is raised in the running conversation."""
         self._link = None
         self._mavlink = None
         if isinstance(self._awaited, Receive | Await | Pause):
             self._advance(LinkLost("the flight controller's port is gone"), now)
 
     def stop(self, now: float) -> None:
-        """Tell the running conversation to come to its end now; it may still speak to the flight controller."""
+        """Raise Stopped in the running conversation, which may still use the line to clean up."""
         if isinstance(self._awaited, Receive | Await | Pause):
             self._advance(Stopped("the bridge is stopping"), now)
 
     def received(self, frame: MspFrame, now: float) -> None:
-        """Take a reply from the flight controller; the running conversation gets it if it waits for it."""
+        """Pass on an MSP reply if the running conversation waits for it."""
         if isinstance(self._awaited, Receive) and frame.command in self._awaited.commands:
             self._advance(frame, now)
 
     def received_mavlink(self, frame: MavlinkFrame, now: float) -> None:
-        """Take a MAVLink frame from the flight controller, in the same way."""
+        """Pass on a MAVLink frame if the running conversation waits for it."""
         if isinstance(self._awaited, Await) and frame.msgid in self._awaited.msgids:
             self._advance(frame, now)
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
-        """Take the store's answer to an effect that was handed out; nobody waits for one that comes too late."""
+        """Pass on the store's reply to an effect; a reply after its timeout is ignored."""
         if effect is self._awaited:
             self._advance(answer, now)
 
     def tick(self, now: float) -> None:
-        """End waits whose time is over."""
+        """End a wait that has timed out."""
         if self._deadline is None or now < self._deadline:
             return
         if isinstance(self._awaited, Receive) and self._link is not None:
-            # The link may have sent the request later than it was handed over, or heard others meanwhile.
+            # The link may have sent the request later than it was handed over, or heard other replies meanwhile.
             deadline = self._link.reply_deadline(self._awaited.commands, now)
             if now < deadline:
                 self._deadline = deadline
@@ -122,23 +122,23 @@ class Runner:
         self._advance(None, now)
 
     def next_deadline(self) -> float | None:
-        """Return when `tick` has something to do."""
+        """The time of the next `tick`; None while nothing is awaited."""
         return self._deadline
 
     def _begin_next(self, now: float) -> None:
-        """Run what is queued; a loop, because all of it may end at once when there is no link."""
+        """Run the queue; a loop, because without a link every conversation may end at once."""
         while self._current is None and self._queue and not self._busy:
             self._current = self._queue.popleft()
             self._current.began_at = now
             self._run(None, now)
 
     def _advance(self, answer: object, now: float) -> None:
-        """Go on with the current conversation, and with the next ones when it ends."""
+        """Resume the current conversation, and start the next ones when it ends."""
         self._run(answer, now)
         self._begin_next(now)
 
     def _run(self, answer: object, now: float) -> None:
-        """Run the current conversation up to its next wait."""
+        """Run the current conversation until it waits again."""
         assert self._current is not None
         task = self._current
         conversation = task.conversation
@@ -151,7 +151,7 @@ class Runner:
                 if isinstance(effect, Send | Receive) and self._link is None:
                     answer = LinkLost("there is no link to the flight controller")
                 elif isinstance(effect, Transmit | Await) and self._mavlink is None:
-                    answer = LinkLost("the flight controller speaks MAVLink no more")
+                    answer = LinkLost("the flight controller no longer speaks MAVLink")
                 elif isinstance(effect, Transmit):
                     assert self._mavlink is not None
                     answer = self._mavlink.send(effect.packed)
@@ -184,7 +184,7 @@ class Runner:
             self._current = None
             raise
         self._current = None
-        # What on_done starts is run after it has returned, so that it sees a consistent state.
+        # Conversations started by on_done run after it has returned, so that it sees a consistent state.
         self._busy = True
         try:
             task.on_done(result, now)

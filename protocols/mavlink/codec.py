@@ -34,7 +34,7 @@ class MavlinkDecoder:
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """A message as bytes, before it is known to whom it goes. MAVLink 2 leaves trailing zeros out."""
+    """A payload, whole and as MAVLink 2 sends it (without trailing zeros); receivers differ only in the header."""
 
     msgid: int
     payload_v1: bytes

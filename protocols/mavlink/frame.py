@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splits a byte stream into MAVLink 1 and 2 frames (https://mavlink.io/en/guide/serialization.html).
 
-Frames are checked by CRC but not decoded: what is only passed on stays bytes.
+Frames are checked by CRC but not decoded: forwarding needs only the bytes.
 """
 
 import re
@@ -80,18 +80,17 @@ class MavlinkFrame:
 
 
 class MavlinkSplitter:
-    """Finds frames in a byte stream. Never raises: what is not a frame is counted and skipped.
+    """Finds frames in a byte stream. Never raises: other bytes are counted and skipped.
 
-    After a bad CRC the search goes on ONE byte later: a frame behind a false or cut header is not lost with it.
-    A header that cannot be one is given up at once: a message that nobody knows (its frame could not be checked), in
-    MAVLink 1 a size that its message cannot have, an incompatibility flag that we do not know (which the protocol
-    demands).
+    After a CRC failure the search resumes ONE byte later, so a frame behind a false or cut header is not lost.
+    A header is rejected at once if its message is unknown (the CRC could not be checked), if a MAVLink 1 size does
+    not fit the message, or if it has an unknown incompatibility flag, as the protocol requires.
 
-    Any other header is believed until its frame is there, or `reset`. A cut frame so holds back what follows it, by as
-    many bytes as were cut off, 279 at most. To give out whole frames from within an incomplete one would be wrong: a
-    log that is downloaded over MAVLink is full of them.
+    Any other header is trusted until its frame is complete, or until `reset`. A cut frame therefore delays the bytes
+    behind it, 279 at most. Frames inside an incomplete frame are not returned: a log downloaded over MAVLink contains
+    whole frames as data.
 
-    No CRC covers a signature. If bytes are missing in it, the next frame has begun within: it is searched like noise.
+    A signature has no CRC. If part of it is missing, the next frame starts inside it, so it is scanned like noise.
     """
 
     def __init__(self) -> None:
@@ -101,15 +100,15 @@ class MavlinkSplitter:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a frame has begun that is not whole."""
+        """True while a frame is incomplete."""
         return bool(self._buffer)
 
     def feed(self, data: bytes) -> list[MavlinkFrame]:
-        """Take bytes as they come and return the frames that they complete."""
+        """Take received bytes; return the frames that they complete."""
         return self._split(self._buffer + data, is_end=False)
 
     def reset(self) -> list[MavlinkFrame]:
-        """Give up on an incomplete frame (silence, end of a datagram); return the frames its bytes were hiding."""
+        """Drop an incomplete frame (silence, end of a datagram); return the frames found in its bytes."""
         return self._split(self._buffer, is_end=True)
 
     def _split(self, data: bytes, *, is_end: bool) -> list[MavlinkFrame]:

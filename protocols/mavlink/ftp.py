@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MAVLink FTP is not offered; a request is refused at once so that nobody waits (https://mavlink.io/en/services/ftp.html)."""
+"""MAVLink FTP is not offered: requests get a NAK at once (https://mavlink.io/en/services/ftp.html)."""
 
 import struct
 from collections.abc import Sequence

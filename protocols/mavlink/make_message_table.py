@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m protocols.mavlink.make_message_table`: print message_table.py anew, from pymavlink's dialect `all`.
+"""`python -m protocols.mavlink.make_message_table`: print a new message_table.py from pymavlink's dialect `all`.
 
 A frame can only be checked with its message's CRC_EXTRA, so that every message counts that any flight controller may
 send; pymavlink's own module of that dialect would cost the daemon 6 MB on top of the one that it speaks.
@@ -55,7 +55,7 @@ def _format(msgid: int, message: Message) -> MessageFormat:
 
 
 def _places(message: Message) -> dict[str, int]:
-    """Return where in the payload each field begins."""
+    """The offset of each field in the payload."""
     places: dict[str, int] = {}
     at = 0
     for name, kind, count in zip(

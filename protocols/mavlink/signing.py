@@ -2,7 +2,7 @@
 """MAVLink 2 message signing (https://mavlink.io/en/guide/message_signing.html).
 
 A signed frame ends in 13 bytes: a link id, a timestamp of 48 bits in 10 us since 2015-01-01, and the first 6 bytes of
-the SHA-256 of key, frame, link id and timestamp. It tells who sent a frame and that it is new; it hides nothing.
+the SHA-256 of key, frame, link id and timestamp. It proves the sender and rules out replays; nothing is encrypted.
 """
 
 from collections.abc import Callable
@@ -32,12 +32,12 @@ def key_from_passphrase(passphrase: str) -> bytes:
 
 
 def ticks(unix_s: float) -> int:
-    """Return a time in seconds since the Unix epoch as a timestamp; 0 for what was before 2015."""
+    """The signing timestamp of a Unix time in seconds; 0 before 2015."""
     return max(0, int((unix_s - EPOCH_UNIX_S) * TICKS_PER_S))
 
 
 class Timestamps:
-    """What we sign with: the time, but never the same twice and never back, whatever the clock does.
+    """The timestamps of outgoing frames: the time, but strictly increasing even if the clock steps back.
 
     `clock` returns seconds since the Unix epoch. `at_least`: the last one of an earlier run.
     """
@@ -56,7 +56,7 @@ class Timestamps:
         return self.last
 
     def follow(self, timestamp: int) -> None:
-        """Take over the time of somebody who has the key, and a clock that is ahead of ours."""
+        """Adopt the timestamp of a peer with the key whose clock is ahead of ours."""
         self.last = max(self.last, timestamp)
 
 
@@ -71,7 +71,7 @@ class Check(Enum):
 
 
 class Signing:
-    """One key, and the timestamps that were used with it. Whoever shares the key shares this."""
+    """One key and the timestamps used with it. Links with the same key share one instance."""
 
     def __init__(self, key: bytes, timestamps: Timestamps) -> None:
         self._key = key

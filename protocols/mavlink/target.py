@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whom a frame is meant for, read from its bytes without decoding it."""
+"""The target of a frame, read from its bytes without decoding it."""
 
 from collections.abc import Sequence
 

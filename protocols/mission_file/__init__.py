@@ -10,9 +10,9 @@ __all__ = ["MissionFileError", "read_mission_file", "write_qgc_wpl"]
 
 
 def read_mission_file(data: bytes, name: str) -> list[MissionItem]:
-    """Read a QGC WPL 110 or a QGroundControl plan, told apart by what is in it; home is item 0.
+    """Read a QGC WPL 110 or a QGroundControl plan, recognised by content; home is item 0.
 
-    MissionFileError says in one sentence what is wrong, where in the file called `name`, and what to do.
+    Raises MissionFileError, one sentence: what is wrong, where in the file `name`, and what to do.
     """
     try:
         text = data.decode("utf-8-sig")

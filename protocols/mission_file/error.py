@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong with a mission file, in words for the person who gave it to us."""
+"""The error for an unreadable mission file, worded for the user."""
 
 _LONGEST_QUOTE = 24
 
 
 class MissionFileError(Exception):
-    """One sentence: which file, where in it, what is wrong, what to do about it."""
+    """One sentence: the file, the place in it, the problem, the remedy."""
 
     def __init__(self, name: str, where: str, what: str, remedy: str) -> None:
         place = f"{name}, {where}" if where else name
@@ -13,7 +13,7 @@ class MissionFileError(Exception):
 
 
 def shown(found: object) -> str:
-    """Quote what was found in a file: printable, short, on one line."""
+    """Quote text from a file: printable, short, on one line."""
     if isinstance(found, list | dict):
         return "a list" if isinstance(found, list) else "an object"
     text = ascii(found)

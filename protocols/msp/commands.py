@@ -25,7 +25,7 @@ class Msp(IntEnum):
 
 
 class MspAction(IntEnum):
-    """What is done on the ground only: the firmware does not look whether it flies (serial.c)."""
+    """Commands for the ground only: the firmware would carry them out in flight, too (serial.c)."""
 
     ACC_CALIBRATION = 205
     MAG_CALIBRATION = 206

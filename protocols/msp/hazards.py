@@ -10,7 +10,7 @@ RUN_LENGTH = 3
 
 
 def is_clean(frame: bytes) -> bool:
-    """Tell whether no hazard byte stands anywhere in `frame`: then no run can form, at borders or by loss either."""
+    """True if `frame` contains no hazard byte, so that no run can form, not even across frames or after a loss."""
     return HAZARDS.isdisjoint(frame)
 
 

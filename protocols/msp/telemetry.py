@@ -24,7 +24,7 @@ _MIN_CHANNELS, _MAX_CHANNELS = 4, 18
 
 
 class Sensor(IntFlag):
-    """Bits of MSP_STATUS: what is on board and answers, the same on all firmware."""
+    """Bits of MSP_STATUS: the sensors that are fitted and respond; the same on all firmware."""
 
     ACCELEROMETER = 1
     BAROMETER = 2
