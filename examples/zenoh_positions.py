@@ -19,8 +19,8 @@ def main(endpoint: str) -> None:
     newest: dict[str, int] = {}
 
     def heard(sample: zenoh.Sample) -> None:
-        if sample.encoding != zenoh.Encoding.APPLICATION_JSON:
-            return  # a vehicle may be set to CBOR; cbor2.loads() reads that
+        if not str(sample.encoding).startswith("application/json"):
+            return  # a vehicle may be set to CBOR: docs/zenoh.md
         key = str(sample.key_expr)
         vehicle = key.split("/")[1]
         position = json.loads(sample.payload.to_bytes())
@@ -30,7 +30,7 @@ def main(endpoint: str) -> None:
         place = (position["lat_deg"], position["lon_deg"], position["height_m"])
         print(f"{vehicle}: lat, lon, height {place}" + (f", {lost} lost before" if lost > 0 else ""), flush=True)
 
-    with zenoh.open(config) as session, session.declare_subscriber("fleet/*/telemetry/position", heard):
+    with zenoh.open(config) as session, session.declare_subscriber("fleet/*/v1/telemetry/position", heard):
         try:
             while True:
                 time.sleep(1)

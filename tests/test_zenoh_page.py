@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from service.zenoh_link.compact import SCHEMAS as FOLDER
 from service.zenoh_link.keys import KEYS, VERSION, ZenohKey
-from service.zenoh_link.schema_files import FOLDER
 
 PAGE = (Path(__file__).parents[1] / "docs" / "zenoh.md").read_text()
 SECTIONS = dict(re.findall(r"^##+ ([^\n]*)\n(.*?)(?=^##+ |\Z)", PAGE, re.MULTILINE | re.DOTALL))

@@ -123,7 +123,7 @@ def push_mission(file: Path, names: tuple[str, ...], to_all: bool, as_json: bool
         delivery = FleetPush.of(chosen(bridges, names, prefix), bridges)
         try:
             with progress_bars(delivery, item_count) as show:
-                push(session, prefix, delivery, mission, show)
+                push(session, prefix, delivery, bridges, mission, show)
         except KeyboardInterrupt:
             what = "stopped; what has begun goes on there: `naze-bridge fleet list` tells what each vehicle holds"
             click.echo(f"naze-bridge: {what}", err=True)
@@ -153,7 +153,8 @@ def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **wh
     if to_output and (len(names) != 1 or as_json):
         raise click.UsageError("standard output takes one mission: name one --vehicle, and leave --json away")
     with _session(where) as (session, prefix):
-        held = pull(session, prefix, chosen(alive(session, prefix), names, prefix))
+        bridges = alive(session, prefix)
+        held = pull(session, prefix, chosen(bridges, names, prefix), bridges)
     for each in held:
         if each.error is None and to_output:
             click.echo(write_qgc_wpl(each.items), nl=False)

@@ -1,22 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What comes over zenoh, as plain data that may be printed. Strangers publish, too: nothing here raises."""
 
-import json
 from typing import Any
 
 import cbor2
 import zenoh
 
 from service.mission_data import Json
-
-_CBOR = "application/cbor"
+from service.zenoh_link.payload import decoded
 
 
 def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
     """Return the object in a payload, JSON or CBOR as its encoding says; None if there is none."""
-    data = sample.payload.to_bytes()
     try:
-        value = cbor2.loads(data) if str(sample.encoding).startswith(_CBOR) else json.loads(data)
+        value = decoded(sample.payload.to_bytes(), str(sample.encoding))
     except (ValueError, RecursionError, cbor2.CBORError):
         return None
     return value if isinstance(value, dict) else None

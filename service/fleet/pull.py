@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the vehicles' flight controllers hold, brought home."""
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -9,11 +10,12 @@ import zenoh
 from protocols.mission_item import MissionItem
 from service.fleet.payload import decode, part, text, whole
 from service.fleet.session import ask
+from service.fleet.vehicle import BridgeState, replier
 from service.mission_data import mission_items
 from service.zenoh_link.keys import MISSION_CURRENT, full
 
 #: The bridge knows what is held, or reads it first: some seconds at 9600 baud.
-_PATIENCE_S = 15.0
+_TIMEOUT_S = 15.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,23 +29,22 @@ class Held:
     error: str | None = None
 
 
-def pull(session: zenoh.Session, prefix: str, names: Collection[str]) -> list[Held]:
-    """Ask the vehicles what they hold; the answers by name, one for each."""
+def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeState]) -> list[Held]:
+    """Ask the vehicles what they hold; the answers by name, one for each. What a storage replies is not believed."""
+    used = Counter(bridge.vehicle for bridge in bridges)
     held: dict[str, Held] = {}
-    twice: set[str] = set()
     # One question to all is as quick as one to the slowest.
     only = next(iter(names)) if len(names) == 1 else "*"
-    for reply in ask(session, full(prefix, only, MISSION_CURRENT.suffix), timeout_s=_PATIENCE_S):
-        if reply.ok is None:
+    for reply in ask(session, full(prefix, only, MISSION_CURRENT.suffix), timeout_s=_TIMEOUT_S):
+        bridge = replier(reply)
+        if reply.ok is None or bridge is None or bridge not in bridges or bridge.vehicle not in names:
             continue
-        name = str(reply.ok.key_expr).split("/")[1]
-        if name not in names:
-            continue
-        if name in held:
-            twice.add(name)
-        held[name] = _held(name, reply.ok)
-    for name in twice:
-        held[name] = Held(name, error="several bridges use this name: give each its own (zenoh.vehicle)")
+        held[bridge.vehicle] = _held(bridge.vehicle, reply.ok)
+        if len(held) == len(names):
+            break
+    for name in names:
+        if used[name] > 1:
+            held[name] = Held(name, error="several bridges use this name: give each its own (zenoh.vehicle)")
     silent = "it does not tell: its bridge hangs, or the router's access control denies the question"
     return [held.get(name) or Held(name, error=silent) for name in names]
 

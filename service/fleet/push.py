@@ -5,14 +5,14 @@
 """
 
 import queue
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
 import zenoh
 
 from service.fleet.payload import decode, part, text, whole
 from service.fleet.session import ask, send_query
-from service.fleet.vehicle import BridgeState, bridge_of
+from service.fleet.vehicle import BridgeState, bridge_of, replier
 from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
 
@@ -105,7 +105,12 @@ class FleetPush:
 
 
 def push(
-    session: zenoh.Session, prefix: str, fleet: FleetPush, mission: bytes, show: Callable[[FleetPush], None]
+    session: zenoh.Session,
+    prefix: str,
+    fleet: FleetPush,
+    bridges: Collection[BridgeState],
+    mission: bytes,
+    show: Callable[[FleetPush], None],
 ) -> None:
     """Send the mission to all and wait until each is done; `show` is called whenever something has changed."""
     events: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -125,7 +130,8 @@ def push(
         if not fleet.vehicles[name].is_done:
             # Its token does not tell: that of a vehicle which has just died may still be there.
             state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_PATIENCE_S)
-            fleet.ended(name, is_alive=any(reply.ok is not None for reply in state))
+            # Neither does a storage, which goes on answering for a vehicle that has died.
+            fleet.ended(name, is_alive=any(replier(reply) in bridges for reply in state))
 
     def start(name: str) -> None:
         send_query(

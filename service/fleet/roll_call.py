@@ -5,7 +5,7 @@ import zenoh
 
 from service.fleet.payload import decode_reply
 from service.fleet.session import FleetError, ask
-from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, vehicle_of
+from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, replier, vehicle_of
 from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, full
 
@@ -27,7 +27,7 @@ def roll_call(session: zenoh.Session, prefix: str) -> list[Vehicle]:
     # None to hear, nothing to wait for.
     if bridges:
         for reply in ask(session, full(prefix, "*", STATE.suffix), timeout_s=_PATIENCE_S):
-            state, bridge = decode_reply(reply), _replier(reply)
+            state, bridge = decode_reply(reply), replier(reply)
             if state is not None and bridge in bridges:
                 states[bridge] = state
                 if len(states) == len(bridges):
@@ -48,10 +48,3 @@ def chosen(bridges: set[BridgeState], names: tuple[str, ...], prefix: str) -> li
 
 def _are(names: list[str]) -> str:
     return f"is {names[0]}" if len(names) == 1 else f"are {', '.join(names)}"
-
-
-def _replier(reply: zenoh.Reply) -> BridgeState | None:
-    """Return whose reply it is: its key names the vehicle, its sender the session."""
-    if reply.ok is None or reply.replier_id is None:
-        return None
-    return BridgeState(str(reply.ok.key_expr).split("/")[1], str(reply.replier_id.zid))

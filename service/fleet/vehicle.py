@@ -5,9 +5,11 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import zenoh
+
 from service.fleet.payload import flag, number, text, whole
 from service.mission_data import Json
-from service.zenoh_link.keys import ALIVE
+from service.zenoh_link.keys import ALIVE, vehicle_in
 from service.zenoh_link.settings import ZenohSettingsError, check_name
 
 
@@ -45,13 +47,20 @@ class Vehicle:
 def bridge_of(key: str, prefix: str) -> BridgeState | None:
     """Return whose liveliness token a key is; None if it is none that a bridge of ours has."""
     match key.split("/"):
-        case [first, name, middle, session_id] if first == prefix and middle == ALIVE:
+        case [first, name, *middle, session_id] if first == prefix and "/".join(middle) == ALIVE:
             try:
                 check_name("vehicle", name)
             except ZenohSettingsError:
                 return None
             return BridgeState(name, session_id)
     return None
+
+
+def replier(reply: zenoh.Reply) -> BridgeState | None:
+    """The bridge that sent a reply: its key names the vehicle, its sender the session. A storage is none."""
+    if reply.ok is None or reply.replier_id is None:
+        return None
+    return BridgeState(vehicle_in(reply.ok.key_expr), str(reply.replier_id.zid))
 
 
 def vehicle_of(bridge: BridgeState, state: Json | None) -> Vehicle:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One setting: its name, what it means, and how a value is read."""
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -166,3 +167,24 @@ class Several:
     def from_text(self, text: str) -> object:
         """Take its words."""
         return text.split()
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of one line, {name = value}."""
+
+    wanted: str
+    parse: Callable[[object], object]
+
+    def read(self, value: object, folder: Path) -> object:
+        """Read a table."""
+        if not isinstance(value, dict):
+            raise _wrong(value, f"a table, {self.wanted}")
+        return self.parse(value)
+
+    def from_text(self, text: str) -> object:
+        """Read the table as TOML."""
+        try:
+            return tomllib.loads(f"table = {text}")["table"]
+        except tomllib.TOMLDecodeError:
+            return text

@@ -7,7 +7,7 @@ from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.fc.states import Autopilot
 from service.links.connection import parse_fc
 from service.links.write_access import parse_link
-from service.settings.key import Choice, FileName, Key, Several, Text, Unfit, Whole, YesNo
+from service.settings.key import Choice, FileName, Key, Several, Table, Text, Unfit, Whole, YesNo
 from service.settings.settings import (
     DEFAULT_GCS,
     DEFAULT_LOG_LEVEL,
@@ -15,7 +15,7 @@ from service.settings.settings import (
     TlogLimits,
 )
 from service.web.settings import DEFAULT_LISTEN, parse_listen
-from service.zenoh_link.settings import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, check_name
+from service.zenoh_link.settings import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, Profile, check_name, check_rates
 
 LOG_LEVELS = ("debug", "info", "warning", "error")
 _LIMITS = TlogLimits()
@@ -106,6 +106,18 @@ KEYS = (
         Choice([each.value for each in PayloadEncoding], PayloadEncoding),
         "How payloads are written.",
         f'"{PayloadEncoding.JSON.value}"',
+    ),
+    Key(
+        "zenoh.profile",
+        Choice([each.value for each in Profile], Profile),
+        "What the link may cost: full sends each sample, metered a group every 5 s, and arming and the like at once.",
+        f'"{Profile.FULL.value}"',
+    ),
+    Key(
+        "zenoh.rates",
+        Table("as in {attitude = 2, position = 1}", check_rates),
+        "Greatest rate of a telemetry group, or of state, Hz; 0: never. Goes over the profile.",
+        example="{attitude = 2, position = 1}",
     ),
     Key(
         "zenoh.connect",

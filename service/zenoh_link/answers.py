@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Queries for what is the case now: state, mission/current and mission/list."""
+"""Queries about the vehicle: state, history, mission/current and mission/list."""
 
 from bridge.bridge import Bridge
 from service.api import MissionJobs
 from service.mission_data import Json
 from service.zenoh_link import keys
+from service.zenoh_link.history import History
 from service.zenoh_link.payload import Payloads, strict
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.vehicle_data import VehicleData, mission_current
@@ -16,19 +17,27 @@ _TIMES = ("received_at", "concluded_at")
 class Answers:
     """Answers in the encoding of the samples."""
 
-    def __init__(self, data: VehicleData, bridge: Bridge, jobs: MissionJobs, payloads: Payloads) -> None:
+    def __init__(
+        self, data: VehicleData, bridge: Bridge, jobs: MissionJobs, payloads: Payloads, history: History
+    ) -> None:
         self._bridge = bridge
         self._data = data
         self._jobs = jobs
         self._payloads = payloads
+        self._history = history
         self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.STATE: self._state,
+            keys.HISTORY: self._past,
             keys.MISSION_CURRENT: self._mission_current,
             keys.MISSION_LIST: self._mission_list,
         }
 
     async def _state(self, question: Question) -> None:
         self._tell(question, keys.STATE, self._data.state())
+
+    async def _past(self, question: Question) -> None:
+        found = await self._history.answer(question.parameter("_time"))
+        self._tell(question, keys.HISTORY, found | {"missions": [_with_units(each) for each in found["missions"]]})
 
     async def _mission_current(self, question: Question) -> None:
         self._tell(question, keys.MISSION_CURRENT, mission_current(self._bridge.missions.held))
@@ -41,7 +50,7 @@ class Answers:
         self._tell(question, keys.MISSION_LIST, {"missions": [_with_units(mission) for mission in found]})
 
     def _tell(self, question: Question, key: keys.ZenohKey, body: Json) -> None:
-        question.tell(self._payloads.answer(key, body), self._payloads.encoding)
+        question.tell(self._payloads.answer(key, body), self._payloads.encoding(key))
 
 
 def _with_units(mission: Json) -> Json:

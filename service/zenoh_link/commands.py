@@ -4,33 +4,38 @@
 import asyncio
 from collections.abc import Callable
 
-import zenoh
-
+from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.api import MOST, MissionJobs
 from service.mission_data import Json, to_json
 from service.zenoh_link import keys
-from service.zenoh_link.queries import Answerer, QueryRefused, Question
+from service.zenoh_link.queries import JSON_REPLY, Answerer, QueryRefused, Question
+from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates
+from service.zenoh_link.settings import STATE_NAME
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _PAYLOAD = "the query's payload"
 #: Files on disk may be larger, but they are not read beside a running link: a mission that fits has some 20 KB.
 _MAX_BYTES = 1 << 20
 _MAX_ITEMS = 1000
+_USUAL_REQUEST_S = 60.0
+_RATE_NAMES = (*(group.value for group in Group), STATE_NAME)
 
 
 class CommandQueries:
     """Carries them out as MissionJobs does for everybody."""
 
-    def __init__(self, jobs: MissionJobs) -> None:
+    def __init__(self, jobs: MissionJobs, rates: SampleRates) -> None:
         self._jobs = jobs
+        self._rates = rates
         self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.UPLOAD: self._upload,
             keys.CHECK: self._check,
             keys.CLEAR: self._clear,
             keys.RESTORE: self._restore,
             keys.STATUS: self._status,
+            keys.RATES: self._raise_rates,
         }
 
     async def _upload(self, question: Question) -> None:
@@ -54,6 +59,15 @@ class CommandQueries:
     async def _status(self, question: Question) -> None:
         _tell(question, {"result": self._jobs.status()})
 
+    async def _raise_rates(self, question: Question) -> None:
+        now = asyncio.get_running_loop().time()
+        for_s = _number(question, "for_s", MAX_REQUEST_S) or _USUAL_REQUEST_S
+        wanted = {name: _number(question, name, MAX_REQUEST_HZ) for name in _RATE_NAMES}
+        for name, rate_hz in wanted.items():
+            if rate_hz is not None:
+                self._rates.request(name, rate_hz, now + for_s)
+        _tell(question, {"result": {"rates_hz": self._rates.describe(now)}})
+
 
 async def _items(question: Question) -> list[MissionItem]:
     """Return the mission in the payload: the formats, the reader and its words are those of `naze-bridge check`."""
@@ -70,6 +84,20 @@ async def _items(question: Question) -> list[MissionItem]:
     return items
 
 
+def _number(question: Question, name: str, most: float) -> float | None:
+    """A parameter's number, greater than 0; None if it is not given."""
+    text = question.parameter(name)
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number <= most:
+        raise QueryRefused(f"{name} must be a number, more than 0 and at most {most:.0f}, as in rates?attitude=10")
+    return number
+
+
 def _teller(question: Question, count: int) -> Callable[[Json], None]:
     """Return what tells the progress towards `count` records."""
     return lambda progress: _tell(question, progress | {"of": count})
@@ -82,4 +110,4 @@ def _end(question: Question, answer: Json) -> None:
 
 
 def _tell(question: Question, body: Json) -> None:
-    question.tell(to_json(body).encode(), zenoh.Encoding.APPLICATION_JSON)
+    question.tell(to_json(body).encode(), JSON_REPLY)

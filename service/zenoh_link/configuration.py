@@ -13,6 +13,8 @@ from service.zenoh_link.settings import I_KNOW, ZenohSettings, ZenohSettingsErro
 
 #: A command of 10 MB is answered; what is larger is not even put together in a Pi's memory.
 _MAX_MESSAGE_BYTES = 16 << 20
+#: The kernel doubles it. Two seconds of telemetry; enough for 300 kB/s at a round trip of 100 ms.
+_SEND_BUFFER_BYTES = 16 << 10
 #: What we set where the configuration is as zenoh's own default is: key, value.
 _DEFAULTS: dict[str, object] = {
     "scouting/multicast/enabled": False,
@@ -20,6 +22,10 @@ _DEFAULTS: dict[str, object] = {
     # A slow subscriber costs the event loop nothing, not even the millisecond that zenoh would wait.
     "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
     "transport/link/rx/max_message_size": _MAX_MESSAGE_BYTES,
+    # Samples that are kept are numbered by their time of publication.
+    "timestamping/enabled": True,
+    # A stalled router must not collect seconds of telemetry that it later passes on as fresh.
+    "transport/link/tcp/so_sndbuf": _SEND_BUFFER_BYTES,
     # 16 MB that help only programs on the same machine.
     "transport/shared_memory/enabled": False,
 }

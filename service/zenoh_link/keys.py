@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every key of a vehicle, in one table: docs/zenoh.md shows the same one.
 
-A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/state` takes a whole fleet.
+A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` takes a whole fleet. The
+version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread.
 """
 
 from dataclasses import dataclass
@@ -9,49 +10,64 @@ from enum import Enum
 
 from bridge.model.vehicle_groups import Group
 
-#: The version of keys and payloads. One that a reader of this version would misread gets another.
+#: The version of keys and payloads. A new field leaves it alone; a change that would mislead a reader raises it.
 VERSION = 1
-#: A verbatim chunk: no wildcard of a subscriber or a query matches it, so nobody sends a command by accident.
-COMMANDS = f"@cmd/v{VERSION}"
+_V = f"v{VERSION}"
+#: Verbatim chunks (@) match no wildcard: nobody sends a command by accident, and a recorder of `fleet/**` does not
+#: become a MAVLink ground station.
+COMMANDS = f"@cmd/{_V}"
+MAVLINK = f"@mavlink/{_V}"
 
 
 class SampleDelivery(Enum):
-    """What becomes of a sample that cannot go at once: it is dropped, or waits on the session's thread."""
+    """How a sample travels."""
 
-    DROP = "dropped rather than waited for"
+    DROP = "dropped rather than delayed"
     RELIABLE = "reliable"
     REPLY = "a reply to a query"
 
 
 @dataclass(frozen=True, slots=True)
 class ZenohKey:
-    """One key. `schema`: file name below schemas/, without its ending; None: the payload is raw MAVLink."""
+    """One key. `schema`: file name below schemas/, without its ending; None: the payload is raw MAVLink.
+
+    `kept`: samples that the vehicle keeps, from which a subscriber recovers lost ones; 0: none.
+    """
 
     suffix: str
     schema: str | None
     delivery: SampleDelivery
+    kept: int = 0
+
+    @property
+    def is_published(self) -> bool:
+        """True if the vehicle puts samples at this key."""
+        return self.delivery is not SampleDelivery.REPLY and self is not MAVLINK_IN
 
 
-TELEMETRY = {group: ZenohKey(f"telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}
-STATE = ZenohKey("state", "state", SampleDelivery.DROP)
-EVENT = ZenohKey("event", "event", SampleDelivery.RELIABLE)
-MISSION_CURRENT = ZenohKey("mission/current", "mission_current", SampleDelivery.RELIABLE)
-MISSION_LIST = ZenohKey("mission/list", "mission_list", SampleDelivery.REPLY)
-MISSION_REPORT = ZenohKey("mission/report", "mission_report", SampleDelivery.RELIABLE)
-MAVLINK_OUT = ZenohKey("mavlink/out", None, SampleDelivery.DROP)
-MAVLINK_IN = ZenohKey("mavlink/in", None, SampleDelivery.RELIABLE)
+TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}
+STATE = ZenohKey(f"{_V}/state", "state", SampleDelivery.DROP, kept=1)
+EVENT = ZenohKey(f"{_V}/event", "event", SampleDelivery.RELIABLE, kept=256)
+HISTORY = ZenohKey(f"{_V}/history", "history", SampleDelivery.REPLY)
+MISSION_CURRENT = ZenohKey(f"{_V}/mission/current", "mission_current", SampleDelivery.RELIABLE, kept=1)
+MISSION_LIST = ZenohKey(f"{_V}/mission/list", "mission_list", SampleDelivery.REPLY)
+MISSION_REPORT = ZenohKey(f"{_V}/mission/report", "mission_report", SampleDelivery.RELIABLE, kept=16)
+MAVLINK_OUT = ZenohKey(f"{MAVLINK}/out", None, SampleDelivery.DROP)
+MAVLINK_IN = ZenohKey(f"{MAVLINK}/in", None, SampleDelivery.RELIABLE)
 
 UPLOAD = ZenohKey(f"{COMMANDS}/mission/upload", "command_reply", SampleDelivery.REPLY)
 CHECK = ZenohKey(f"{COMMANDS}/mission/check", "command_reply", SampleDelivery.REPLY)
 CLEAR = ZenohKey(f"{COMMANDS}/mission/clear", "command_reply", SampleDelivery.REPLY)
 RESTORE = ZenohKey(f"{COMMANDS}/mission/restore", "command_reply", SampleDelivery.REPLY)
 STATUS = ZenohKey(f"{COMMANDS}/status", "command_reply", SampleDelivery.REPLY)
-COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS)
+RATES = ZenohKey(f"{COMMANDS}/rates", "command_reply", SampleDelivery.REPLY)
+COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS, RATES)
 
 KEYS = (
     *TELEMETRY.values(),
     STATE,
     EVENT,
+    HISTORY,
     MISSION_CURRENT,
     MISSION_LIST,
     MISSION_REPORT,
@@ -60,10 +76,15 @@ KEYS = (
     *COMMAND_KEYS,
 )
 
-#: A liveliness token: <prefix>/<vehicle>/alive/<session id>.
-ALIVE = "alive"
+#: A liveliness token: <prefix>/<vehicle>/v1/alive/<session id>.
+ALIVE = f"{_V}/alive"
 
 
 def full(prefix: str, vehicle: str, suffix: str) -> str:
-    """Return a key's whole name."""
+    """A key's whole name."""
     return f"{prefix}/{vehicle}/{suffix}"
+
+
+def vehicle_in(key: object) -> str:
+    """The vehicle's name in a whole key."""
+    return str(key).split("/")[1]

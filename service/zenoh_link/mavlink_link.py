@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MAVLink over zenoh: a link to ground stations like the others. Frames go out only while somebody reads them."""
+"""MAVLink over zenoh: a link to ground stations like the others. Frames go out only while a subscriber reads them."""
 
 import asyncio
 

@@ -28,12 +28,14 @@ from service.zenoh_link.answers import Answers
 from service.zenoh_link.commands import CommandQueries
 from service.zenoh_link.configuration import connect_endpoints, make_config, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
-from service.zenoh_link.keys import SampleDelivery, ZenohKey
+from service.zenoh_link.history import History
+from service.zenoh_link.keys import ZenohKey
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
-from service.zenoh_link.payload import Payloads
+from service.zenoh_link.payload import Payloads, plain
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
+from service.zenoh_link.rates import SampleRates
 from service.zenoh_link.session import SessionThread
 from service.zenoh_link.settings import ZenohSettings
 from service.zenoh_link.vehicle_data import VehicleData
@@ -63,9 +65,11 @@ class Node:
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others)
         self._queries = Queries(self._thread)
         jobs = MissionJobs(daemon)
-        self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads).answerers
+        self._rates = SampleRates(settings.profile, settings.rates)
+        self._history = History(jobs)
+        self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads, self._history).answerers
         if settings.commands:
-            self._answerers |= CommandQueries(jobs).answerers
+            self._answerers |= CommandQueries(jobs, self._rates).answerers
         self._held: HeldMission | None = None
         self._ask_why_at = self._loop.time() + _PATIENCE_S
         self._why_alone = ""
@@ -95,7 +99,9 @@ class Node:
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
         """Publish an event, and soon after it the state: something has changed."""
-        self._send_surely(keys.EVENT, lambda: vehicle_data.event(level, event, facts))
+        body = self._payloads.head(keys.EVENT) | vehicle_data.event(level, event, facts)
+        self._history.add(body)
+        self._thread.submit(lambda: self._publisher.put_raw(keys.EVENT, self._payloads.encode(keys.EVENT, body)))
         if level != "debug":
             self._news()
 
@@ -112,7 +118,7 @@ class Node:
 
     def _declare(self, session: zenoh.Session) -> None:
         for key in keys.KEYS:
-            if key.delivery is not SampleDelivery.REPLY and key is not keys.MAVLINK_IN:
+            if key.is_published:
                 self._publisher.declare(session, key, self._name(key.suffix))
         for key, answerer in self._answerers.items():
             self._queries.declare(session, self._name(key.suffix), answerer)
@@ -138,16 +144,17 @@ class Node:
             self._daemon.bridge.report.watch(read)
             self._daemon.flush()
 
-    def _publish(self, group: Group) -> None:
+    def _publish(self, group: Group, *, gathered: bool = False) -> None:
         key = keys.TELEMETRY[group]
         if self._publisher.has_readers(key):
-            self._publisher.put(key, self._data.group(group))
+            sample = self._daemon.bridge.report.group(group)
+            if self._rates.admits(group, sample, self._loop.time(), gathered=gathered):
+                self._publisher.put(key, plain(sample))
 
     def _send_surely(self, key: ZenohKey, body: Callable[[], Json]) -> None:
         """Publish on the session's thread, where the body is made, too: a report of a long list takes its time."""
-        if self._publisher.has_readers(key):
-            head = self._payloads.head(key)
-            self._thread.submit(lambda: self._publisher.put_raw(key, self._payloads.encode(head | body())))
+        head = self._payloads.head(key)
+        self._thread.submit(lambda: self._publisher.put_raw(key, self._payloads.encode(key, head | body())))
 
     def _news(self) -> None:
         """Publish what changes as a whole, once for all that changes now."""
@@ -177,9 +184,12 @@ class Node:
 
     def _publish_whole(self) -> None:
         self._soon = None
-        self._publish(Group.LINK)
-        if self._publisher.has_readers(keys.STATE):
-            self._publisher.put(keys.STATE, self._data.state())
+        for group in {Group.LINK, *self._rates.held_back}:
+            self._publish(group, gathered=True)
+        state = self._data.state()
+        marks = (state["status"]["armed"], state["mission"], state["link"]["state"], state["others_of_this_name"])
+        if self._publisher.is_declared and self._rates.admits_state(marks, self._loop.time()):
+            self._publisher.put(keys.STATE, state)
         held = self._daemon.bridge.missions.held
         if held is not self._held:
             self._held = held

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Payloads: plain data in one of two encodings, with a version, a sequence number and a time."""
+"""Payloads: plain data in JSON or compact CBOR, with a version, a sequence number and a time."""
 
 import json
 import math
@@ -10,39 +10,69 @@ from functools import cache
 from operator import attrgetter
 from typing import Any
 
-import cbor2
 import zenoh
 
 from service.mission_data import Json
+from service.zenoh_link import compact
 from service.zenoh_link.keys import VERSION, ZenohKey
 from service.zenoh_link.settings import PayloadEncoding
 
 _write_any = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 _SCALARS = frozenset((float, int, str, bool, type(None)))
-ENCODINGS = {
+_ENCODINGS = {
     PayloadEncoding.JSON: zenoh.Encoding.APPLICATION_JSON,
     PayloadEncoding.CBOR: zenoh.Encoding.APPLICATION_CBOR,
 }
+_SCHEMA = f"naze-bridge/v{VERSION}/"
+
+
+def encoding_of(key: ZenohKey, encoding: PayloadEncoding) -> zenoh.Encoding:
+    """The encoding that a sample names: with its schema, as in "application/json;naze-bridge/v1/state"."""
+    if key.schema is None:
+        return zenoh.Encoding.APPLICATION_OCTET_STREAM
+    return _ENCODINGS[encoding].with_schema(_SCHEMA + key.schema)
+
+
+def decoded(data: bytes, encoding: str) -> Any:
+    """What `data` holds, by the encoding that came with it; ValueError or cbor2.CBORError if it cannot be read."""
+    kind, _, schema = encoding.partition(";")
+    if kind == str(zenoh.Encoding.APPLICATION_CBOR):
+        return compact.loads(schema.removeprefix(_SCHEMA), data)
+    return json.loads(data)
 
 
 class Payloads:
     """Makes the payloads of one vehicle. Each key has a sequence of its own."""
 
     def __init__(self, encoding: PayloadEncoding) -> None:
-        self.encoding = ENCODINGS[encoding]
-        self.encode: Callable[[Json], bytes] = _to_json if encoding is PayloadEncoding.JSON else cbor2.dumps
+        self._encoding = encoding
         self._next: dict[str, int] = {}
+
+    def encoding(self, key: ZenohKey) -> zenoh.Encoding:
+        """The encoding of a key's samples."""
+        return encoding_of(key, self._encoding)
+
+    def encode(self, key: ZenohKey, body: Json) -> bytes:
+        """Write a payload. May be called on any thread."""
+        if self._encoding is PayloadEncoding.CBOR and key.schema is not None:
+            return compact.dumps(key.schema, body)
+        return _to_json(body)
 
     def head(self, key: ZenohKey) -> Json:
         """Begin the next payload of a key."""
         seq = self._next.get(key.suffix, 0)
         self._next[key.suffix] = seq + 1
-        return {"v": VERSION, "seq": seq, "time_s": time.time()}
+        return {"v": VERSION, "seq": seq, "time_s": _now_s()}
 
     def answer(self, key: ZenohKey, body: Json) -> bytes:
         """Make the answer to a query: it has the number of the last sample."""
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
-        return self.encode({"v": VERSION, "seq": seq, "time_s": time.time(), **body})
+        return self.encode(key, {"v": VERSION, "seq": seq, "time_s": _now_s(), **body})
+
+
+def _now_s() -> float:
+    """The time to the millisecond: no clock of a Pi is better, and each digit is paid for."""
+    return round(time.time(), 3)
 
 
 def plain(thing: Any) -> Json:

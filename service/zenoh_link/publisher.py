@@ -8,21 +8,29 @@ import asyncio
 from collections.abc import Callable
 
 import zenoh
+from zenoh import ext
 
 from service.mission_data import Json
-from service.zenoh_link.keys import SampleDelivery, ZenohKey
+from service.zenoh_link.keys import STATE, SampleDelivery, ZenohKey
 from service.zenoh_link.payload import Payloads
 from service.zenoh_link.threads import post
 
+#: How soon after a sample its number is published, by which a subscriber sees that the last one was lost.
+_LAST_NUMBER_S = 1.0
+
 
 class Publisher:
-    """Knows which keys somebody reads; what nobody reads is not even made."""
+    """Publishes a vehicle's samples, and knows which keys have subscribers: telemetry without one is not even made.
+
+    Samples of the keys that are kept are put in any case. A subscriber that was away, or joins late, asks the publisher
+    for them; zenoh's AdvancedSubscriber does so by itself.
+    """
 
     def __init__(self, payloads: Payloads, on_readers: Callable[[ZenohKey, bool], None]) -> None:
         self._payloads = payloads
         self._on_readers = on_readers
         self._loop = asyncio.get_running_loop()
-        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._publishers: dict[str, zenoh.Publisher | ext.AdvancedPublisher] = {}
         self._read: set[str] = set()
         self._listeners: list[zenoh.MatchingListener[None]] = []
         #: How many samples zenoh refused.
@@ -30,13 +38,16 @@ class Publisher:
 
     def declare(self, session: zenoh.Session, key: ZenohKey, name: str) -> None:
         """Declare a key's publisher; `name`: the key in full. Called on the session's thread."""
-        reliable = key.delivery is SampleDelivery.RELIABLE
+        if key.kept:
+            self._publishers[key.suffix] = self._declare_kept(session, key, name)
+            return
         publisher = session.declare_publisher(
             name,
-            encoding=zenoh.Encoding.APPLICATION_OCTET_STREAM if key.schema is None else self._payloads.encoding,
-            congestion_control=zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP,
-            # Each priority has a queue of its own: what is waited for does not hold up what is not.
-            priority=zenoh.Priority.DATA_LOW if reliable else zenoh.Priority.DATA,
+            encoding=self._payloads.encoding(key),
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=zenoh.Priority.DATA,
+            # A link of datagrams carries it as such; TCP does as ever.
+            reliability=zenoh.Reliability.BEST_EFFORT,
         )
         self._publishers[key.suffix] = publisher
 
@@ -46,13 +57,32 @@ class Publisher:
         # It is called at once if somebody reads already.
         self._listeners.append(publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False)))
 
+    def _declare_kept(self, session: zenoh.Session, key: ZenohKey, name: str) -> ext.AdvancedPublisher:
+        reliable = key.delivery is SampleDelivery.RELIABLE
+        return ext.declare_advanced_publisher(
+            session,
+            name,
+            encoding=self._payloads.encoding(key),
+            congestion_control=zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP,
+            # Each priority has a queue of its own: samples that wait do not hold up telemetry.
+            priority=zenoh.Priority.DATA_LOW if reliable else zenoh.Priority.DATA,
+            cache=ext.CacheConfig(max_samples=key.kept),
+            sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_LAST_NUMBER_S),
+            publisher_detection=True,
+        )
+
+    @property
+    def is_declared(self) -> bool:
+        """True if the session is open and the vehicle's state can be put."""
+        return STATE.suffix in self._publishers
+
     def has_readers(self, key: ZenohKey) -> bool:
         """Tell whether anybody reads a key."""
         return key.suffix in self._read
 
     def put(self, key: ZenohKey, body: Json) -> None:
         """Publish plain data."""
-        self.put_raw(key, self._payloads.encode(self._payloads.head(key) | body))
+        self.put_raw(key, self._payloads.encode(key, self._payloads.head(key) | body))
 
     def put_raw(self, key: ZenohKey, data: bytes) -> None:
         """Publish bytes."""

@@ -11,7 +11,10 @@ import zenoh
 
 from service.api import ControlError
 from service.mission_data import Json, to_json
+from service.zenoh_link.keys import UPLOAD
+from service.zenoh_link.payload import encoding_of
 from service.zenoh_link.session import SessionThread
+from service.zenoh_link.settings import PayloadEncoding
 from service.zenoh_link.threads import post
 from storage.store_error import StoreError
 
@@ -20,6 +23,9 @@ _MAX_AT_ONCE = 16
 _STOPPED = (
     "the daemon was stopped meanwhile; mission/current tells what the flight controller holds, once it runs again"
 )
+
+#: The encoding of a command's replies and of all errors.
+JSON_REPLY = encoding_of(UPLOAD, PayloadEncoding.JSON)
 
 _log = structlog.get_logger()
 
@@ -58,13 +64,17 @@ class Question:
 
     def tell(self, data: bytes, encoding: zenoh.Encoding) -> None:
         """Send one reply; more may follow."""
-        self._thread.submit(lambda: self._query.reply(self.name, data, encoding=encoding), is_reply=True)
+
+        def reply() -> None:
+            self._query.reply(self.name, data, encoding=encoding, timestamp=self._thread.timestamp())
+
+        self._thread.submit(reply, is_reply=True)
 
     def refuse(self, error: QueryRefused) -> None:
         """Send the error."""
         body = {"error": str(error)} | ({} if error.result is None else {"result": error.result})
         data = to_json(body).encode()
-        answer = partial(self._query.reply_err, data, encoding=zenoh.Encoding.APPLICATION_JSON)
+        answer = partial(self._query.reply_err, data, encoding=JSON_REPLY)
         self._thread.submit(answer, is_reply=True)
 
     def end(self) -> None:

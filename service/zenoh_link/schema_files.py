@@ -7,7 +7,6 @@
 import json
 import types
 from dataclasses import is_dataclass
-from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from bridge.model import vehicle_groups as groups
@@ -15,10 +14,10 @@ from bridge.model.finding import Finding
 from bridge.model.vehicle_groups import Group, VehicleReport
 from protocols.mission_item import MissionItem
 from service.mission_data import Json
+from service.zenoh_link.compact import CBOR_KEY, SCHEMAS, object_schema
 from service.zenoh_link.keys import VERSION
 from storage.mission_store import MissionSummary
 
-FOLDER = Path(__file__).parent / "schemas"
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {float: "number", int: "integer", str: "string", bool: "boolean", types.NoneType: "null"}
 _ENVELOPE: Json = {
@@ -50,6 +49,7 @@ def schemas() -> dict[str, Json]:
     made["state"] = {
         "vehicle": {"type": "string", "description": "its name, as in the key"},
         "others_of_this_name": {"type": "integer", "minimum": 0, "description": "more bridges that use the name"},
+        "time_source": {"type": "string", "description": "ntp: the clock was set over the network; pi: it was not"},
         **_fields(VehicleReport),
     }
     made["event"] = {
@@ -65,11 +65,39 @@ def schemas() -> dict[str, Json]:
     summary = _fields(MissionSummary) | {"checksum": _CHECKSUM}
     for name in ("received_at", "concluded_at"):
         summary[f"{name}_s"] = summary.pop(name) | {"description": "seconds since 1970 (UTC)"}
-    made["mission_list"] = {"missions": {"type": "array", "items": _object(summary)}}
+    missions = {"missions": {"type": "array", "items": _object(summary)}}
+    made["mission_list"] = missions
+    made["history"] = {"events": {"type": "array", "items": _object(_ENVELOPE | made["event"])}, **missions}
     made["mission_report"] = upload | {"source": {"type": "string", "description": "who sent it"}}
     files = {name: _file(name, _ENVELOPE | body) for name, body in made.items()}
     files["command_reply"] = _reply(_object(upload, required=("ack", "text")), items, findings)
-    return files
+    return {name: numbered(schema, _published(name)) for name, schema in files.items()}
+
+
+def _published(name: str) -> Json:
+    path = SCHEMAS / f"{name}.json"
+    found: Json = json.loads(path.read_text()) if path.is_file() else {}
+    return found
+
+
+def numbered(schema: Json, published: Json) -> Json:
+    """Give each field its number: the one that was published, or for a new field the next one."""
+    schema, inner, known = dict(schema), object_schema(schema), object_schema(published)
+    if inner is not schema and (choices := schema.get("anyOf")):
+        schema["anyOf"] = [numbered(each, known) if each is inner else each for each in choices]
+    if items := schema.get("items"):
+        schema["items"] = numbered(items, known.get("items", {}))
+    if properties := schema.get("properties"):
+        before = known.get("properties", {})
+        last = max((each[CBOR_KEY] for each in before.values() if CBOR_KEY in each), default=-1)
+        fields: Json = {}
+        for name, field in properties.items():
+            number = before.get(name, {}).get(CBOR_KEY)
+            if number is None:
+                number = last = last + 1
+            fields[name] = numbered(field, before.get(name, {})) | {CBOR_KEY: number}
+        schema["properties"] = fields
+    return schema
 
 
 def _reply(upload: Json, items: Json, findings: Json) -> Json:
@@ -83,6 +111,7 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
         }
     )
     status = {"type": "object", "required": ["state"], "description": "as `naze-bridge status --json`"}
+    rates = _object({"rates_hz": {"type": "object", "additionalProperties": {"type": ["number", "null"]}}})
     count = {"type": "integer", "minimum": 0}
     error = {"type": "string", "description": "one sentence: why not"}
     return {
@@ -90,7 +119,7 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
         "title": "@cmd",
         "oneOf": [
             _object({"progress": count, "of": count}),
-            _object({"result": {"anyOf": [upload, check, status]}}),
+            _object({"result": {"anyOf": [upload, check, status, rates]}}),
             _object({"error": error, "result": upload}, required=("error",)),
         ],
     }
@@ -102,7 +131,7 @@ def _file(name: str, properties: Json) -> Json:
 
 def _object(properties: Json, required: tuple[str, ...] | None = None) -> Json:
     must = list(properties) if required is None else list(required)
-    return {"type": "object", "properties": properties, "required": must, "additionalProperties": False}
+    return {"type": "object", "properties": properties, "required": must}
 
 
 def _fields(kind: type) -> Json:
@@ -133,9 +162,9 @@ def text(schema: Json) -> str:
 
 def write() -> None:
     """Write all files."""
-    FOLDER.mkdir(exist_ok=True)
+    SCHEMAS.mkdir(exist_ok=True)
     for name, schema in schemas().items():
-        (FOLDER / f"{name}.json").write_text(text(schema))
+        (SCHEMAS / f"{name}.json").write_text(text(schema))
 
 
 if __name__ == "__main__":

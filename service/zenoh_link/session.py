@@ -58,6 +58,10 @@ class SessionThread:
             self._jobs.append(job)
             self._wake.notify()
 
+    def timestamp(self) -> zenoh.Timestamp | None:
+        """The time of the session's clock, for a reply; samples get theirs from zenoh."""
+        return None if self._session is None else self._session.new_timestamp()
+
     def close(self) -> None:
         """Close the session, and wait for that only a moment."""
         with self._wake:

@@ -3,9 +3,12 @@
 
 import re
 import socket
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
+
+from bridge.model.vehicle_groups import Group
 
 #: What must be written to take commands from whoever reaches the session.
 I_KNOW = "I know"
@@ -25,6 +28,18 @@ class PayloadEncoding(Enum):
     CBOR = "cbor"
 
 
+class Profile(Enum):
+    """What a vehicle's link may cost."""
+
+    FULL = "full"
+    METERED = "metered"
+
+
+#: The name of the `state` key among the groups' names, where rates are given.
+STATE_NAME = "state"
+_MAX_RATE_HZ = 50.0
+
+
 def host_name() -> str:
     """Return this machine's name as a vehicle's: what a key cannot hold becomes a dash."""
     return _FORBIDDEN.sub("-", socket.gethostname()).lstrip("@")[:_MAX_NAME] or "vehicle"
@@ -34,13 +49,16 @@ def host_name() -> str:
 class ZenohSettings:
     """How the daemon joins zenoh. Endpoints are zenoh's: "tcp/192.168.4.1:7447".
 
-    `config_file`: a zenoh configuration that is passed through; what it does not say is as without it.
-    `commands`: whether @cmd is answered; `commands_without_authentication` must be "I know" to do so for strangers.
+    `config_file`: a zenoh configuration that is passed through; ours applies where it is silent.
+    `rates`: greatest rate of a group, or of "state", Hz; 0: never.
+    `commands`: whether @cmd is answered; without authentication only if `commands_without_authentication` is "I know".
     """
 
     prefix: str = DEFAULT_PREFIX
     vehicle: str = field(default_factory=host_name)
     encoding: PayloadEncoding = PayloadEncoding.JSON
+    profile: Profile = Profile.FULL
+    rates: Mapping[str, float] = field(default_factory=dict)
     connect: tuple[str, ...] = ()
     listen: tuple[str, ...] = ()
     config_file: Path | None = None
@@ -51,6 +69,18 @@ class ZenohSettings:
     def __post_init__(self) -> None:
         check_name("prefix", self.prefix)
         check_name("vehicle", self.vehicle)
+
+
+def check_rates(rates: object) -> dict[str, float]:
+    """Read rates in Hz by the groups' names, and "state"; ZenohSettingsError."""
+    names = [*(group.value for group in Group), STATE_NAME]
+    assert isinstance(rates, dict)  # the settings' reader says so
+    for name, hz in rates.items():
+        if name not in names:
+            raise ZenohSettingsError(f"zenoh.rates has no group {name!r}: there are {', '.join(names)}")
+        if isinstance(hz, bool) or not isinstance(hz, int | float) or not 0 <= hz <= _MAX_RATE_HZ:
+            raise ZenohSettingsError(f"zenoh.rates.{name} must be a rate in Hz, 0 to {_MAX_RATE_HZ:.0f}; 0: never")
+    return {name: float(hz) for name, hz in rates.items()}
 
 
 def check_name(setting: str, name: str) -> None:

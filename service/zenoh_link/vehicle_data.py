@@ -8,9 +8,9 @@ from bridge.bridge import Bridge
 from bridge.missions.mission_service import Delivery, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.vehicle_groups import Group
 from service.mission_data import Json
 from service.zenoh_link.payload import plain, strict
+from service.zenoh_link.time_source import time_source
 
 
 class VehicleData:
@@ -21,15 +21,12 @@ class VehicleData:
         self._bridge = bridge
         self._others = others
 
-    def group(self, group: Group) -> Json:
-        """Return one group of telemetry."""
-        return plain(self._bridge.report.group(group))
-
     def state(self) -> Json:
         """Return everything that is known."""
         return {
             "vehicle": self._vehicle,
             "others_of_this_name": len(self._others),
+            "time_source": time_source(),
             **plain(self._bridge.report.whole()),
         }
 

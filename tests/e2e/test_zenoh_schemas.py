@@ -13,8 +13,9 @@ from plan import plain_plan
 from programs import until
 from zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
 
-from service.zenoh_link.keys import COMMANDS, KEYS, SampleDelivery
-from service.zenoh_link.schema_files import FOLDER, schemas, text
+from service.zenoh_link.compact import SCHEMAS as FOLDER
+from service.zenoh_link.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION
+from service.zenoh_link.schema_files import schemas, text
 
 MISSION = (Path(__file__).parents[2] / "examples" / "naze-field.waypoints").read_bytes()
 SCHEMAS = {key.suffix: key.schema for key in KEYS}
@@ -32,16 +33,13 @@ def check(suffix: str, payload: Any) -> None:
     validator(name).validate(payload)
 
 
-def check_all(reader: Reader, encoding: zenoh.Encoding) -> set[str]:
+def check_all(reader: Reader, encoding: str) -> set[str]:
     """Check all samples, and return which keys there were."""
     found: set[str] = set()
     for sample in reader.samples:
-        suffix = str(sample.key_expr).removeprefix(key(""))
+        suffix = str(sample.key_expr).removeprefix(key("@").removesuffix("@"))
         found.add(suffix)
-        if SCHEMAS[suffix] is None:
-            assert sample.encoding == zenoh.Encoding.APPLICATION_OCTET_STREAM
-            continue
-        assert sample.encoding == encoding
+        assert str(sample.encoding) == f"application/{encoding};naze-bridge/v{VERSION}/{SCHEMAS[suffix]}"
         check(suffix, body(sample))
     return found
 
@@ -75,12 +73,11 @@ def test_all_that_is_said_is_as_published(start: Starter, encoding: str) -> None
         ask_surely(opened, f"{COMMANDS}/mission/upload", refused)
         bench.board.set("armed 1")
         reader.wait("event", lambda event: event["event"] == "vehicle.armed")
-        for suffix in ("state", "mission/current", "mission/list"):
-            check(suffix, ask_surely(opened, suffix))
+        for suffix in ("state", "mission/current", "mission/list", "history"):
+            check(f"v{VERSION}/{suffix}", ask_surely(opened, suffix))
         bench.board.set("unplug")
         reader.wait("state", lambda state: state["link"]["flight_controller"] is None)
         until(lambda: reader.of("mission/report"), "a report")
-        encodings = {"json": zenoh.Encoding.APPLICATION_JSON, "cbor": zenoh.Encoding.APPLICATION_CBOR}
-        found = check_all(reader, encodings[encoding])
-    published = {each.suffix for each in KEYS if each.delivery is not SampleDelivery.REPLY} - {"mavlink/in"}
+        found = check_all(reader, encoding)
+    published = {each.suffix for each in KEYS if each.is_published} - {MAVLINK_OUT.suffix}
     assert found == published

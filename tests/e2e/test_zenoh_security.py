@@ -65,7 +65,7 @@ def test_the_pilot_commands_and_a_guest_looks(start: Starter, fleet: Fleet) -> N
             refused = guest.get(key(suffix), timeout=3.0)
             assert [body(reply.ok) for reply in refused if reply.ok] == []
         assert len(bench.board.records()) == 12
-        guest.put(key("mavlink/in"), b"anything")
+        guest.put(key("@mavlink/v1/in"), b"anything")
         bench.daemon.push(plain_plan(9))
     bench.board.assert_was_treated_well()
 

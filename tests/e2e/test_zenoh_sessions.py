@@ -80,7 +80,7 @@ def test_two_peers_without_a_router(start: Starter) -> None:
         reader = Reader(opened)
         numbers = [each["seq"] for each in until(lambda: reader.of("telemetry/attitude")[20:], "telemetry")]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-        tokens = [str(reply.ok.key_expr) for reply in opened.liveliness().get("fleet/*/alive/*") if reply.ok]
+        tokens = [str(reply.ok.key_expr) for reply in opened.liveliness().get("fleet/*/v1/alive/*") if reply.ok]
         assert [token.rpartition("/")[0] for token in tokens] == [key("alive")]
 
 
@@ -117,7 +117,7 @@ def test_a_stalled_subscriber_holds_nothing_up(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
     with stalled_subscriber(where), session(connect=where) as opened:
-        reader = Reader(opened, "fleet/*/telemetry/*")
+        reader = Reader(opened, "fleet/*/v1/telemetry/*")
         for number in range(6):
             bench.daemon.push(plain_plan(146, number))
         heard = len(reader.samples)
@@ -159,15 +159,15 @@ def test_mavlink_goes_out_while_it_is_read_and_comes_in(start: Starter) -> None:
     bench = zenoh_bench(start, f'listen = ["{where}"]\nmavlink_in = true\ncommands_without_authentication = "I know"')
     decoder = MavlinkDecoder()
     with session(connect=where) as opened:
-        reader = Reader(opened, key("mavlink/out"))
+        reader = Reader(opened, key("@mavlink/v1/out"))
         until(lambda: len(reader.samples) > 30, "frames")
         frames = [frame for each in reader.samples for frame in MavlinkSplitter().feed(each.payload.to_bytes())]
         numbers = [frame.seq for frame in frames]
         assert numbers == [(numbers[0] + place) % 256 for place in range(len(numbers))]
         assert all(decoder.decode(frame) for frame in frames)
         speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
-        opened.put(key("mavlink/in"), b"\xfd\xff no MAVLink" * 9)
-        opened.put(key("mavlink/in"), bytes(mavlink.MAVLink_mission_request_list_message(1, 1, 0).pack(speaker)))
+        opened.put(key("@mavlink/v1/in"), b"\xfd\xff no MAVLink" * 9)
+        opened.put(key("@mavlink/v1/in"), bytes(mavlink.MAVLink_mission_request_list_message(1, 1, 0).pack(speaker)))
 
         def answered() -> bool:
             return any(
@@ -179,17 +179,17 @@ def test_mavlink_goes_out_while_it_is_read_and_comes_in(start: Starter) -> None:
         until(answered, "the answer")
         status = bench.daemon.status()
         assert status is not None
-        assert status["ground_stations"] == ["zenoh mavlink/out"]
+        assert status["ground_stations"] == ["zenoh @mavlink/v1/out"]
 
 
 def test_nothing_comes_in_unless_it_is_switched_on(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
     with session(connect=where) as opened:
-        reader = Reader(opened, key("mavlink/out"))
+        reader = Reader(opened, key("@mavlink/v1/out"))
         until(lambda: reader.samples, "a frame")
         speaker = mavlink.MAVLink(None, srcSystem=254, srcComponent=190)
-        opened.put(key("mavlink/in"), bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(speaker)))
+        opened.put(key("@mavlink/v1/in"), bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(speaker)))
         seen = len(reader.samples)
         until(lambda: len(reader.samples) > seen + 20, "more frames")
         status = bench.daemon.status()

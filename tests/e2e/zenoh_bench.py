@@ -8,10 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import cbor2
 import zenoh
 from benches import Bench, Starter
 from programs import PATIENCE, free_port, until
+
+from service.zenoh_link.keys import VERSION
+from service.zenoh_link.payload import decoded
 
 VEHICLE = "naze-1"
 I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
@@ -46,13 +48,12 @@ def session(connect: str = "", listen: str = "") -> Iterator[zenoh.Session]:
 
 
 def key(suffix: str, vehicle: str = VEHICLE) -> str:
-    return f"fleet/{vehicle}/{suffix}"
+    return f"fleet/{vehicle}/{suffix if suffix.startswith('@') else f'v{VERSION}/{suffix}'}"
 
 
 def body(data: zenoh.Sample | zenoh.ReplyError) -> Any:
     """What a sample, a reply or an error holds."""
-    raw = data.payload.to_bytes()
-    return cbor2.loads(raw) if data.encoding == zenoh.Encoding.APPLICATION_CBOR else json.loads(raw)
+    return decoded(data.payload.to_bytes(), str(data.encoding))
 
 
 class Reader:

@@ -147,16 +147,21 @@ def test_strangers_say_strange_things(fleet: Fleet) -> None:
     with ExitStack() as stack:
         session = stack.enter_context(session_of(fleet))
         liveliness = session.liveliness()
-        for key in ("fleet/ghost/alive/0", "fleet/spa ce/alive/1", "fleet/ghost/alive/0/more", "fleet/\x1b[2J/alive/2"):
+        for key in (
+            "fleet/ghost/v1/alive/0",
+            "fleet/spa ce/v1/alive/1",
+            "fleet/ghost/v1/alive/0/more",
+            "fleet/\x1b[2J/v1/alive/2",
+        ):
             stack.enter_context(liveliness.declare_token(key))
         answers = (b"\xff", b"[" * 100_000, b'{"link": 3, "battery": {"voltage_v": "\x1b[2J"}}', b"[]")
 
         def lie(query: zenoh.Query) -> None:
             with query:
                 for answer in answers:
-                    query.reply("fleet/ghost/state", answer)
+                    query.reply("fleet/ghost/v1/state", answer)
 
-        stack.enter_context(session.declare_queryable("fleet/ghost/state", lie))
+        stack.enter_context(session.declare_queryable("fleet/ghost/v1/state", lie))
         until(lambda: "ghost" in fleet.listed(), "the ghost")
         listed = fleet.ask("list")
         assert (listed.returncode, listed.stderr) == (0, ""), listed
@@ -194,7 +199,7 @@ def test_the_line_for_the_shell(fleet: Fleet, tmp_path: Path) -> None:
         command = [sys.executable, "-u", "-c", code.replace("tcp/localhost:7447", fleet.router.endpoint)]
         reader = subprocess.Popen(command, stdout=log, stderr=log)
     try:
-        until(lambda: "fleet/kite/telemetry/position b'{" in output.read_text(), "a position")
+        until(lambda: "fleet/kite/v1/telemetry/position b'{" in output.read_text(), "a position")
     finally:
         reader.kill()
         reader.wait()

@@ -55,12 +55,14 @@ def stands_in_for(stack: ExitStack, session: zenoh.Session, vehicle: str) -> Non
     # The answer is given under the vehicle's own key, as a bridge does: a query's may have wildcards.
     def state(query: zenoh.Query) -> None:
         with query:
-            query.reply(f"fleet/{vehicle}/state", json.dumps({"link": {"state": "MSP"}}), encoding="application/json")
+            query.reply(
+                f"fleet/{vehicle}/v1/state", json.dumps({"link": {"state": "MSP"}}), encoding="application/json"
+            )
 
-    stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/state", state))
+    stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/v1/state", state))
     stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/@cmd/v1/status", answer))
     stack.enter_context(session.declare_queryable(f"fleet/{vehicle}/@cmd/v1/mission/upload", accept))
-    stack.enter_context(session.liveliness().declare_token(f"fleet/{vehicle}/alive/{session.zid()}"))
+    stack.enter_context(session.liveliness().declare_token(f"fleet/{vehicle}/v1/alive/{session.zid()}"))
 
 
 def asks(session: zenoh.Session, key: str) -> int:
@@ -73,11 +75,13 @@ def test_a_vehicle_is_seen_by_everybody_and_commanded_by_the_pilot(secured: Flee
         stands_in_for(stack, vehicle, "naze-1")
         pilot, guest = (stack.enter_context(secured.open("pilot", name)) for name in ("pilot", "guest"))
         until(lambda: asks(pilot, "fleet/naze-1/@cmd/v1/status") == 1, "the pilot's command")
-        assert asks(guest, "fleet/naze-1/state") == 1
+        assert asks(guest, "fleet/naze-1/v1/state") == 1
         assert asks(guest, "fleet/naze-1/@cmd/v1/status") == 0
         heard: list[str] = []
-        stack.enter_context(guest.declare_subscriber("fleet/*/telemetry/*", lambda sample: heard.append(str(sample))))
-        publisher = stack.enter_context(vehicle.declare_publisher("fleet/naze-1/telemetry/position"))
+        stack.enter_context(
+            guest.declare_subscriber("fleet/*/v1/telemetry/*", lambda sample: heard.append(str(sample)))
+        )
+        publisher = stack.enter_context(vehicle.declare_publisher("fleet/naze-1/v1/telemetry/position"))
 
         def hears() -> bool:
             publisher.put("{}")
@@ -110,7 +114,7 @@ def test_a_vehicle_cannot_be_another_one(secured: Fleet) -> None:
         pilot = stack.enter_context(secured.open("pilot", "pilot"))
         until(lambda: asks(pilot, "fleet/naze-2/@cmd/v1/status") == 1, "the answer under its own name")
         assert asks(pilot, "fleet/naze-1/@cmd/v1/status") == 0
-        tokens = [str(reply.ok.key_expr) for reply in pilot.liveliness().get("fleet/*/alive/*") if reply.ok]
+        tokens = [str(reply.ok.key_expr) for reply in pilot.liveliness().get("fleet/*/v1/alive/*") if reply.ok]
         assert [key.split("/")[1] for key in tokens] == ["naze-2"]
 
 
@@ -119,8 +123,8 @@ def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
         vehicle = stack.enter_context(tls.open("vehicle", "naze-1"))
         stands_in_for(stack, vehicle, "naze-1")
         pilot, stranger = (stack.enter_context(tls.open("pilot", name)) for name in ("pilot", "stranger"))
-        until(lambda: asks(pilot, "fleet/naze-1/state") == 1, "the pilot's question")
-        assert asks(stranger, "fleet/naze-1/state") == asks(stranger, "fleet/naze-1/@cmd/v1/status") == 0
+        until(lambda: asks(pilot, "fleet/naze-1/v1/state") == 1, "the pilot's question")
+        assert asks(stranger, "fleet/naze-1/v1/state") == asks(stranger, "fleet/naze-1/@cmd/v1/status") == 0
 
 
 def refused(listed: subprocess.CompletedProcess[str]) -> str:

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How often each group goes out: the profile, the owner's limits, and for a while what a subscriber asks for. Sans-IO.
+
+Times are seconds of a monotonic clock.
+"""
+
+from collections.abc import Mapping
+from math import inf
+from typing import Any
+
+from bridge.model.vehicle_groups import Group
+from service.zenoh_link.settings import STATE_NAME, Profile
+
+#: The metered profile: each group every 5 s, the state every 15 s, and changes of the fields below at once.
+_METERED_S = 5.0
+_METERED_STATE_S = 15.0
+_AT_ONCE = {Group.STATUS: ("armed", "mode"), Group.GPS: ("fix",), Group.LINK: ("state", "flight_controller")}
+#: Groups this rare wait for each other and share packets, each of which costs 100 bytes of headers.
+GATHERED_FROM_S = 1.0
+#: A subscriber's request ends by itself: the owner pays for it.
+MAX_REQUEST_S = 3600.0
+MAX_REQUEST_HZ = 50.0
+
+
+class SampleRates:
+    """Decides for each sample whether it goes out. Names are those of the groups, and "state"."""
+
+    def __init__(self, profile: Profile, limits_hz: Mapping[str, float]) -> None:
+        usual = {group.value: _METERED_S for group in Group} | {STATE_NAME: _METERED_STATE_S}
+        self._interval_s = usual if profile is Profile.METERED else {}
+        self._interval_s |= {name: 1 / hz if hz else inf for name, hz in limits_hz.items()}
+        self._requests: dict[str, tuple[float, float]] = {}
+        self._due_at: dict[str, float] = {}
+        self._sent: dict[str, object] = {}
+        #: Groups whose newest sample was not sent, because it came too early.
+        self.held_back: set[Group] = set()
+
+    def admits(self, group: Group, sample: Any, now: float, *, gathered: bool = False) -> bool:
+        """True if this sample of a group goes out now. `gathered`: with all others that are held back."""
+        if group.value not in self._interval_s:
+            return True
+        marks = [getattr(sample, name) for name in _AT_ONCE.get(group, ())]
+        waits = not gathered and self._current_s(group.value, now) >= GATHERED_FROM_S
+        admitted = (not waits or marks != self._sent.get(group.value)) and self._admits(group.value, marks, now)
+        (self.held_back.discard if admitted else self.held_back.add)(group)
+        return admitted
+
+    def admits_state(self, marks: object, now: float) -> bool:
+        """True if the state goes out now. `marks`: a change of these cannot wait."""
+        return STATE_NAME not in self._interval_s or self._admits(STATE_NAME, marks, now)
+
+    def request(self, name: str, rate_hz: float, until: float) -> None:
+        """Raise a rate until then. The owner's own is never undercut."""
+        self._requests[name] = (1 / rate_hz, until)
+        self._due_at.pop(name, None)
+
+    def describe(self, now: float) -> dict[str, float | None]:
+        """The greatest rate of each name at present, Hz; None: as fast as the flight controller is polled."""
+        names = [group.value for group in Group] + [STATE_NAME]
+        return {name: round(1 / self._current_s(name, now), 3) if name in self._interval_s else None for name in names}
+
+    def _admits(self, name: str, marks: object, now: float) -> bool:
+        """True if a sample is due, or if `marks` differ from those of the last one."""
+        interval_s = self._current_s(name, now)
+        if interval_s == inf or (now < self._due_at.get(name, -inf) and self._sent.get(name) == marks):
+            return False
+        self._sent[name] = marks
+        # The same instants for all groups, so that they share packets; and 10 Hz become 4 Hz, not 3.3.
+        self._due_at[name] = (now // interval_s + 1) * interval_s
+        return True
+
+    def _current_s(self, name: str, now: float) -> float:
+        interval_s = self._interval_s[name]
+        requested_s, until = self._requests.get(name, (inf, -inf))
+        return min(interval_s, requested_s) if now < until else interval_s

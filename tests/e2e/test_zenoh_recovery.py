@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Nothing that matters is lost: cuts, late subscribers, recorders, and storages that answer for vehicles long gone."""
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import zenoh
+from benches import Starter
+from plan import plain_plan
+from programs import until
+from zenoh import ext
+from zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
+from zenoh_router import running_router
+
+
+def recovering(opened: zenoh.Session, suffix: str, heard: list[Any]) -> ext.AdvancedSubscriber[None]:
+    return ext.declare_advanced_subscriber(
+        opened,
+        key(suffix),
+        lambda sample: heard.append(body(sample)),
+        history=ext.HistoryConfig(detect_late_publishers=True),
+        recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+    )
+
+
+def test_events_and_reports_survive_a_router_that_hangs_and_dies(start: Starter, tmp_path: Path) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'connect = ["{where}"]')
+    events: list[Any] = []
+    reports: list[Any] = []
+    with running_router(tmp_path, where) as router, session(connect=where) as opened:
+        subscribers = [recovering(opened, "event", events), recovering(opened, "mission/report", reports)]
+        until(lambda: any(each["event"] == "fc.found" for each in events), "what was said before")
+        router.process.send_signal(signal.SIGSTOP)
+        for count in range(4, 10):
+            bench.daemon.push(plain_plan(count))
+        router.end(signal.SIGKILL)
+        router.start_again()
+        until(lambda: len(reports) >= 6, "all reports")
+        assert [len(each["sent"]) for each in reports] == list(range(4, 10))
+        assert [each["seq"] for each in reports] == list(range(6))
+        until(lambda: sum(each["event"] == "mission.push_ended" for each in events) == 6, "all events")
+        assert [each["seq"] for each in events] == list(range(len(events)))
+        del subscribers
+    status = bench.daemon.status()
+    assert status is not None
+    assert status["zenoh_dropped"] == 0
+
+
+def test_a_late_subscriber_hears_what_was_said(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]')
+    bench.daemon.push(plain_plan(7))
+    heard: dict[str, list[Any]] = {name: [] for name in ("event", "mission/report", "mission/current", "state")}
+    with session(connect=where) as opened:
+        subscribers = [recovering(opened, name, found) for name, found in heard.items()]
+        until(lambda: all(heard.values()), "the past")
+        assert len(heard["mission/report"][0]["stored"]) == 7
+        assert heard["mission/current"][-1]["count"] == 7
+        del subscribers
+
+
+def test_the_past_can_be_asked_for(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]')
+    bench.daemon.push(plain_plan(7))
+    with session(connect=where) as opened:
+        past = ask_surely(opened, "history?_time=[now(-10m)..]")
+        assert [each["record_count"] for each in past["missions"]] == [7]
+        assert [each["seq"] for each in past["events"]] == list(range(len(past["events"])))
+        assert {"fc.found", "mission.push_ended"} <= {each["event"] for each in past["events"]}
+        assert (before := ask_surely(opened, "history?_time=[..now(-10m)]"))["events"] == before["missions"] == []
+        assert "not a time range" in ask_surely(opened, "history?_time=lately")["error"]
+
+
+def test_a_recorder_of_everything_is_no_ground_station(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]')
+    with session(connect=where) as opened:
+        reader = Reader(opened, "fleet/**")
+        until(lambda: len(reader.of("telemetry/attitude")) > 10, "telemetry")
+        status = bench.daemon.status()
+        assert status is not None
+        assert status["ground_stations"] == []
+        assert not [each for each in reader.samples if "@" in str(each.key_expr)]
+
+
+def test_replies_and_samples_have_a_time(start: Starter) -> None:
+    where = endpoint()
+    zenoh_bench(start, f'listen = ["{where}"]')
+    with session(connect=where) as opened:
+        reader = Reader(opened)
+        reader.wait("telemetry/attitude")
+        assert all(sample.timestamp is not None for sample in reader.samples)
+        ask_surely(opened, "state")
+        (reply,) = opened.get(key("state"))
+        assert reply.ok is not None
+        assert reply.ok.timestamp is not None
+        assert body(reply.ok)["time_source"] in {"ntp", "pi"}
+
+
+def test_a_metered_link_and_a_request_for_more(start: Starter) -> None:
+    """Telemetry is rare, arming is not delayed, and a subscriber may ask for more."""
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]\nprofile = "metered"\nrates = {{rc = 0}}\n{I_KNOW}')
+    with session(connect=where) as opened:
+        reader = Reader(opened)
+        # The first goes out at once, the others together with all groups.
+        until(lambda: len(reader.of("telemetry/status")) == 3, "three samples")
+        _, first, second = reader.of("telemetry/status")
+        assert second["time_s"] - first["time_s"] > 4
+        assert reader.of("telemetry/rc") == []
+        bench.board.set("armed 1")
+        armed = reader.wait("telemetry/status", lambda status: status["armed"])
+        assert armed["time_s"] - second["time_s"] < 4
+        (granted,) = ask(opened, "@cmd/v1/rates?attitude=5;for_s=30")
+        assert granted["result"]["rates_hz"]["attitude"] == 5.0
+        seen = len(reader.of("telemetry/attitude"))
+        until(lambda: len(reader.of("telemetry/attitude")) > seen + 8, "samples as asked for")
+        assert "more than 0" in ask(opened, "@cmd/v1/rates?attitude=1e9")[0]["error"]

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How often samples go out: limits, changes that cannot wait, requests that end by themselves."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.model.vehicle_groups import Attitude, Group, Status
+from service.zenoh_link.rates import SampleRates
+from service.zenoh_link.settings import Profile, ZenohSettingsError, check_rates
+
+GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)
+
+
+def sent_at(rates: SampleRates, times: list[float], group: Group = Group.ATTITUDE) -> list[float]:
+    return [now for now in times if rates.admits(group, Attitude(1.0), now, gathered=True)]
+
+
+def times_of(gaps_s: list[float]) -> list[float]:
+    times = [100.0]
+    for gap_s in gaps_s:
+        times.append(times[-1] + gap_s)
+    return times
+
+
+@given(GAPS_S, st.sampled_from([0.2, 1.0, 4.0, 10.0]))
+def test_no_more_than_the_limit_goes_out(gaps_s: list[float], limit_hz: float) -> None:
+    times = times_of(gaps_s)
+    sent = sent_at(SampleRates(Profile.FULL, {"attitude": limit_hz}), times)
+    assert sent[0] == times[0]
+    assert len(sent) <= 2 + (times[-1] - times[0]) * limit_hz
+
+
+def test_a_limit_is_reached_from_a_rate_that_it_does_not_divide() -> None:
+    sent = sent_at(SampleRates(Profile.FULL, {"attitude": 4.0}), [number / 10 for number in range(1000)])
+    assert 395 <= len(sent) <= 401
+
+
+@given(GAPS_S)
+def test_the_full_profile_limits_nothing(gaps_s: list[float]) -> None:
+    times = times_of(gaps_s)
+    assert sent_at(SampleRates(Profile.FULL, {}), times) == times
+
+
+def test_a_rate_of_0_sends_nothing() -> None:
+    assert sent_at(SampleRates(Profile.METERED, {"attitude": 0.0}), [1.0, 20.0, 400.0]) == []
+
+
+def test_arming_does_not_wait_on_a_metered_link() -> None:
+    rates = SampleRates(Profile.METERED, {})
+    assert rates.admits(Group.STATUS, Status(armed=False, mode="ACRO", cycle_time_us=3000), 0.0)
+    assert not rates.admits(Group.STATUS, Status(armed=False, mode="ACRO", cycle_time_us=3050), 1.0)
+    assert rates.held_back == {Group.STATUS}
+    assert rates.admits(Group.STATUS, Status(armed=True, mode="ACRO", cycle_time_us=3050), 1.1)
+    assert rates.held_back == set()
+    assert rates.admits_state(("armed", None), 1.1)
+    assert not rates.admits_state(("armed", None), 2.1)
+    assert rates.admits_state(("disarmed", None), 2.2)
+
+
+def test_rare_groups_go_out_together() -> None:
+    rates = SampleRates(Profile.METERED, {})
+    for group in (Group.ATTITUDE, Group.POSITION):
+        assert rates.admits(group, Attitude(1.0), 3.0)
+    assert not any(rates.admits(group, Attitude(2.0), 7.0) for group in (Group.ATTITUDE, Group.POSITION))
+    assert rates.held_back == {Group.ATTITUDE, Group.POSITION}
+    assert all(rates.admits(group, Attitude(2.0), 7.1, gathered=True) for group in (Group.ATTITUDE, Group.POSITION))
+
+
+def test_a_request_raises_a_rate_for_a_while() -> None:
+    rates = SampleRates(Profile.METERED, {})
+    seconds = [float(number) for number in range(61)]
+    assert len(sent_at(rates, seconds)) == 13
+    rates.request("attitude", 1.0, until=130.0)
+    assert rates.describe(100.0)["attitude"] == 1.0
+    assert len(sent_at(rates, [100 + each for each in seconds])) == 30 + 7
+
+    rates = SampleRates(Profile.METERED, {})
+    rates.request("attitude", 1.0, until=130.0)
+    assert rates.describe(131.0)["attitude"] == 0.2
+    rates.request("attitude", 0.01, until=300.0)
+    assert rates.describe(140.0)["attitude"] == 0.2
+
+
+@pytest.mark.parametrize("rates", [{"altitude": 1}, {"rc": -1}, {"rc": True}, {"rc": "fast"}, {"rc": 1e9}])
+def test_rates_that_cannot_be_used(rates: dict[str, object]) -> None:
+    with pytest.raises(ZenohSettingsError, match=r"zenoh\.rates"):
+        check_rates(rates)
