@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from bridge.gcs.station import Peer, Station
 from bridge.model.events import EventLog
-from bridge.vehicle.commands import CommandResult
+from protocols.mavlink.command_result import CommandResult
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame

@@ -6,7 +6,6 @@ Nothing here may arm, steer or restart an aircraft; such commands are refused wi
 
 import math
 from collections.abc import Callable, Sequence
-from enum import IntEnum
 
 from bridge.fc.actions import (
     CALIBRATE_ACCELEROMETER,
@@ -18,19 +17,8 @@ from bridge.fc.actions import (
 )
 from bridge.gcs.station import Post, Severity, Station
 from bridge.vehicle.own_vehicle import OwnVehicle
+from protocols.mavlink.command_result import CommandResult
 from protocols.mavlink.dialect import messages
-
-
-class CommandResult(IntEnum):
-    """MAV_RESULT."""
-
-    ACCEPTED = 0
-    TEMPORARILY_REJECTED = 1
-    DENIED = 2
-    UNSUPPORTED = 3
-    FAILED = 4
-    IN_PROGRESS = 5
-
 
 _MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1
 _MAX_MSGID = (1 << 24) - 1
