@@ -13,6 +13,7 @@ from math import inf
 
 import serial
 
+from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.vehicle.telemetry_table import TELEMETRY
 
@@ -39,7 +40,7 @@ def _poll(loop: asyncio.AbstractEventLoop, link: str) -> None:
         loop.call_later(interval_s, ask, poll, interval_s)
 
     for poll in POLLS:
-        interval_s = min(poll.needed_s, *(row.interval_s for row in TELEMETRY if row.poll is poll.command))
+        interval_s = min(poll.needed_s, *(row.interval_s for row in TELEMETRY if POLL_FOR[row.reading] is poll.command))
         if interval_s < inf:
             ask(poll, interval_s)
 

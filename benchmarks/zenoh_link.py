@@ -24,6 +24,7 @@ from benchmarks.idle import LIBRARIES, libraries_mb, listener, resident_mb, udpo
 from benchmarks.processes import BenchmarkError, daemon, running, wait_for
 from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, wish
 from benchmarks.zenoh_programs import client, configuration, router_program
+from bridge.model.vehicle import Orientation
 from bridge.model.vehicle_groups import Group
 from service.daemon import Daemon
 from service.links.connection import parse_fc
@@ -171,7 +172,7 @@ class _Fed:
         # An hour ahead: no timer of the loop runs before its time has been played.
         self._now = asyncio.get_running_loop().time() + 3600
         daemon.bridge.fc_opened(self._now)
-        while daemon.bridge.session.vehicle.attitude is None:
+        while daemon.bridge.session.vehicle.last(Orientation) is None:
             self.step()
 
     def step(self) -> int:

@@ -3,7 +3,7 @@
 
 The service feeds bytes, time and the store's answers in, and afterwards takes what is to be sent, stored and said.
 A byte's way from the UART:
-    fc_received -> FcSession -> MspLink -> VehicleState -> OwnVehicle -> Ground -> take_datagrams
+    fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take_datagrams
 A mission item's way to the flight controller, and back for the proof:
     gcs_received -> Ground -> Guard -> MessageRouter -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 
-from bridge.controllers.harakiri.relay import HarakiriRelay
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
 from bridge.fc.actions import FcActions
@@ -77,7 +76,6 @@ class Bridge:
         self._store_effects: list[StoreEffect] = []
         self._was_armed = False
         self._pass_through: PassThrough | None = None
-        self._relay: HarakiriRelay | None = None
         self._announcer = LinkAnnouncer()
         self._incidents = Incidents()
 
@@ -97,7 +95,6 @@ class Bridge:
             self._incidents,
             self._controller_changed,
             self._mavlink_received,
-            self._answered,
             config.autopilot,
         )
         self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
@@ -140,6 +137,7 @@ class Bridge:
     def fc_received(self, data: bytes, now: float) -> None:
         """Take bytes from the port."""
         self.session.received(data, now)
+        self._pass_on_news(now)
         armed = self.session.vehicle.armed
         if armed is None or armed == self._was_armed:
             # What is not known is no change: a Harakiri that arms may fall silent first.
@@ -224,6 +222,7 @@ class Bridge:
     def tick(self, now: float) -> None:
         """Do what is due."""
         self.session.tick(now)
+        self._pass_on_news(now)
         self.runner.tick(now)
         self._uploads.tick(now)
         for peer in self.ground.expire(now):
@@ -286,14 +285,11 @@ class Bridge:
         store = self._open_store(controller)
         self.missions.use(store)
         self._downloads.forget_all()
-        self.report.controller_changed()
         if controller is None:
-            self._relay = None
             self._uploads.link_lost(now)
             self._announcer.lost(now)
             return
         is_passed_through = controller.profile.is_passed_through
-        self._relay = None if is_passed_through else HarakiriRelay(self.ground)
         self._pass_through = PassThrough(self.ground) if is_passed_through else None
         self._say(self._announcer.found(controller))
         if not isinstance(store, Refusal):
@@ -310,22 +306,25 @@ class Bridge:
         view = VehicleView(self._is_armed, self._home, self._vehicle.home)
         return profile.open_store(controller, view, RuleSettings(self._config.takeoff_max_m))
 
-    def _answered(self, command: int, now: float) -> None:
-        self._vehicle.answered(command, now)
-        self.report.answered(command)
+    def _pass_on_news(self, now: float) -> None:
+        if self.report.is_watched:
+            self.session.settle_telemetry()
+        news = self.session.vehicle.take_news()
+        if news:
+            self.report.heard(news)
+            if self._pass_through is None:
+                self._vehicle.heard(news, now)
 
     def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
-        self.report.mavlink_received(frames)
         if self._pass_through is not None:
             self._pass_through.from_autopilot(frames)
-        elif self._relay is not None:
-            self._relay.take(frames)
 
     def _is_armed(self) -> bool | None:
         return self.session.vehicle.armed
 
     def _home(self) -> tuple[int, int] | None:
-        home = self.session.vehicle.home
+        vehicle = self.session.vehicle
+        home = vehicle.home if vehicle.is_home_settled else None
         return None if home is None else (home.lat_e7, home.lon_e7)
 
     def _banner(self) -> str:

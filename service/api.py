@@ -116,16 +116,16 @@ class MissionJobs:
         bridge = self._daemon.bridge
         session = bridge.session
         controller = session.controller
-        vehicle = session.vehicle
+        report = bridge.report.whole()
         held = bridge.missions.held
         link = session.link
         return {
             "flight_controller": None if controller is None else controller.name,
             "state": session.state.name,
             "speed_baud": session.speed if controller else None,
-            "armed": vehicle.armed,
-            "battery_v": vehicle.analog.battery_dv / 10 if vehicle.analog else None,
-            "satellites": vehicle.gps.satellites if vehicle.gps else None,
+            "armed": report.status.armed,
+            "battery_v": report.battery.voltage_v,
+            "satellites": report.gps.satellites,
             "ground_stations": [str(peer) for peer in bridge.ground.peers()],
             "refused": [f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()],
             "recording": self._daemon.recording,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from protocols.mavlink.dialect import messages as m
 
@@ -26,10 +27,11 @@ def name_of(row: Row) -> str:
 @pytest.mark.parametrize("row", TELEMETRY, ids=name_of)
 def test_each_message_is_on_the_page_as_it_is_in_the_code(row: Row) -> None:
     (line,) = re.findall(rf"^\| {name_of(row)} \| (.*) \|$", PAGE, re.MULTILINE)
-    poll, rate, stream = line.split(" | ")
-    assert poll.startswith(f"{row.poll.name} {row.poll.value}")
-    if row.interval_s < inf:
-        assert rate == f"{1 / row.interval_s:g} Hz"
+    after, _, rate, stream = line.split(" | ")
+    if row.msgid != m.MAVLINK_MSG_ID_HOME_POSITION:
+        poll = POLL_FOR[row.reading]
+        assert after.startswith(f"{poll.name} {poll.value}")
+    assert rate == ("on request" if row.interval_s == inf else f"{1 / row.interval_s:g} Hz")
     assert stream == ("none" if row.stream == NO_STREAM else STREAMS[row.stream])
 
 

@@ -32,7 +32,7 @@ OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recogni
 #: Ground stations write missions to such an autopilot directly; only the command line can ask the bridge for it.
 OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",
-    "other",
+    "MAVLink",
     Spoken.MAVLINK,
     no_missions=Refusal(
         MissionResult.UNSUPPORTED, "This autopilot speaks MAVLink itself: write its missions from a ground station"

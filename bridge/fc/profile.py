@@ -5,8 +5,8 @@
 `bridge/controllers/` and add it to that list; nothing else asks what kind of board it is.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
@@ -15,10 +15,14 @@ from bridge.line.poll_schedule import POLLS, Poll
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.list_check import MissionRules
 from bridge.model.refusal import Refusal
+from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import Info
 
 _ARM_BOX = "ARM"
+
+#: Fills the vehicle from the payload of a reply, heard at a time.
+Decoder = Callable[[Vehicle, bytes, "FlightController", float], None]
 
 NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "This flight controller stores no missions")
 
@@ -50,7 +54,9 @@ class Profile:
 
     name: for people and logs. family: profiles of one firmware share it; a board that switches protocol stays in it.
     recognise: MSP only; returns the flight controller if the interview shows that it is this kind.
-    polls: the telemetry questions it answers. accepts_any_byte: its parser acts on no byte runs inside a frame.
+    polls: the telemetry questions it answers. decoders: by command, for replies in a layout of its own; the common ones
+    are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
+    accepts_any_byte: its parser acts on no byte runs inside a frame.
     open_store: how missions are written to it, or None with `no_missions` as the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
@@ -64,6 +70,8 @@ class Profile:
     spoken: Spoken = Spoken.MSP
     recognise: Callable[[Interview], Conversation["FlightController | None"]] | None = None
     polls: tuple[Poll, ...] = POLLS
+    decoders: Mapping[int, Decoder] = field(default_factory=dict)
+    has_2d_fix: bool = False
     accepts_any_byte: bool = False
     open_store: Callable[["FlightController", VehicleView, RuleSettings], AnyFcMissionStore] | None = None
     no_missions: Refusal = NO_MISSIONS

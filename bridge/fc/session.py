@@ -31,9 +31,8 @@ from bridge.line.msp_link import MspLink
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.events import EventLog, Incidents
-from bridge.model.vehicle_state import VehicleState
+from bridge.model.vehicle import Vehicle
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.msp.telemetry import HomePoint
 
 #: State -> event -> next state. Any other event in a state is a bug.
 TRANSITIONS: Mapping[type[State], Mapping[type[Event], type[State]]] = {
@@ -56,7 +55,7 @@ class FcSession:
     """Runs the state machine of one port.
 
     `on_change` is called with each flight controller that is found, and with None when it is lost. `on_mavlink` gets
-    its MAVLink frames, `on_answer` the command number of each MSP reply.
+    its MAVLink frames.
     """
 
     def __init__(
@@ -68,10 +67,9 @@ class FcSession:
         incidents: Incidents,
         on_change: Callable[[FlightController | None, float], None],
         on_mavlink: Callable[[list[MavlinkFrame]], None],
-        on_answer: Callable[[int, float], None],
         autopilot: Autopilot,
     ) -> None:
-        self._port = Port(speeds, autopilot, profiles, runner, on_mavlink, on_answer)
+        self._port = Port(speeds, autopilot, profiles, runner, on_mavlink)
         self._log_event = log_event
         self._incidents = incidents
         #: From the port's opening or a loss until a flight controller is found.
@@ -85,8 +83,8 @@ class FcSession:
         return self.state.controller
 
     @property
-    def vehicle(self) -> VehicleState:
-        """Its telemetry."""
+    def vehicle(self) -> Vehicle:
+        """What it has told, kept when it is lost."""
         return self._port.vehicle
 
     @property
@@ -151,6 +149,11 @@ class FcSession:
         """The bytes to be written to the port at the present `speed`."""
         return self.state.take_output()
 
+    def settle_telemetry(self) -> None:
+        """Read what a passed-through autopilot has sent into the vehicle."""
+        if isinstance(self.state, Mavlink):
+            self.state.telemetry.settle()
+
     def send_mavlink(self, frame: bytes) -> None:
         """Pass a ground station's frame on to an autopilot that speaks MAVLink itself."""
         if isinstance(self.state, Mavlink):
@@ -180,10 +183,6 @@ class FcSession:
         self.state = Closed(self._port, state.speed)
         if not isinstance(state, MspLine) and state.controller is None:
             return
-        # These do not depend on the protocol.
-        before = self._port.vehicle
-        home = before.home_or_position()
-        self._port.vehicle = VehicleState(mixer=before.mixer, home=None if home is None else HomePoint(*home))
         self._port.runner.link_down(now)
         if state.controller is None:
             return

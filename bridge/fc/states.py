@@ -14,6 +14,8 @@ from typing import ClassVar
 
 from bridge.fc.autosense import Autosense, Found, Spoken
 from bridge.fc.identify import identify_msp
+from bridge.fc.mavlink_telemetry import MavlinkTelemetry
+from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController, Profile
 from bridge.line.conversation import LinkLost
 from bridge.line.frsky_line import FrskyLine
@@ -22,7 +24,7 @@ from bridge.line.msp_link import MspLink
 from bridge.line.pending_replies import PendingReplies
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
-from bridge.model.vehicle_state import VehicleState
+from bridge.model.vehicle import FlightState, Source, Vehicle
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspFrame
@@ -114,14 +116,21 @@ class Port:
     profiles: Sequence[Profile]
     runner: Runner
     on_mavlink: Callable[[list[MavlinkFrame]], None]
-    on_answer: Callable[[int, float], None]
     polls: PollSchedule = field(default_factory=PollSchedule)
-    vehicle: VehicleState = field(default_factory=VehicleState)
+    vehicle: Vehicle = field(default_factory=Vehicle)
     output: list[bytes] = field(default_factory=list)
     #: A Harakiri that arms may change its speed; disarmed, it comes back to this one.
     known_speed: int | None = None
     #: The family of the board that was last identified over MSP on this port.
     met_family: str | None = None
+    #: The family of the board that `vehicle` describes, which outlives a lost link and a change of protocol.
+    family: str | None = None
+
+    def meet(self, controller: FlightController) -> None:
+        """Begin a new vehicle if this is another board than before."""
+        if controller.profile.family != self.family:
+            self.family, self.vehicle = controller.profile.family, Vehicle()
+        self.vehicle.mixer = controller.mixer or self.vehicle.mixer
 
 
 class State(ABC):
@@ -361,7 +370,7 @@ class Msp(MspLine):
             self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
         self.link.any_byte = controller.profile.accepts_any_byte
         port.polls.begin(event.found.speed, controller.profile.polls)
-        port.vehicle.mixer = controller.mixer
+        port.meet(controller)
         self._check_interval_s = _FIRST_CHECK_S
         self._check_at = now + _FIRST_CHECK_S if controller.profile.open_store is None else inf
         self._corrected: FlightController | None = None
@@ -370,8 +379,7 @@ class Msp(MspLine):
         """Replies belong to a conversation, to a poll, or to both."""
         super().take_frame(frame, now)
         self.port.polls.answered(frame)
-        self.port.vehicle.take(frame, self.controller)
-        self.port.on_answer(frame.command, now)
+        hear_msp(self.port.vehicle, frame, self.controller, now)
 
     def tick(self, now: float) -> Event | None:
         """Poll; check an identity that is in doubt."""
@@ -411,7 +419,9 @@ class Mavlink(State):
         super().__init__(port, event.found.speed)
         profile = self._profile(event.found.heard)
         self.controller = FlightController(profile, profile.name)
+        port.meet(self.controller)
         self._line = MavlinkLine(is_harakiri=not profile.is_passed_through, now=now)
+        self.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=not profile.is_passed_through)
         if not profile.is_passed_through:
             port.runner.mavlink_up(self._line)
 
@@ -437,8 +447,8 @@ class Mavlink(State):
         return super().take_output() + self._line.take_output()
 
     def _take(self, frames: list[MavlinkFrame], now: float) -> Event | None:
-        self.port.vehicle.armed = self._line.armed
         if frames:
+            self.telemetry.take(frames, now)
             self.port.on_mavlink(frames)
         if self.port.runner.is_busy:
             for frame in frames:
@@ -470,7 +480,10 @@ class Frsky(State):
         (profile,) = (profile for profile in port.profiles if profile.spoken is Spoken.FRSKY)
         self.controller = FlightController(profile, profile.name)
         self._line = FrskyLine(now)
-        port.vehicle.armed = True
+        port.meet(self.controller)
+        # Only an armed Harakiri sends it.
+        known = port.vehicle.last(FlightState)
+        port.vehicle.hear(FlightState(now, Source.FRSKY, True, None if known is None else known.mode))
 
     def receive(self, data: bytes, now: float) -> Event | None:
         """Watch the line."""

@@ -62,7 +62,6 @@ POLLS = (
     Poll(Msp.ALTITUDE, request(Msp.ALTITUDE), 10, 1.0),
     Poll(Msp.ANALOG, request(Msp.ANALOG), 9, 1.0),
     Poll(Msp.RC, request(Msp.RC), 68, 1.0),
-    Poll(Msp.COMP_GPS, request(Msp.COMP_GPS), 5, 5.0),
     Poll(Msp.WP, request(Msp.WP, b"\0"), 21, 2.0),
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
 )

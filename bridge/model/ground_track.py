@@ -1,45 +1,56 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Velocity over ground, for flight controllers that send a speed but no course: its direction is that of two fixes."""
+"""Distances between places, and the course over ground of receivers that report a speed but no course."""
 
 import math
-
-from protocols.msp.telemetry import RawGps
+from typing import Protocol
 
 _METRES_PER_DEGREE = 111_320.0
-#: Fixes nearer to each other than this say more of the receiver's noise than of the way.
+#: Positions closer together than this show the receiver's noise rather than a movement.
 _LEG_M = 1.0
 
-#: Metres a second to the north and to the east.
-Velocity = tuple[float, float]
+
+class Place(Protocol):
+    """Degrees * 1e7."""
+
+    @property
+    def lat_e7(self) -> int:
+        """Latitude."""
+
+    @property
+    def lon_e7(self) -> int:
+        """Longitude."""
 
 
 class GroundTrack:
-    """Follows the fixes of one receiver. Its speed is measured, and taken as it is; only the direction is made."""
+    """Follows successive positions."""
 
     def __init__(self) -> None:
-        self._leg_began: RawGps | None = None
-        self._direction: tuple[float, float] | None = None
+        self._leg_began: Place | None = None
+        self._course_deg: float | None = None
 
-    def velocity(self, gps: RawGps) -> Velocity | None:
-        """Take a fix; None while it moves and nothing tells where to: at the first one."""
-        speed = gps.speed_cms / 100
-        if gps.course_ddeg is not None:
-            course = math.radians(gps.course_ddeg / 10)
-            return speed * math.cos(course), speed * math.sin(course)
-        self._leg_began = self._leg_began or gps
-        north, east = _way(self._leg_began, gps)
-        metres = math.hypot(north, east)
-        direction = self._direction or ((north / metres, east / metres) if metres else None)
-        if metres >= _LEG_M:
-            self._leg_began = gps
-            self._direction = direction = north / metres, east / metres
-        if direction is None:
-            return None if speed else (0.0, 0.0)
-        return speed * direction[0], speed * direction[1]
+    def course_deg(self, place: Place) -> float | None:
+        """Take a position. The course, 0 up to 360, or None before the first metre."""
+        if self._leg_began is None:
+            self._leg_began = place
+        elif distance_m(self._leg_began, place) >= _LEG_M:
+            self._course_deg = bearing_deg(self._leg_began, place)
+            self._leg_began = place
+        return self._course_deg
 
 
-def _way(start: RawGps, end: RawGps) -> tuple[float, float]:
-    """Return metres to the north and to the east."""
+def distance_m(start: Place, end: Place) -> float:
+    """Metres between two places; exact enough for a flight in sight."""
+    return math.hypot(*north_east_m(start, end))
+
+
+def bearing_deg(start: Place, end: Place) -> float:
+    """Direction from one place to another, 0 up to 360."""
+    north, east = north_east_m(start, end)
+    return math.degrees(math.atan2(east, north)) % 360
+
+
+def north_east_m(start: Place, end: Place) -> tuple[float, float]:
+    """Metres to the north and to the east."""
     metres_per_unit = _METRES_PER_DEGREE / 1e7
     # Across the date line the short way is meant.
     east_units = (end.lon_e7 - start.lon_e7 + 1_800_000_000) % 3_600_000_000 - 1_800_000_000

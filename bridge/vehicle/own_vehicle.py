@@ -5,10 +5,11 @@ It is there from the start and keeps its ids whatever the flight controller does
 the craft was armed and speaks another protocol now.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from math import inf
 
+from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.gcs.message_rates import MessageRates
@@ -16,8 +17,10 @@ from bridge.gcs.station import Peer, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import MissionProgress
+from bridge.model.vehicle import FlightState, Home, MissionLeg, Reading
 from bridge.vehicle import vehicle_messages
-from bridge.vehicle.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY, Row
+from bridge.vehicle.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY
+from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
@@ -29,11 +32,8 @@ _FASTEST_S = 0.01
 _MISSION_CURRENT = messages.MAVLINK_MSG_ID_MISSION_CURRENT
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _STREAMS = {row.msgid: row.stream for row in TELEMETRY} | {_MISSION_CURRENT: EXTENDED_STATUS}
-_POLLS = {row.msgid: row.poll for row in TELEMETRY}
+_READINGS = {row.msgid: row.reading for row in TELEMETRY}
 _DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | {_MISSION_CURRENT: _TICK_S}
-_ROWS: dict[int, list[Row]] = {}
-for _row in TELEMETRY:
-    _ROWS.setdefault(_row.poll, []).append(_row)
 
 
 class OwnVehicle:
@@ -47,9 +47,9 @@ class OwnVehicle:
         self._tick_due = now
         self._rates = MessageRates(_DEFAULTS)
         self._progress = MissionProgress()
-        self._announced_home: tuple[int, int] | None = None
-        self._also_wanted: Mapping[Msp, float] = {}
-        self._announced: tuple[bool | None, FlightMode | None] | None = None
+        self._announced_home: Home | None = None
+        self._also_wanted: Mapping[type[Reading], float] = {}
+        self._announced: tuple[bool | None, FlightMode | str | None] | None = None
 
     def newcomer(self) -> None:
         """Somebody new is there: who comes later must hear of home, too."""
@@ -72,32 +72,35 @@ class OwnVehicle:
         """Return when `tick` has something to do."""
         return self._tick_due
 
-    def answered(self, command: int, now: float) -> None:
-        """The flight controller has answered a poll: pass on what it said."""
+    def heard(self, news: Collection[type[Reading]], now: float) -> None:
+        """The vehicle has new readings: send the messages that they are for, where due."""
         self._now = now
         everyone = self._ground.everyone()
-        vehicle = self._session.vehicle
-        for row in _ROWS.get(command, ()):
+        at = self._moment()
+        for row in TELEMETRY:
+            if row.reading not in news:
+                continue
             peers = self._rates.take_due(row.msgid, everyone, now)
             if not peers:
                 continue
             for make in row.makers:
-                message = make(vehicle, self._boot_ms())
+                message = make(at)
                 if message is not None:
                     self._ground.multicast(pack(message), peers)
-        if command == Msp.NAV_STATUS:
+        if MissionLeg in news:
             self._follow_mission()
-        if command == Msp.STATUS and self._announced != (vehicle.armed, vehicle.mode):
+        if FlightState in news and self._announced != self._shown_state():
             self._heartbeat()
 
-    def also_want(self, polls: Mapping[Msp, float]) -> None:
-        """Poll for others than ground stations, too: seconds by command."""
-        self._also_wanted = polls
+    def also_want(self, readings: Mapping[type[Reading], float]) -> None:
+        """Poll for others than ground stations, too: seconds by reading."""
+        self._also_wanted = readings
         self._set_polls(self._ground.everyone())
 
     def home(self) -> tuple[int, int] | None:
-        """Return where home is, degrees * 1e7."""
-        return self._session.vehicle.home_or_position()
+        """Home, or else the present position, degrees * 1e7."""
+        home = self._session.vehicle.home_or_position()
+        return None if home is None else (home.lat_e7, home.lon_e7)
 
     # What ground stations ask for.
 
@@ -132,33 +135,39 @@ class OwnVehicle:
             return _TICK_S
         if not self._rates.knows(msgid):
             return None
-        poll = _POLLS.get(msgid)
-        pace_s = _TICK_S if poll is None else self._session.polls.interval_s(poll)
+        reading = _READINGS.get(msgid)
+        pace_s = _TICK_S if reading is None else self._session.polls.interval_s(POLL_FOR[reading])
         return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
 
     def _set_polls(self, everyone: Sequence[Peer]) -> None:
         """Poll as often as somebody wants to hear of it."""
-        wanted = dict(self._also_wanted)
+        wanted: dict[Msp, float] = {}
+        for reading, interval_s in self._also_wanted.items():
+            _want(wanted, reading, interval_s)
         for row in TELEMETRY:
-            wanted[row.poll] = min(wanted.get(row.poll, inf), self._rates.fastest_s(row.msgid, everyone))
+            _want(wanted, row.reading, self._rates.fastest_s(row.msgid, everyone))
         self._session.polls.want(wanted)
 
     def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:
-        vehicle, boot_ms = self._session.vehicle, self._boot_ms()
         if msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             return [vehicle_messages.autopilot_version]
         if msgid == _MISSION_CURRENT:
             return [self._mission_current]
         makers = (make for row in TELEMETRY if row.msgid == msgid for make in row.makers)
-        return [partial(make, vehicle, boot_ms) for make in makers]
+        return [partial(make, self._moment()) for make in makers]
 
-    def _boot_ms(self) -> int:
-        return int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
+    def _moment(self) -> Moment:
+        boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
+        return Moment(self._session.vehicle, self._now, boot_ms)
+
+    def _shown_state(self) -> tuple[bool | None, FlightMode | str | None]:
+        state = self._session.vehicle.last(FlightState)
+        return (None, None) if state is None else (state.armed, state.mode)
 
     def _heartbeat(self) -> Message:
-        vehicle = self._session.vehicle
-        self._announced = vehicle.armed, vehicle.mode
-        heartbeat = vehicle_messages.heartbeat(vehicle, linked=self._session.controller is not None)
+        self._announced = self._shown_state()
+        is_linked = self._session.controller is not None
+        heartbeat = vehicle_messages.heartbeat(self._session.vehicle, linked=is_linked)
         self._ground.broadcast(heartbeat)
         return heartbeat
 
@@ -169,18 +178,23 @@ class OwnVehicle:
 
     def _follow_mission(self) -> None:
         """Tell at once what was reached; where it flies to next comes every second."""
-        nav = self._session.vehicle.nav
-        reached = None if nav is None else self._progress.take(nav)
+        leg = self._session.vehicle.last(MissionLeg)
+        reached = None if leg is None else self._progress.take(leg.status)
         seq = self._missions.seq_of(reached or 0)
         if seq:
             self._ground.broadcast(vehicle_messages.mission_item_reached(seq))
 
     def _announce_home(self) -> None:
         """HOME_POSITION whenever it is another one; who asks gets it at any time."""
-        home = self.home()
+        home = self._session.vehicle.home
         if home == self._announced_home:
             return
-        message = vehicle_messages.home_position(self._session.vehicle, self._boot_ms())
+        message = vehicle_messages.home_position(self._moment())
         if message is not None:
             self._announced_home = home
             self._ground.broadcast(message)
+
+
+def _want(wanted: dict[Msp, float], reading: type[Reading], interval_s: float) -> None:
+    poll = POLL_FOR[reading]
+    wanted[poll] = min(wanted.get(poll, inf), interval_s)

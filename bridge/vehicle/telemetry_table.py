@@ -1,18 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which message is made from which poll's reply, how often by default, and in which of ArduPilot's streams it is."""
+"""Which message follows which reading, how often by default, and in which of ArduPilot's streams it is."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
-from bridge.model.vehicle_state import VehicleState
+from bridge.model.vehicle import (
+    FlightState,
+    GlobalPosition,
+    GpsFix,
+    Health,
+    Height,
+    ImuSample,
+    Orientation,
+    Power,
+    Reading,
+    Sticks,
+)
 from bridge.vehicle import vehicle_messages as make
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
-from protocols.msp.commands import Msp
 
-#: Makes a message from what is known, `boot_ms` milliseconds after the start; None: not enough is known.
-Maker = Callable[[VehicleState, int], Message | None]
+#: Makes a message of the vehicle at a moment; None if too little is known.
+Maker = Callable[[make.Moment], Message | None]
 
 NO_STREAM = -1
 #: MAV_DATA_STREAM's members, as ArduCopter fills them (GCS_Mavlink.cpp).
@@ -22,27 +32,27 @@ EXTRA1, EXTRA2, EXTRA3 = 10, 11, 12
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One message id. It goes out the moment that `poll` is answered; `interval_s` infinite: only on request."""
+    """One message id. It is sent as soon as `reading` is heard; `interval_s` infinite: only on request."""
 
     msgid: int
-    poll: Msp
+    reading: type[Reading]
     interval_s: float
     stream: int
     makers: tuple[Maker, ...]
 
 
 TELEMETRY = (
-    Row(m.MAVLINK_MSG_ID_ATTITUDE, Msp.ATTITUDE, 0.04, EXTRA1, (make.attitude,)),
-    Row(m.MAVLINK_MSG_ID_GPS_RAW_INT, Msp.RAW_GPS, 0.2, EXTENDED_STATUS, (make.gps_raw_int,)),
-    Row(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, Msp.RAW_GPS, 0.2, POSITION, (make.global_position_int,)),
-    Row(m.MAVLINK_MSG_ID_VFR_HUD, Msp.ALTITUDE, 0.2, EXTRA2, (make.vfr_hud,)),
-    Row(m.MAVLINK_MSG_ID_SYS_STATUS, Msp.STATUS, 0.5, EXTENDED_STATUS, (make.sys_status,)),
-    Row(m.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, Msp.STATUS, 1.0, EXTENDED_STATUS, (make.extended_sys_state,)),
-    Row(m.MAVLINK_MSG_ID_NAMED_VALUE_INT, Msp.STATUS, 1.0, EXTRA3, (make.cycle_time, make.i2c_errors)),
-    Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, Msp.ANALOG, 1.0, EXTRA3, (make.battery_status,)),
-    Row(m.MAVLINK_MSG_ID_RC_CHANNELS, Msp.RC, 0.5, RC_CHANNELS, (make.rc_channels,)),
-    Row(m.MAVLINK_MSG_ID_RC_CHANNELS_RAW, Msp.RC, 0.5, RC_CHANNELS, (make.rc_channels_raw,)),
-    Row(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, Msp.COMP_GPS, 1.0, EXTRA3, (make.home_distance, make.home_direction)),
-    Row(m.MAVLINK_MSG_ID_HOME_POSITION, Msp.WP, inf, NO_STREAM, (make.home_position,)),
-    Row(m.MAVLINK_MSG_ID_RAW_IMU, Msp.RAW_IMU, inf, RAW_SENSORS, (make.raw_imu,)),
+    Row(m.MAVLINK_MSG_ID_ATTITUDE, Orientation, 0.04, EXTRA1, (make.attitude,)),
+    Row(m.MAVLINK_MSG_ID_GPS_RAW_INT, GpsFix, 0.2, EXTENDED_STATUS, (make.gps_raw_int,)),
+    Row(m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, GlobalPosition, 0.2, POSITION, (make.global_position_int,)),
+    Row(m.MAVLINK_MSG_ID_VFR_HUD, Height, 0.2, EXTRA2, (make.vfr_hud,)),
+    Row(m.MAVLINK_MSG_ID_SYS_STATUS, Health, 0.5, EXTENDED_STATUS, (make.sys_status,)),
+    Row(m.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, FlightState, 1.0, EXTENDED_STATUS, (make.extended_sys_state,)),
+    Row(m.MAVLINK_MSG_ID_NAMED_VALUE_INT, Health, 1.0, EXTRA3, (make.cycle_time, make.i2c_errors)),
+    Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, Power, 1.0, EXTRA3, (make.battery_status,)),
+    Row(m.MAVLINK_MSG_ID_RC_CHANNELS, Sticks, 0.5, RC_CHANNELS, (make.rc_channels,)),
+    Row(m.MAVLINK_MSG_ID_RC_CHANNELS_RAW, Sticks, 0.5, RC_CHANNELS, (make.rc_channels_raw,)),
+    Row(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, GlobalPosition, 1.0, EXTRA3, (make.home_distance, make.home_direction)),
+    Row(m.MAVLINK_MSG_ID_HOME_POSITION, GlobalPosition, inf, NO_STREAM, (make.home_position,)),
+    Row(m.MAVLINK_MSG_ID_RAW_IMU, ImuSample, inf, RAW_SENSORS, (make.raw_imu,)),
 )

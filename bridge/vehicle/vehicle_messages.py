@@ -1,14 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The MAVLink messages that make a flight controller on MSP a vehicle: docs/telemetry.md, field by field.
+"""The MAVLink messages of the vehicle that the bridge represents: docs/telemetry.md, field by field.
 
-What is not known is MAVLink's "unknown"; a message whose fields have no such value is not made (None).
+An unknown or stale value is MAVLink's "unknown"; a message whose fields have no such value is not made (None).
 """
 
 import math
+from dataclasses import dataclass
 
 from bridge.model.flight_mode import FlightMode
+from bridge.model.ground_track import bearing_deg, distance_m
 from bridge.model.mission_progress import Progress
-from bridge.model.vehicle_state import VehicleState
+from bridge.model.vehicle import (
+    STALE_S,
+    Fix,
+    FlightState,
+    GlobalPosition,
+    GpsFix,
+    Health,
+    Height,
+    ImuSample,
+    Orientation,
+    Power,
+    ReadingT,
+    Signal,
+    Sticks,
+    Vehicle,
+)
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 
@@ -68,21 +85,44 @@ _VERSION = (0, 1, 0, 0)
 _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_U8 = 0xFF
 _RAW_CHANNELS, _CHANNELS = 8, 18
-_MAX_RSSI, _MSP_MAX_RSSI = 254, 1020
+_MAX_RSSI = 254
+_THROTTLE = 2
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
 
 
-def vehicle_type(vehicle: VehicleState) -> int:
-    """Return MAV_TYPE; a mixer that nobody told of is a quadrocopter's."""
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The vehicle at one moment. now: monotonic s. stale_s: the age from which a reading counts as unknown."""
+
+    vehicle: Vehicle
+    now: float
+    boot_ms: int
+    stale_s: float = STALE_S
+
+    def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
+        """The latest reading of a kind, unless it is stale."""
+        return self.vehicle.fresh(kind, self.now, self.stale_s)
+
+    def altitude_m(self, position: GlobalPosition) -> float:
+        """Above mean sea level: home's altitude plus the height above it, which is finer than GPS's whole metres."""
+        home, height = self.vehicle.home, self.fresh(Height)
+        if home is None or home.altitude_m is None or height is None:
+            return position.altitude_m
+        return home.altitude_m + height.height_m
+
+
+def vehicle_type(vehicle: Vehicle) -> int:
+    """MAV_TYPE; an unknown mixer is a quadrocopter's."""
     kind: int = _TYPES.get(vehicle.mixer or 0, messages.MAV_TYPE_QUADROTOR)
     return kind
 
 
-def heartbeat(vehicle: VehicleState, *, linked: bool) -> Message:
+def heartbeat(vehicle: Vehicle, *, linked: bool) -> Message:
     """HEARTBEAT: an ArduPilot copter (or plane); the state says whether a flight controller is there."""
     kind = vehicle_type(vehicle)
     modes = _PLANE_MODES if kind == messages.MAV_TYPE_FIXED_WING else _COPTER_MODES
-    mode = vehicle.mode or FlightMode.STABILIZE
+    state = vehicle.last(FlightState)
+    mode = state.mode if state is not None and isinstance(state.mode, FlightMode) else FlightMode.STABILIZE
     base_mode = messages.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | messages.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     if mode is not FlightMode.ACRO:
         base_mode |= messages.MAV_MODE_FLAG_STABILIZE_ENABLED
@@ -91,11 +131,11 @@ def heartbeat(vehicle: VehicleState, *, linked: bool) -> Message:
     if vehicle.armed:
         base_mode |= messages.MAV_MODE_FLAG_SAFETY_ARMED
     if not linked:
-        state = messages.MAV_STATE_UNINIT
+        status = messages.MAV_STATE_UNINIT if state is None else messages.MAV_STATE_CRITICAL
     else:
-        state = messages.MAV_STATE_ACTIVE if vehicle.armed else messages.MAV_STATE_STANDBY
+        status = messages.MAV_STATE_ACTIVE if vehicle.armed else messages.MAV_STATE_STANDBY
     return messages.MAVLink_heartbeat_message(
-        kind, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, modes[mode], state, 3
+        kind, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, modes[mode], status, 3
     )
 
 
@@ -120,202 +160,214 @@ def mission_item_reached(seq: int) -> Message:
     return messages.MAVLink_mission_item_reached_message(seq)
 
 
-def attitude(vehicle: VehicleState, boot_ms: int) -> Message | None:
-    """ATTITUDE, radians; MSP's pitch is nose-down positive, MAVLink's nose-up. Rates are not known."""
-    now = vehicle.attitude
+def attitude(at: Moment) -> Message | None:
+    """ATTITUDE: radians, radians a second."""
+    now = at.fresh(Orientation)
     if now is None:
         return None
+    roll_rate, pitch_rate, yaw_rate = map(math.radians, now.rates_deg_s or (math.nan,) * 3)
     return messages.MAVLink_attitude_message(
-        boot_ms,
-        math.radians(now.roll_ddeg / 10),
-        math.radians(-now.pitch_ddeg / 10),
+        at.boot_ms,
+        math.radians(now.roll_deg),
+        math.radians(now.pitch_deg),
         math.radians((now.heading_deg + 180) % 360 - 180),
-        math.nan,
-        math.nan,
-        math.nan,
+        roll_rate,
+        pitch_rate,
+        yaw_rate,
     )
 
 
-def gps_raw_int(vehicle: VehicleState, boot_ms: int) -> Message | None:
-    """GPS_RAW_INT: degrees * 1e7, mm above sea level, cm/s; dilution and course only where they are sent."""
-    gps = vehicle.gps
+def gps_raw_int(at: Moment) -> Message | None:
+    """GPS_RAW_INT: degrees * 1e7, mm above mean sea level, cm/s, 0.01 degrees."""
+    gps = at.fresh(GpsFix)
     if gps is None:
         return None
+    position = at.fresh(GlobalPosition) if gps.fix is not Fix.NO_FIX else None
     return messages.MAVLink_gps_raw_int_message(
-        boot_ms * 1000,
-        vehicle.fix,
-        gps.lat_e7,
-        gps.lon_e7,
-        gps.altitude_m * 1000,
-        _UNKNOWN_U16 if gps.hdop_e2 is None else gps.hdop_e2,
+        at.boot_ms * 1000,
+        gps.fix,
+        0 if position is None else position.lat_e7,
+        0 if position is None else position.lon_e7,
+        0 if position is None else _fit(round(position.altitude_m * 1000), 32),
+        _scaled_u16(gps.hdop, 100),
         _UNKNOWN_U16,
-        gps.speed_cms,
-        _UNKNOWN_U16 if gps.course_ddeg is None else gps.course_ddeg * 10 % 36000,
-        gps.satellites,
+        _scaled_u16(gps.ground_speed_m_s, 100),
+        _UNKNOWN_U16 if gps.course_deg is None else round(gps.course_deg * 100) % 36000,
+        _UNKNOWN_U8 if gps.satellites is None else gps.satellites,
     )
 
 
-def global_position_int(vehicle: VehicleState, boot_ms: int) -> Message | None:
-    """GLOBAL_POSITION_INT: mm, cm/s, 0.01 degrees. Only with a fix, a velocity and a height: none has an "unknown"."""
-    gps, height, velocity = vehicle.gps, vehicle.height, vehicle.velocity
-    if gps is None or not vehicle.has_fix or height is None or velocity is None:
+def global_position_int(at: Moment) -> Message | None:
+    """GLOBAL_POSITION_INT: mm, cm/s, 0.01 degrees. Position, velocity and height have no "unknown"."""
+    position, height = at.fresh(GlobalPosition), at.fresh(Height)
+    if position is None or height is None or position.north_m_s is None or position.east_m_s is None:
         return None
-    north, east = velocity
-    heading = vehicle.attitude if vehicle.has_compass else None
+    orientation = at.fresh(Orientation)
+    is_north_known = orientation is not None and orientation.is_north_known
     return messages.MAVLink_global_position_int_message(
-        boot_ms,
-        gps.lat_e7,
-        gps.lon_e7,
-        gps.altitude_m * 1000,
-        _fit(height.height_cm * 10, 32),
-        _fit(round(north * 100), 16),
-        _fit(round(east * 100), 16),
-        _fit(-height.climb_cms, 16),
-        _UNKNOWN_U16 if heading is None else heading.heading_deg % 360 * 100,
+        at.boot_ms,
+        position.lat_e7,
+        position.lon_e7,
+        _fit(round(at.altitude_m(position) * 1000), 32),
+        _fit(round(height.height_m * 1000), 32),
+        _fit(round(position.north_m_s * 100), 16),
+        _fit(round(position.east_m_s * 100), 16),
+        _fit(round(-height.climb_m_s * 100), 16),
+        round(orientation.heading_deg * 100) % 36000 if orientation and is_north_known else _UNKNOWN_U16,
     )
 
 
-def vfr_hud(vehicle: VehicleState, _boot_ms: int) -> Message | None:
-    """VFR_HUD: m/s, degrees, percent of the throttle stick, metres above sea level.
+def vfr_hud(at: Moment) -> Message | None:
+    """VFR_HUD: m/s, degrees, percent of the throttle stick, metres above mean sea level.
 
-    A copter's airspeed is the ground speed, as with ArduCopter; of what has wings it is not known. Heading and throttle
-    have no "unknown", so both must be there.
+    A copter's airspeed is the ground speed, as with ArduCopter; a plane's is unknown. Heading and throttle have no
+    "unknown", so both must be there.
     """
-    attitude_now, channels, height = vehicle.attitude, vehicle.channels, vehicle.height
-    if attitude_now is None or channels is None:
+    orientation, sticks = at.fresh(Orientation), at.fresh(Sticks)
+    if orientation is None or sticks is None or len(sticks.channels_us) <= _THROTTLE:
         return None
-    gps = vehicle.gps if vehicle.has_fix else None
-    speed = math.nan if gps is None else gps.speed_cms / 100
-    has_wings = vehicle_type(vehicle) == messages.MAV_TYPE_FIXED_WING
-    throttle = (channels[3] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
+    position, height, gps = at.fresh(GlobalPosition), at.fresh(Height), at.fresh(GpsFix)
+    speed = math.nan if gps is None or gps.ground_speed_m_s is None else gps.ground_speed_m_s
+    has_wings = vehicle_type(at.vehicle) == messages.MAV_TYPE_FIXED_WING
+    throttle = (sticks.channels_us[_THROTTLE] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
     return messages.MAVLink_vfr_hud_message(
         math.nan if has_wings else speed,
         speed,
-        attitude_now.heading_deg % 360,
+        round(orientation.heading_deg) % 360,
         min(max(throttle, 0), 100),
-        math.nan if gps is None else gps.altitude_m,
-        math.nan if height is None else height.climb_cms / 100,
+        math.nan if position is None else at.altitude_m(position),
+        math.nan if height is None else height.climb_m_s,
     )
 
 
-def sys_status(vehicle: VehicleState, _boot_ms: int) -> Message | None:
-    """SYS_STATUS: what STATUS calls there is there, and well; mV and cA; the I2C errors are the errors_comm."""
-    status = vehicle.status
-    if status is None:
+def sys_status(at: Moment) -> Message | None:
+    """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads. A sensor that is not heard is not healthy."""
+    health = at.vehicle.last(Health)
+    if health is None:
         return None
     sensors = _ALWAYS_THERE
     for sensor, bit in _SENSORS.items():
-        if sensor & status.sensors:
+        if sensor & health.sensors:
             sensors |= bit
-    millivolts, centiamperes, _ = _battery(vehicle)
+    is_heard = at.fresh(Health) is not None
+    power = at.fresh(Power)
     return messages.MAVLink_sys_status_message(
-        sensors, sensors, sensors | _NEVER_ILL, 0, millivolts, centiamperes, -1, 0, status.i2c_errors, 0, 0, 0, 0
+        sensors,
+        sensors,
+        (sensors if is_heard else 0) | _NEVER_ILL,
+        0,
+        _scaled_u16(None if power is None else power.voltage_v, 1000),
+        -1 if power is None or power.current_a is None else _fit(round(power.current_a * 100), 16),
+        -1,
+        0,
+        health.i2c_errors or 0,
+        0,
+        0,
+        0,
+        0,
     )
 
 
-def battery_status(vehicle: VehicleState, _boot_ms: int) -> Message | None:
-    """BATTERY_STATUS: mV (which Mission Planner reads only here), cA and mAh where they are measured."""
-    millivolts, centiamperes, drawn_mah = _battery(vehicle)
-    if millivolts == _UNKNOWN_U16:
+def battery_status(at: Moment) -> Message | None:
+    """BATTERY_STATUS: mV (Mission Planner reads the voltage only here), cA and mAh."""
+    power = at.fresh(Power)
+    if power is None or power.voltage_v is None:
         return None
-    voltages = [millivolts, *[_UNKNOWN_U16] * 9]
-    return messages.MAVLink_battery_status_message(0, 0, 0, 32767, voltages, centiamperes, drawn_mah, -1, -1)
+    voltages = [_scaled_u16(power.voltage_v, 1000), *[_UNKNOWN_U16] * 9]
+    current = -1 if power.current_a is None else _fit(round(power.current_a * 100), 16)
+    drawn = -1 if power.drawn_mah is None else power.drawn_mah
+    return messages.MAVLink_battery_status_message(0, 0, 0, 32767, voltages, current, drawn, -1, -1)
 
 
-def rc_channels(vehicle: VehicleState, boot_ms: int) -> Message | None:
-    """RC_CHANNELS: microseconds, in ArduPilot's order."""
-    if vehicle.channels is None:
+def rc_channels(at: Moment) -> Message | None:
+    """RC_CHANNELS: microseconds."""
+    sticks = at.fresh(Sticks)
+    if sticks is None:
         return None
-    channels = _in_mavlink_order(vehicle.channels)
+    channels = sticks.channels_us
     unknown = [_UNKNOWN_U16] * (_CHANNELS - len(channels))
-    return messages.MAVLink_rc_channels_message(boot_ms, len(channels), *channels, *unknown, _rssi(vehicle))
+    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *channels, *unknown, _rssi(at))
 
 
-def rc_channels_raw(vehicle: VehicleState, boot_ms: int) -> Message | None:
+def rc_channels_raw(at: Moment) -> Message | None:
     """RC_CHANNELS_RAW: the first eight."""
-    if vehicle.channels is None:
+    sticks = at.fresh(Sticks)
+    if sticks is None:
         return None
-    channels = _in_mavlink_order(vehicle.channels)[:_RAW_CHANNELS]
+    channels = sticks.channels_us[:_RAW_CHANNELS]
     unknown = [_UNKNOWN_U16] * (_RAW_CHANNELS - len(channels))
-    return messages.MAVLink_rc_channels_raw_message(boot_ms, 0, *channels, *unknown, _rssi(vehicle))
+    return messages.MAVLink_rc_channels_raw_message(at.boot_ms, 0, *channels, *unknown, _rssi(at))
 
 
-def raw_imu(vehicle: VehicleState, boot_ms: int) -> Message | None:
+def raw_imu(at: Moment) -> Message | None:
     """RAW_IMU: as the flight controller scales them."""
-    imu = vehicle.imu
+    imu = at.fresh(ImuSample)
     if imu is None:
         return None
-    return messages.MAVLink_raw_imu_message(boot_ms * 1000, *imu.acc, *imu.gyro, *imu.mag)
+    return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, *imu.acc, *imu.gyro, *imu.mag)
 
 
-def extended_sys_state(vehicle: VehicleState, _boot_ms: int) -> Message | None:
+def extended_sys_state(at: Moment) -> Message | None:
     """EXTENDED_SYS_STATE: disarmed is on the ground; of an armed craft it is not known."""
-    if vehicle.armed is None:
+    state = at.fresh(FlightState)
+    if state is None or state.armed is None:
         return None
-    landed = messages.MAV_LANDED_STATE_UNDEFINED if vehicle.armed else messages.MAV_LANDED_STATE_ON_GROUND
+    landed = messages.MAV_LANDED_STATE_UNDEFINED if state.armed else messages.MAV_LANDED_STATE_ON_GROUND
     return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, landed)
 
 
-def cycle_time(vehicle: VehicleState, boot_ms: int) -> Message | None:
+def cycle_time(at: Moment) -> Message | None:
     """NAMED_VALUE_INT: the main loop's time in microseconds."""
-    return vehicle.status and messages.MAVLink_named_value_int_message(
-        boot_ms, b"cycle_us", vehicle.status.cycle_time_us
-    )
-
-
-def i2c_errors(vehicle: VehicleState, boot_ms: int) -> Message | None:
-    """NAMED_VALUE_INT: failed talks with a sensor since the flight controller's start."""
-    return vehicle.status and messages.MAVLink_named_value_int_message(boot_ms, b"i2c_err", vehicle.status.i2c_errors)
-
-
-def home_distance(vehicle: VehicleState, boot_ms: int) -> Message | None:
-    """NAMED_VALUE_FLOAT: metres to the flight controller's home."""
-    if vehicle.home is None or vehicle.home_vector is None:
+    health = at.fresh(Health)
+    if health is None or health.cycle_time_us is None:
         return None
-    return messages.MAVLink_named_value_float_message(boot_ms, b"home_m", vehicle.home_vector.distance_m)
+    return messages.MAVLink_named_value_int_message(at.boot_ms, b"cycle_us", health.cycle_time_us)
 
 
-def home_direction(vehicle: VehicleState, boot_ms: int) -> Message | None:
-    """NAMED_VALUE_FLOAT: where the flight controller's home is, degrees."""
-    if vehicle.home is None or vehicle.home_vector is None:
+def i2c_errors(at: Moment) -> Message | None:
+    """NAMED_VALUE_INT: sensor reads that failed since the flight controller's start."""
+    health = at.fresh(Health)
+    if health is None or health.i2c_errors is None:
         return None
-    return messages.MAVLink_named_value_float_message(boot_ms, b"home_deg", vehicle.home_vector.direction_deg % 360)
+    return messages.MAVLink_named_value_int_message(at.boot_ms, b"i2c_err", health.i2c_errors)
 
 
-def home_position(vehicle: VehicleState, _boot_ms: int) -> Message | None:
-    """HOME_POSITION: degrees * 1e7, mm above sea level; the local frame has its origin there."""
-    home, altitude_m = vehicle.home_or_position(), vehicle.home_altitude_m
-    if home is None or altitude_m is None:
+def home_distance(at: Moment) -> Message | None:
+    """NAMED_VALUE_FLOAT: metres to home."""
+    position, home = at.fresh(GlobalPosition), at.vehicle.home
+    if position is None or home is None:
         return None
-    altitude_mm = _fit(round(altitude_m * 1000), 32)
+    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_m", distance_m(position, home))
+
+
+def home_direction(at: Moment) -> Message | None:
+    """NAMED_VALUE_FLOAT: the direction of home, degrees."""
+    position, home = at.fresh(GlobalPosition), at.vehicle.home
+    if position is None or home is None:
+        return None
+    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_deg", bearing_deg(position, home))
+
+
+def home_position(at: Moment) -> Message | None:
+    """HOME_POSITION: degrees * 1e7, mm above mean sea level; the local frame has its origin there."""
+    home = at.vehicle.home
+    if home is None or home.altitude_m is None:
+        return None
+    altitude_mm = _fit(round(home.altitude_m * 1000), 32)
     unknown_attitude, unknown_approach = [math.nan] * 4, [math.nan] * 3
     return messages.MAVLink_home_position_message(
-        *home, altitude_mm, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach
+        home.lat_e7, home.lon_e7, altitude_mm, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach
     )
 
 
-def _battery(vehicle: VehicleState) -> tuple[int, int, int]:
-    """Return mV, cA and mAh. A voltage of 0 is not measured, nor is a current when nothing was ever drawn."""
-    analog = vehicle.analog
-    if analog is None:
-        return _UNKNOWN_U16, -1, -1
-    millivolts = analog.battery_dv * 100 or _UNKNOWN_U16
-    if analog.current_ca is None or analog.drawn_mah is None or not (analog.current_ca or analog.drawn_mah):
-        return millivolts, -1, -1
-    return millivolts, analog.current_ca, analog.drawn_mah
+def _rssi(at: Moment) -> int:
+    """0..254, or 255: unknown."""
+    signal = at.fresh(Signal)
+    return _UNKNOWN_U8 if signal is None else int(signal.strength * _MAX_RSSI)
 
 
-def _in_mavlink_order(channels: tuple[int, ...]) -> tuple[int, ...]:
-    """MSP sends roll, pitch, yaw, throttle; ground stations expect roll, pitch, throttle, yaw."""
-    roll, pitch, yaw, throttle, *aux = channels
-    return (roll, pitch, throttle, yaw, *aux)
-
-
-def _rssi(vehicle: VehicleState) -> int:
-    """Return 0..254, or 255: not known."""
-    if vehicle.analog is None or not vehicle.measures_rssi:
-        return _UNKNOWN_U8
-    return min(vehicle.analog.rssi * _MAX_RSSI // _MSP_MAX_RSSI, _MAX_RSSI)
+def _scaled_u16(value: float | None, parts: int) -> int:
+    return _UNKNOWN_U16 if value is None else min(max(round(value * parts), 0), _UNKNOWN_U16)
 
 
 def _fit(value: int, bits: int) -> int:

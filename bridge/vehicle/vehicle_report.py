@@ -1,30 +1,68 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One place to ask what is known of the vehicle, whatever protocol its flight controller speaks now. Sans-IO."""
+"""The vehicle in published groups (bridge.model.vehicle_groups): for zenoh, the status page and the command line."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import cache
 from typing import Any
 
 from bridge.fc.session import FcSession
-from bridge.fc.states import Mavlink
 from bridge.gcs.ground import Ground
 from bridge.missions.mission_service import MissionService
-from bridge.model.vehicle_groups import Group, Link, MissionIdentity, VehicleReport
-from bridge.vehicle.mavlink_groups import MavlinkGroups
-from bridge.vehicle.msp_groups import POLLED_FOR, TOLD_BY, MspGroups
-from protocols.mavlink.frame import MavlinkFrame
-from protocols.msp.commands import Msp
+from bridge.model.flight_mode import FlightMode
+from bridge.model.ground_track import bearing_deg, distance_m
+from bridge.model.vehicle import (
+    Fix,
+    FlightState,
+    GlobalPosition,
+    GpsFix,
+    Health,
+    Height,
+    Orientation,
+    Power,
+    Reading,
+    ReadingT,
+    Signal,
+    Sticks,
+)
+from bridge.model.vehicle_groups import (
+    Attitude,
+    Battery,
+    Gps,
+    Group,
+    Link,
+    MissionIdentity,
+    Position,
+    Rc,
+    Status,
+    VehicleReport,
+)
+from protocols.msp.telemetry import Sensor
 
-_FROM_MSP = {group: getattr(MspGroups, group.value) for group in Group if group is not Group.LINK}
-_FROM_MAVLINK = {group: getattr(MavlinkGroups, group.value) for group in Group if group is not Group.LINK}
+#: The readings that a group shows, and how often they are polled while the group is watched, seconds. A group is news
+#: when the first of its readings is.
+_SHOWS: Mapping[Group, Mapping[type[Reading], float]] = {
+    Group.ATTITUDE: {Orientation: 0.1},
+    Group.POSITION: {GlobalPosition: 0.2, Height: 0.2},
+    Group.GPS: {GpsFix: 0.2},
+    Group.BATTERY: {Power: 1.0},
+    Group.RC: {Sticks: 0.5},
+    Group.STATUS: {FlightState: 0.25},
+    Group.LINK: {},
+}
+_NEWS_OF = {next(iter(readings)): group for group, readings in _SHOWS.items() if readings}
+_FIXES = {Fix.NO_FIX: "none", Fix.TWO_D: "2D", Fix.THREE_D: "3D"}
 _NOTHING: frozenset[Group] = frozenset()
 
 
 class VehicleReporter:
-    """Tells groups when it is asked to. `want`: sets how often the flight controller is to be asked what, seconds."""
+    """Makes groups on request. `want`: sets how often each reading is polled, seconds."""
 
     def __init__(
-        self, session: FcSession, missions: MissionService, ground: Ground, want: Callable[[dict[Msp, float]], None]
+        self,
+        session: FcSession,
+        missions: MissionService,
+        ground: Ground,
+        want: Callable[[Mapping[type[Reading], float]], None],
     ) -> None:
         self._session = session
         self._missions = missions
@@ -32,40 +70,28 @@ class VehicleReporter:
         self._want = want
         self._fresh: set[Group] = set()
         self._watched: frozenset[Group] = frozenset()
-        self._mavlink = MavlinkGroups(self._fresh, is_harakiri=False)
+        self._makers: Mapping[Group, Callable[[], Any]] = {group: getattr(self, f"_{group.value}") for group in Group}
 
-    # What the bridge tells.
-
-    def answered(self, command: int) -> None:
-        """The flight controller has answered a poll."""
+    def heard(self, news: Collection[type[Reading]]) -> None:
+        """The vehicle has new readings."""
         if self._watched:
-            self._fresh.update(TOLD_BY.get(command, ()))
-
-    def mavlink_received(self, frames: Sequence[MavlinkFrame]) -> None:
-        """The flight controller speaks MAVLink, and has sent this."""
-        self._mavlink.take(frames)
-
-    def controller_changed(self) -> None:
-        """It is another flight controller, or none, or it speaks otherwise."""
-        controller = self._session.controller
-        is_harakiri = controller is not None and not controller.profile.is_passed_through
-        self._mavlink = MavlinkGroups(self._fresh, is_harakiri=is_harakiri)
-        self._mavlink.is_watched = bool(self._watched)
-
-    # What others ask.
+            self._fresh.update(group for reading, group in _NEWS_OF.items() if reading in news)
 
     def watch(self, groups: Iterable[Group]) -> None:
-        """Follow these groups from now on: they are polled for, and `take_fresh` tells of them."""
+        """Poll for these groups from now on; `take_fresh` returns those with news."""
         self._watched = frozenset(groups)
-        self._mavlink.is_watched = bool(self._watched)
-        polls: dict[Msp, float] = {}
+        wanted: dict[type[Reading], float] = {}
         for group in self._watched:
-            for poll, interval_s in POLLED_FOR[group].items():
-                polls[poll] = min(polls.get(poll, interval_s), interval_s)
-        self._want(polls)
+            wanted |= _SHOWS[group]
+        self._want(wanted)
+
+    @property
+    def is_watched(self) -> bool:
+        """True while any group is watched."""
+        return bool(self._watched)
 
     def take_fresh(self) -> frozenset[Group]:
-        """Return the watched groups that there is news of since the last time."""
+        """The watched groups with news since the last call."""
         if not self._fresh:
             return _NOTHING
         fresh = self._watched & self._fresh
@@ -73,23 +99,69 @@ class VehicleReporter:
         return fresh
 
     def group(self, group: Group) -> Any:
-        """Return one group as it is now: an instance of its class in bridge.vehicle_groups."""
-        if group is Group.LINK:
-            return self._link()
-        if not isinstance(self._session.state, Mavlink):
-            return _FROM_MSP[group](MspGroups(self._session.vehicle))
-        found = _FROM_MAVLINK[group](self._mavlink)
-        home = self._session.vehicle.home
-        if group is Group.POSITION and found.home_lat_deg is None and home is not None:
-            # It was told of before the craft armed.
-            return replace(found, home_lat_deg=home.lat_e7 / 1e7, home_lon_deg=home.lon_e7 / 1e7)
-        return found
+        """One group as it is now: an instance of its class in bridge.model.vehicle_groups."""
+        self._session.settle_telemetry()
+        return self._makers[group]()
 
     def whole(self) -> VehicleReport:
-        """Return everything."""
+        """All groups."""
         held = self._missions.held
         mission = None if held is None else MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}")
         return VehicleReport(**{group.value: self.group(group) for group in Group}, mission=mission)
+
+    def _last(self, kind: type[ReadingT]) -> ReadingT | None:
+        return self._session.vehicle.last(kind)
+
+    def _attitude(self) -> Attitude:
+        now = self._last(Orientation)
+        if now is None:
+            return Attitude()
+        heading_deg = _rounded(now.heading_deg) if now.is_north_known else None
+        return Attitude(_rounded(now.roll_deg), _rounded(now.pitch_deg), heading_deg)
+
+    def _position(self) -> Position:
+        home, here, height = self._session.vehicle.home, self._last(GlobalPosition), self._last(Height)
+        return Position(
+            lat_deg=None if here is None else here.lat_e7 / 1e7,
+            lon_deg=None if here is None else here.lon_e7 / 1e7,
+            altitude_m=None if here is None else here.altitude_m,
+            height_m=None if height is None else _rounded(height.height_m),
+            climb_m_s=None if height is None else _rounded(height.climb_m_s),
+            north_m_s=None if here is None else _rounded(here.north_m_s),
+            east_m_s=None if here is None else _rounded(here.east_m_s),
+            home_lat_deg=None if home is None else home.lat_e7 / 1e7,
+            home_lon_deg=None if home is None else home.lon_e7 / 1e7,
+            home_distance_m=None if home is None or here is None else round(distance_m(here, home), 1),
+            home_direction_deg=None if home is None or here is None else round(bearing_deg(here, home), 1) % 360,
+        )
+
+    def _gps(self) -> Gps:
+        now = self._last(GpsFix)
+        if now is None:
+            return Gps()
+        course_deg = _rounded(now.course_deg)
+        return Gps(_FIXES[now.fix], now.satellites, now.hdop, now.ground_speed_m_s, course_deg)
+
+    def _battery(self) -> Battery:
+        now = self._last(Power)
+        return Battery() if now is None else Battery(now.voltage_v, now.current_a, now.drawn_mah)
+
+    def _rc(self) -> Rc:
+        sticks, signal = self._last(Sticks), self._last(Signal)
+        if sticks is None:
+            return Rc()
+        return Rc(sticks.channels_us, None if signal is None else round(signal.strength * 100, 1))
+
+    def _status(self) -> Status:
+        state, health = self._last(FlightState), self._last(Health)
+        mode = None if state is None else state.mode
+        return Status(
+            armed=None if state is None else state.armed,
+            mode=mode.name if isinstance(mode, FlightMode) else mode,
+            sensors=None if health is None else _names(health.sensors),
+            cycle_time_us=None if health is None else health.cycle_time_us,
+            i2c_errors=None if health is None else health.i2c_errors,
+        )
 
     def _link(self) -> Link:
         session, controller = self._session, self._session.controller
@@ -103,3 +175,12 @@ class VehicleReporter:
             bad_checksums=session.bad_checksums,
             ground_stations=tuple(str(peer) for peer in self._ground.peers()),
         )
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 2)
+
+
+@cache
+def _names(sensors: Sensor) -> tuple[str, ...]:
+    return tuple(str(sensor.name).lower() for sensor in Sensor if sensor & sensors)

@@ -14,7 +14,6 @@ class Msp(IntEnum):
     RAW_IMU = 102
     RC = 105
     RAW_GPS = 106
-    COMP_GPS = 107
     ATTITUDE = 108
     ALTITUDE = 109
     ANALOG = 110

@@ -12,7 +12,6 @@ _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
 _RAW_IMU = struct.Struct("<9h")
 _RAW_GPS = struct.Struct("<BBiihH")
-_COMP_GPS = struct.Struct("<Hh")
 _ATTITUDE = struct.Struct("<hhh")
 _ALTITUDE = struct.Struct("<ih")
 _ANALOG = struct.Struct("<BHH")
@@ -80,15 +79,7 @@ class RawGps:
 
 
 @dataclass(frozen=True, slots=True)
-class HomeVector:
-    """MSP_COMP_GPS: the way home, in metres and degrees; 0, 0 while there is no home."""
-
-    distance_m: int
-    direction_deg: int
-
-
-@dataclass(frozen=True, slots=True)
-class Attitude:
+class AttitudeReply:
     """MSP_ATTITUDE: roll and pitch in 0.1 degrees, heading in degrees.
 
     Right wing down and nose down are positive on all firmware; Harakiri's and baseflight's heading is -180..180, the
@@ -101,7 +92,7 @@ class Attitude:
 
 
 @dataclass(frozen=True, slots=True)
-class Altitude:
+class AltitudeReply:
     """MSP_ALTITUDE: estimated height above the launch point in cm, climb in cm/s."""
 
     height_cm: int
@@ -168,19 +159,14 @@ def decode_raw_gps(payload: bytes) -> RawGps | None:
     return RawGps(fix, satellites, lat, lon, altitude, speed, course, hdop)
 
 
-def decode_comp_gps(payload: bytes) -> HomeVector | None:
-    """Read MSP_COMP_GPS."""
-    return HomeVector(*_COMP_GPS.unpack_from(payload)) if len(payload) >= _COMP_GPS.size else None
-
-
-def decode_attitude(payload: bytes) -> Attitude | None:
+def decode_attitude(payload: bytes) -> AttitudeReply | None:
     """Read MSP_ATTITUDE."""
-    return Attitude(*_ATTITUDE.unpack_from(payload)) if len(payload) >= _ATTITUDE.size else None
+    return AttitudeReply(*_ATTITUDE.unpack_from(payload)) if len(payload) >= _ATTITUDE.size else None
 
 
-def decode_altitude(payload: bytes) -> Altitude | None:
+def decode_altitude(payload: bytes) -> AltitudeReply | None:
     """Read MSP_ALTITUDE."""
-    return Altitude(*_ALTITUDE.unpack_from(payload)) if len(payload) >= _ALTITUDE.size else None
+    return AltitudeReply(*_ALTITUDE.unpack_from(payload)) if len(payload) >= _ALTITUDE.size else None
 
 
 def decode_analog(payload: bytes) -> Analog | None:

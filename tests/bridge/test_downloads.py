@@ -285,13 +285,13 @@ def test_without_a_link_and_without_a_store_the_reason_is_told() -> None:
 def test_armed_in_mavlink_mode_home_is_served_and_no_more() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.run(6)
-    home = world.bridge.session.vehicle.home_or_position()
+    home = world.bridge.session.vehicle.home
     assert home is not None
     world.faults.armed = True
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
     world.run(1.5)
     (item,) = ask(station, request_message(0))
-    assert (item.x, item.y) == home
+    assert (item.x, item.y) == (home.lat_e7, home.lon_e7)
     for message in (request_message(1), list_message()):
         (ack,) = ask(station, message)
         assert ack.type == A.DENIED

@@ -183,8 +183,9 @@ def test_a_board_that_serves_a_request_each_10_ms_is_served() -> None:
 
 def test_a_mission_that_is_flown_is_told_item_by_item() -> None:
     board, world, station = board_with()
-    home = world.bridge.session.vehicle.home_or_position() or (473977000, 85456000)
-    legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home[0] + 1500 * n, home[1], 20.0) for n in (1, 2, 3)]
+    home = world.bridge.session.vehicle.home
+    assert home is not None
+    legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home.lat_e7 + 1500 * n, home.lon_e7, 20.0) for n in (1, 2, 3)]
     speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
     assert Upload(station, [plan(1)[0], legs[0], speed, *legs[1:]]).run() is ACCEPTED
     board.faults.armed = True

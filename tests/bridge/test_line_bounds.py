@@ -10,6 +10,7 @@ from world import GroundStation, World, flash_holding
 
 from bridge.line.conversation import Send
 from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
+from bridge.model.vehicle import Orientation
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from simulator.options import Faults, SimOptions
@@ -60,7 +61,7 @@ def test_all_at_once_at_every_speed(baud: int) -> None:
     world.wait_until(lambda _: bool(outcome), 60)
     world.run(30)
     assert station.said("MISSION_COUNT")
-    assert world.bridge.session.vehicle.attitude is not None
+    assert world.bridge.session.vehicle.last(Orientation) is not None
     world.assert_line_was_clean()
     assert world.naze.counters.max_outstanding_reply_bytes <= MAX_OUTSTANDING_BYTES
 

@@ -14,7 +14,7 @@ from bridge.line.poll_schedule import POLLS, PollSchedule
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
-REPLY_PAYLOADS = {101: 11, 102: 18, 105: 16, 106: 14, 107: 5, 108: 8, 109: 6, 110: 5, 118: 12}
+REPLY_PAYLOADS = {101: 11, 102: 18, 105: 16, 106: 14, 108: 8, 109: 6, 110: 5, 118: 12}
 #: Answers a command with a payload's size; None: not at all, -1: an error.
 Answer = Callable[[int], int | None]
 
@@ -91,15 +91,15 @@ def test_one_error_may_be_noise() -> None:
 
 
 def test_what_is_never_answered_is_asked_less_and_less_and_the_others_do_not_suffer() -> None:
-    line = Line(answer=lambda command: None if command == Msp.COMP_GPS else REPLY_PAYLOADS[command])
-    line.schedule.want({Msp.ATTITUDE: 0.04, Msp.COMP_GPS: 0.2})
+    line = Line(answer=lambda command: None if command == Msp.RAW_GPS else REPLY_PAYLOADS[command])
+    line.schedule.want({Msp.ATTITUDE: 0.04, Msp.RAW_GPS: 0.2})
     line.run(30)
     asked = line.run(60)
-    assert asked[Msp.COMP_GPS] <= 14
+    assert asked[Msp.RAW_GPS] <= 14
     assert asked[Msp.ATTITUDE] / 60 == pytest.approx(25, rel=0.1)
     line.answer = answer_all
     line.run(20)
-    assert line.run(10)[Msp.COMP_GPS] == pytest.approx(50, abs=3)
+    assert line.run(10)[Msp.RAW_GPS] == pytest.approx(50, abs=3)
 
 
 @pytest.mark.parametrize(

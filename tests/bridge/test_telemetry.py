@@ -21,7 +21,7 @@ from simulator.options import Faults, SimOptions
 m = messages
 ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)
 #: Question and reply of Harakiri's telemetry, bytes.
-ROUND_TRIPS = {101: 23, 102: 30, 105: 28, 106: 26, 107: 17, 108: 20, 109: 18, 110: 17, 118: 25}
+ROUND_TRIPS = {101: 23, 102: 30, 105: 28, 106: 26, 108: 20, 109: 18, 110: 17, 118: 25}
 ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
 
 
@@ -86,7 +86,8 @@ def check_against(message: Message, truth: FlightState) -> None:
         case "GPS_RAW_INT":
             assert metres_between(message, truth) <= 0.1
             assert message.alt == pytest.approx(truth.altitude_m * 1000, abs=600)
-            assert (message.vel, message.cog) == (pytest.approx(truth.speed_ms * 100, abs=1), 65535)
+            assert message.vel == pytest.approx(truth.speed_ms * 100, abs=1)
+            assert angle_between(message.cog / 100, truth.course) <= 6
             assert (message.fix_type, message.satellites_visible, message.eph, message.epv) == (3, 9, 65535, 65535)
         case "GLOBAL_POSITION_INT":
             assert metres_between(message, truth) <= 0.1
@@ -220,7 +221,8 @@ def test_telemetry_takes_its_share_of_the_line_and_no_more(baud: int) -> None:
     station.take()
     world.run(30)
     bytes_per_s = sum(count * ROUND_TRIPS[command] for command, count in polls(world).items()) / 30
-    assert 0.45 * baud / 10 < bytes_per_s <= 0.6 * baud / 10
+    burst = 0.6 * 0.05 / 30
+    assert 0.45 * baud / 10 < bytes_per_s <= (0.6 + burst) * baud / 10
     world.assert_line_was_clean()
     assert world.naze.counters.max_outstanding_reply_bytes <= 224
     assert set(polls(world)) == {poll.command for poll in POLLS}
@@ -228,7 +230,7 @@ def test_telemetry_takes_its_share_of_the_line_and_no_more(baud: int) -> None:
 
 @pytest.mark.parametrize(("baud", "attitude_hz", "position_hz", "status_hz"), [
     (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
-    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 1.1, 0.2, 0.7),
+    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 1.3, 0.25, 0.7),
 ])  # fmt: skip
 def test_the_rates_without_a_wish(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
     world, station = flown(5, baud=baud)

@@ -9,8 +9,10 @@ import pytest
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
+from bridge.controllers.inav import profile as inav
+from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController
-from bridge.model.vehicle_state import VehicleState
+from bridge.model.vehicle import Vehicle
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import messages as m
@@ -20,17 +22,22 @@ from protocols.msp.frame import Direction, MspFrame
 HARAKIRI_BOXES = ("ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO")
 HARAKIRI = FlightController(harakiri.UNPATCHED, "Harakiri", 3, HARAKIRI_BOXES)
 INAV = FlightController(
-    other.OTHER_MSP, "INAV", None, ("ARM", "ANGLE", "HORIZON", "NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
+    inav.PROFILE, "INAV", None, ("ARM", "ANGLE", "HORIZON", "NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
 )
 BETAFLIGHT = FlightController(other.OTHER_MSP, "BTFL", None, ("ARM", "ANGLE", "HORIZON", "ALT HOLD", "GPS RESCUE"))
 ALL_SENSORS = 0b1111
 U16, U8 = 65535, 255
 
 
-def told(state: VehicleState, who: FlightController, **replies: bytes) -> VehicleState:
+def at(vehicle: Vehicle, boot_ms: int = 0) -> make.Moment:
+    """The moment at which everything was heard."""
+    return make.Moment(vehicle, 0.0, boot_ms)
+
+
+def told(state: Vehicle, who: FlightController, **replies: bytes) -> Vehicle:
     """Let a flight controller answer: a command's name and the payload."""
     for name, payload in replies.items():
-        state.take(MspFrame(Direction.REPLY, Msp[name], payload), who)
+        hear_msp(state, MspFrame(Direction.REPLY, Msp[name], payload), who, 0.0)
     return state
 
 
@@ -59,53 +66,53 @@ def fields(message: Any) -> dict[str, Any]:
 def test_of_nothing_nothing_is_made() -> None:
     for row in TELEMETRY:
         for maker in row.makers:
-            assert maker(VehicleState(), 0) is None
+            assert maker(at(Vehicle())) is None
 
 
 def test_an_error_or_a_short_reply_teaches_nothing() -> None:
-    state = VehicleState()
-    for poll in {row.poll for row in TELEMETRY}:
-        state.take(MspFrame(Direction.ERROR, poll, bytes(40)), HARAKIRI)
-        state.take(MspFrame(Direction.REPLY, poll, b"\x01"), HARAKIRI)
-    assert state == VehicleState(_track=state._track)
+    state = Vehicle()
+    for poll in Msp:
+        hear_msp(state, MspFrame(Direction.ERROR, poll, bytes(40)), HARAKIRI, 0.0)
+        hear_msp(state, MspFrame(Direction.REPLY, poll, b"\x01"), HARAKIRI, 0.0)
+    assert (state.take_news(), state.home) == (frozenset(), None)
 
 
 def test_without_a_fix_there_is_no_position() -> None:
-    state = told(VehicleState(), HARAKIRI, STATUS=status(), RAW_GPS=gps(fix=0), ALTITUDE=bytes(6))
-    assert made(make.gps_raw_int(state, 0)).fix_type == m.GPS_FIX_TYPE_NO_FIX
-    assert make.global_position_int(state, 0) is None
-    assert make.home_position(state, 0) is None
+    state = told(Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(fix=0), ALTITUDE=bytes(6))
+    assert made(make.gps_raw_int(at(state))).fix_type == m.GPS_FIX_TYPE_NO_FIX
+    assert make.global_position_int(at(state)) is None
+    assert make.home_position(at(state)) is None
     told(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
-    hud = fields(make.vfr_hud(state, 0))
+    hud = fields(make.vfr_hud(at(state)))
     assert math.isnan(hud["groundspeed"])
     assert math.isnan(hud["airspeed"])
     assert math.isnan(hud["alt"])
 
 
 def test_harakiri_sends_no_course_and_no_dilution() -> None:
-    raw = fields(make.gps_raw_int(told(VehicleState(), HARAKIRI, RAW_GPS=gps()), 5))
+    raw = fields(make.gps_raw_int(at(told(Vehicle(), HARAKIRI, RAW_GPS=gps()), 5)))
     assert (raw["cog"], raw["eph"], raw["epv"], raw["time_usec"]) == (U16, U16, U16, 5000)
 
 
 def test_a_first_fix_in_motion_has_no_direction_yet() -> None:
-    state = told(VehicleState(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 150, 20), RAW_GPS=gps())
-    assert make.global_position_int(state, 0) is None
+    state = told(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 150, 20), RAW_GPS=gps())
+    assert make.global_position_int(at(state)) is None
     told(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 90))  # a metre to the north
-    position = fields(make.global_position_int(state, 0))
+    position = fields(make.global_position_int(at(state)))
     assert (position["vx"], position["vy"], position["vz"], position["relative_alt"]) == (250, 0, -20, 1500)
     assert position["hdg"] == U16
 
 
 def test_standing_still_from_the_start() -> None:
-    state = told(VehicleState(), HARAKIRI, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
-    position = fields(make.global_position_int(state, 0))
+    state = told(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
+    position = fields(make.global_position_int(at(state)))
     assert (position["vx"], position["vy"], position["relative_alt"]) == (0, 0, 0)
 
 
 def test_a_course_that_is_sent_is_taken() -> None:
-    state = told(VehicleState(), INAV, STATUS=status(), ALTITUDE=bytes(10))
+    state = told(Vehicle(), INAV, STATUS=status(), ALTITUDE=bytes(10))
     told(state, INAV, RAW_GPS=gps(fix=2, more=struct.pack("<HH", 900, 140)))
-    position, raw = fields(make.global_position_int(state, 0)), fields(make.gps_raw_int(state, 0))
+    position, raw = fields(make.global_position_int(at(state))), fields(make.gps_raw_int(at(state)))
     assert (position["vx"], position["vy"]) == (0, 250)
     assert (raw["cog"], raw["eph"], raw["fix_type"]) == (9000, 140, m.GPS_FIX_TYPE_3D_FIX)
 
@@ -114,81 +121,81 @@ def test_a_course_that_is_sent_is_taken() -> None:
     ("who", "fix", "fix_type"), [(INAV, 0, 1), (INAV, 1, 2), (INAV, 2, 3), (HARAKIRI, 1, 3), (BETAFLIGHT, 1, 3)]
 )
 def test_only_inavs_fix_has_grades(who: FlightController, fix: int, fix_type: int) -> None:
-    assert made(make.gps_raw_int(told(VehicleState(), who, RAW_GPS=gps(fix=fix)), 0)).fix_type == fix_type
+    assert made(make.gps_raw_int(at(told(Vehicle(), who, RAW_GPS=gps(fix=fix)), 0))).fix_type == fix_type
 
 
 def test_without_a_barometer_there_is_no_height() -> None:
-    state = told(VehicleState(), HARAKIRI, STATUS=status(sensors=0b1101), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
-    assert make.global_position_int(state, 0) is None
+    state = told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b1101), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
+    assert make.global_position_int(at(state)) is None
     told(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
-    assert math.isnan(made(make.vfr_hud(state, 0)).climb)
+    assert math.isnan(made(make.vfr_hud(at(state))).climb)
     # A board that makes one of its GPS has a height all the same.
     told(state, BETAFLIGHT, ALTITUDE=struct.pack("<ih", 20, 0))
-    assert made(make.global_position_int(state, 0)).relative_alt == 200
+    assert made(make.global_position_int(at(state))).relative_alt == 200
 
 
 def test_without_a_compass_there_is_no_heading() -> None:
-    state = told(VehicleState(), HARAKIRI, STATUS=status(sensors=0b1011), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
+    state = told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b1011), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
     told(state, HARAKIRI, ATTITUDE=attitude(heading=0))
-    assert made(make.global_position_int(state, 0)).hdg == U16
+    assert made(make.global_position_int(at(state))).hdg == U16
 
 
 @pytest.mark.parametrize(("heading", "shown"), [(-170, 190), (170, 170), (190, 190), (359, 359), (0, 0), (-1, 359)])
 @pytest.mark.parametrize("who", [HARAKIRI, INAV, BETAFLIGHT])
 def test_signs_are_the_same_on_all_firmware(who: FlightController, heading: int, shown: int) -> None:
-    state = told(VehicleState(), who, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(fix=2, speed=0))
+    state = told(Vehicle(), who, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(fix=2, speed=0))
     told(state, who, ATTITUDE=attitude(roll=105, pitch=32, heading=heading), RC=bytes(16))
-    shown_attitude = fields(make.attitude(state, 7))
+    shown_attitude = fields(make.attitude(at(state, 7)))
     assert math.degrees(shown_attitude["roll"]) == pytest.approx(10.5)
     assert math.degrees(shown_attitude["pitch"]) == pytest.approx(-3.2)
     assert math.degrees(shown_attitude["yaw"]) % 360 == pytest.approx(shown)
     assert -180 <= math.degrees(shown_attitude["yaw"]) <= 180
     assert all(math.isnan(shown_attitude[f"{axis}speed"]) for axis in ("roll", "pitch", "yaw"))
-    assert made(make.global_position_int(state, 0)).hdg == shown * 100
-    assert made(make.vfr_hud(state, 0)).heading == shown
+    assert made(make.global_position_int(at(state))).hdg == shown * 100
+    assert made(make.vfr_hud(at(state))).heading == shown
 
 
 def test_a_battery_that_is_not_measured() -> None:
-    state = told(VehicleState(), HARAKIRI, STATUS=status())
+    state = told(Vehicle(), HARAKIRI, STATUS=status())
     for reply in (None, struct.pack("<BHH", 0, 0, 0)):
         if reply:
             told(state, HARAKIRI, ANALOG=reply)
-        power = fields(make.sys_status(state, 0))
+        power = fields(make.sys_status(at(state)))
         assert (power["voltage_battery"], power["current_battery"], power["battery_remaining"]) == (U16, -1, -1)
-        assert make.battery_status(state, 0) is None
+        assert make.battery_status(at(state)) is None
 
 
 def test_a_battery_whose_current_is_measured_and_one_whose_is_not() -> None:
-    state = told(VehicleState(), BETAFLIGHT, STATUS=status(), ANALOG=struct.pack("<BHHh", 124, 350, 0, 1234))
-    battery = fields(make.battery_status(state, 0))
+    state = told(Vehicle(), BETAFLIGHT, STATUS=status(), ANALOG=struct.pack("<BHHh", 124, 350, 0, 1234))
+    battery = fields(make.battery_status(at(state)))
     assert (battery["voltages"], battery["current_battery"], battery["current_consumed"]) == (
         [12400, *[U16] * 9],
         1234,
         350,
     )
     assert (battery["temperature"], battery["battery_remaining"], battery["energy_consumed"]) == (32767, -1, -1)
-    assert made(make.sys_status(state, 0)).current_battery == 1234
+    assert made(make.sys_status(at(state))).current_battery == 1234
     told(state, BETAFLIGHT, ANALOG=struct.pack("<BHHh", 124, 0, 0, 0))
     assert (
-        made(make.battery_status(state, 0)).current_battery
-        == made(make.battery_status(state, 0)).current_consumed
+        made(make.battery_status(at(state))).current_battery
+        == made(make.battery_status(at(state))).current_consumed
         == -1
     )
 
 
 def test_a_receiver_without_a_strength() -> None:
-    state = told(VehicleState(), HARAKIRI, RC=struct.pack("<4H", 1500, 1500, 1500, 1000))
-    assert made(make.rc_channels(state, 0)).rssi == U8
+    state = told(Vehicle(), HARAKIRI, RC=struct.pack("<4H", 1500, 1500, 1500, 1000))
+    assert made(make.rc_channels(at(state))).rssi == U8
     told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
-    assert made(make.rc_channels(state, 0)).rssi == U8
+    assert made(make.rc_channels(at(state))).rssi == U8
     for sent, shown in ((1020, 254), (1023, 254), (510, 127), (0, 0)):
         told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, sent))
-        assert made(make.rc_channels(state, 0)).rssi == made(make.rc_channels_raw(state, 0)).rssi == shown
+        assert made(make.rc_channels(at(state))).rssi == made(make.rc_channels_raw(at(state))).rssi == shown
 
 
 def test_channels_that_are_not_there() -> None:
-    state = told(VehicleState(), HARAKIRI, RC=struct.pack("<6H", 1501, 1502, 1503, 1004, 1005, 1006))
-    all_channels, raw = made(make.rc_channels(state, 0)), made(make.rc_channels_raw(state, 0))
+    state = told(Vehicle(), HARAKIRI, RC=struct.pack("<6H", 1501, 1502, 1503, 1004, 1005, 1006))
+    all_channels, raw = made(make.rc_channels(at(state))), made(make.rc_channels_raw(at(state)))
     assert all_channels.chancount == 6
     sent = [1501, 1502, 1004, 1503, 1005, 1006]  # throttle before yaw
     assert [getattr(all_channels, f"chan{n}_raw") for n in range(1, 19)] == [*sent, *[U16] * 12]
@@ -197,8 +204,8 @@ def test_channels_that_are_not_there() -> None:
 
 @pytest.mark.parametrize(("throttle", "shown"), [(900, 0), (1000, 0), (1450, 45), (2000, 100), (2100, 100)])
 def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
-    state = told(VehicleState(), HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<4H", 1500, 1500, 1500, throttle))
-    assert made(make.vfr_hud(state, 0)).throttle == shown
+    state = told(Vehicle(), HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<4H", 1500, 1500, 1500, throttle))
+    assert made(make.vfr_hud(at(state))).throttle == shown
 
 
 @pytest.mark.parametrize(
@@ -221,7 +228,7 @@ def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
     ],
 )
 def test_the_mixer_makes_the_type(mixer: int | None, mav_type: int) -> None:
-    assert make.heartbeat(VehicleState(mixer=mixer), linked=True).type == mav_type
+    assert make.heartbeat(Vehicle(mixer=mixer), linked=True).type == mav_type
 
 
 @pytest.mark.parametrize(
@@ -243,7 +250,7 @@ def test_modes_by_their_boxes(
 ) -> None:
     flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
     for mixer, mode in ((3, copter_mode), (8, plane_mode)):
-        state = told(VehicleState(mixer=mixer), who, STATUS=status(flags=flags))
+        state = told(Vehicle(mixer=mixer), who, STATUS=status(flags=flags))
         beat = make.heartbeat(state, linked=True)
         assert (beat.custom_mode, beat.system_status) == (mode, m.MAV_STATE_ACTIVE)
         assert state.armed
@@ -251,33 +258,29 @@ def test_modes_by_their_boxes(
 
 def test_home_in_flight_is_lower_than_the_craft() -> None:
     state = told(
-        VehicleState(),
+        Vehicle(),
         HARAKIRI,
         STATUS=status(flags=1 << 5),
         RAW_GPS=gps(),
         WP=struct.pack("<BiiHB", 0, 453830000, 84730000, 0, 0),
     )
-    assert make.home_position(state, 0) is None  # how high it flies is not known
+    assert make.home_position(at(state)) is None  # how high it flies is not known
     told(state, HARAKIRI, ALTITUDE=struct.pack("<ih", 2150, 0))
-    home = made(make.home_position(state, 0))
+    home = made(make.home_position(at(state)))
     assert (home.latitude, home.longitude, home.altitude) == (453830000, 84730000, 109_500)
     assert all(math.isnan(value) for value in (*home.q, home.approach_x))
 
 
 def test_the_way_home_only_while_there_is_a_home() -> None:
-    state = told(VehicleState(), HARAKIRI, COMP_GPS=struct.pack("<HhB", 0, 0, 1))
-    assert make.home_distance(state, 0) is make.home_direction(state, 0) is None
-    told(
-        state,
-        HARAKIRI,
-        WP=struct.pack("<BiiHB", 0, 453830000, 84730000, 0, 0),
-        COMP_GPS=struct.pack("<HhB", 40, -152, 1),
-    )
-    assert (made(make.home_distance(state, 0)).value, made(make.home_direction(state, 0)).value) == (40, 208)
+    state = told(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), RAW_GPS=gps())
+    assert make.home_distance(at(state)) is make.home_direction(at(state)) is None
+    told(state, HARAKIRI, WP=struct.pack("<BiiHB", 0, 453838000 - 3593, 84733000, 0, 0))
+    assert made(make.home_distance(at(state))).value == pytest.approx(40, abs=0.1)
+    assert made(make.home_direction(at(state))).value == pytest.approx(180)
 
 
 def test_sensors_and_errors() -> None:
-    present = made(make.sys_status(told(VehicleState(), HARAKIRI, STATUS=status(sensors=0b0001, i2c_errors=9)), 0))
+    present = made(make.sys_status(at(told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b0001, i2c_errors=9)), 0)))
     assert present.errors_comm == 9
     assert not present.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
     assert not present.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS

@@ -16,7 +16,6 @@ LEAST: list[tuple[Callable[[bytes], object], bytes]] = [
     (t.decode_raw_imu, struct.pack("<9h", *range(-4, 5))),
     (t.decode_channels, struct.pack("<4H", 1500, 1501, 1502, 1003)),
     (t.decode_raw_gps, struct.pack("<BBiihH", 1, 9, 453838000, -84733000, 131, 250)),
-    (t.decode_comp_gps, struct.pack("<Hh", 120, -152)),
     (t.decode_attitude, struct.pack("<3h", 105, -32, -170)),
     (t.decode_altitude, struct.pack("<ih", -150, 30)),
     (t.decode_analog, struct.pack("<BHH", 124, 0, 920)),

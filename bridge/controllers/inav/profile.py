@@ -44,6 +44,7 @@ PROFILE = Profile(
     "INAV",
     recognise=_recognise,
     polls=(*POLLS, NAV_POLL),
+    has_2d_fix=True,
     accepts_any_byte=True,
     open_store=_open_store,
     check_kind="inav",

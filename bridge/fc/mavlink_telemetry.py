@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Readings of the vehicle from a flight controller's MAVLink: a Harakiri's, or another autopilot's.
+
+A passed-through autopilot may send thousands of frames a second that nothing here needs: the newest of each kind is
+kept as bytes until `settle`.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from bridge.fc.msp_telemetry import velocity
+from bridge.model.vehicle import (
+    Fix,
+    FlightState,
+    GlobalPosition,
+    GpsFix,
+    Health,
+    Height,
+    Orientation,
+    Power,
+    Signal,
+    Source,
+    Sticks,
+    Vehicle,
+)
+from protocols.mavlink.codec import MavlinkDecoder
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
+from protocols.msp.telemetry import Sensor
+
+_HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
+#: The autopilot field of a heartbeat's payload. Cameras and gimbals send INVALID.
+_AUTOPILOT_AT = 5
+_UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
+_MAX_RSSI, _HARAKIRI_MAX_RSSI = 254, 255
+_CHANNELS = 18
+_SENSORS = {
+    m.MAV_SYS_STATUS_SENSOR_3D_ACCEL: Sensor.ACCELEROMETER,
+    m.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: Sensor.BAROMETER,
+    m.MAV_SYS_STATUS_SENSOR_3D_MAG: Sensor.COMPASS,
+    m.MAV_SYS_STATUS_SENSOR_GPS: Sensor.GPS,
+    m.MAV_SYS_STATUS_SENSOR_LASER_POSITION: Sensor.SONAR,
+}
+
+
+class MavlinkTelemetry:
+    """Fills a vehicle from the frames of the first autopilot that is heard; from a Harakiri's at once.
+
+    Harakiri (baseflight_mavlink.c) sends no GLOBAL_POSITION_INT: its position is in GPS_RAW_INT, and its height above
+    the launch point in VFR_HUD.alt, where MAVLink has the one above mean sea level. Its rssi is 0..255.
+    """
+
+    def __init__(self, vehicle: Vehicle, *, is_harakiri: bool) -> None:
+        self._vehicle = vehicle
+        self._is_harakiri = is_harakiri
+        self._decoder = MavlinkDecoder()
+        self._unread: dict[int, tuple[MavlinkFrame, float]] = {}
+        self._readers: Mapping[int, Callable[[Message, float], None]] = {
+            _HEARTBEAT: self._heartbeat,
+            m.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
+            m.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery_status,
+            m.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
+            m.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps_raw_int,
+            m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position_int,
+            m.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
+            m.MAVLINK_MSG_ID_HOME_POSITION: self._home_position,
+            m.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels,
+            m.MAVLINK_MSG_ID_RC_CHANNELS_RAW: self._rc_channels,
+        }
+        #: Message id by the bytes of a frame's header that hold sender and message id.
+        self._known: dict[bytes, int] = {}
+
+    def take(self, frames: Sequence[MavlinkFrame], now: float) -> None:
+        """Keep the newest frames. Heartbeats are read at once: arming must be noticed."""
+        if not self._known:
+            self._recognise(frames)
+        known, unread = self._known, self._unread
+        for frame in frames:
+            raw = frame.raw
+            msgid = known.get(raw[5:10] if raw[0] == MAGIC_V2 else raw[3:6])
+            if msgid is not None:
+                unread[msgid] = frame, now
+                if msgid == _HEARTBEAT:
+                    self._read(_HEARTBEAT)
+        if self._is_harakiri:
+            self.settle()
+
+    def settle(self) -> None:
+        """Read what `take` has kept."""
+        for msgid in [*self._unread]:
+            self._read(msgid)
+
+    def _recognise(self, frames: Sequence[MavlinkFrame]) -> None:
+        for frame in frames:
+            if frame.msgid == _HEARTBEAT and frame.payload[_AUTOPILOT_AT] != m.MAV_AUTOPILOT_INVALID:
+                sender = bytes((frame.sysid, frame.compid))
+                for msgid in self._readers:
+                    self._known[sender + msgid.to_bytes(3, "little")] = msgid
+                    self._known[sender + bytes((msgid & 0xFF,))] = msgid
+                return
+
+    def _read(self, msgid: int) -> None:
+        frame, now = self._unread.pop(msgid)
+        message = self._decoder.decode(frame)
+        if message is not None:
+            self._readers[msgid](message, now)
+
+    def _heartbeat(self, message: Message, now: float) -> None:
+        armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
+        mode = None
+        if self._is_harakiri:
+            known = self._vehicle.last(FlightState)
+            mode = None if known is None else known.mode
+        elif message.base_mode & m.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            mode = str(message.custom_mode)
+        self._vehicle.hear(FlightState(now, Source.MAVLINK, armed, mode))
+
+    def _attitude(self, message: Message, now: float) -> None:
+        roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))
+        if not (math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw)):
+            return
+        health = self._vehicle.last(Health)
+        is_north_known = not self._is_harakiri or (health is not None and Sensor.COMPASS in health.sensors)
+        rates = (
+            math.degrees(message.rollspeed),
+            math.degrees(message.pitchspeed),
+            math.degrees(message.yawspeed),
+        )
+        has_rates = not self._is_harakiri and all(map(math.isfinite, rates))
+        self._vehicle.hear(
+            Orientation(now, Source.MAVLINK, roll, pitch, yaw % 360, is_north_known, rates if has_rates else None)
+        )
+
+    def _gps_raw_int(self, message: Message, now: float) -> None:
+        if message.fix_type == m.GPS_FIX_TYPE_NO_GPS and not self._is_harakiri:
+            return
+        fix = Fix(min(max(message.fix_type, Fix.NO_FIX), Fix.THREE_D))
+        satellites = _known(message.satellites_visible, _UNKNOWN_U8)
+        if fix is Fix.NO_FIX:
+            self._vehicle.hear(GpsFix(now, Source.MAVLINK, fix, satellites))
+            return
+        speed, course = _scaled(message.vel, 100), _scaled(message.cog, 100)
+        self._vehicle.hear(GpsFix(now, Source.MAVLINK, fix, satellites, speed, course, _scaled(message.eph, 100)))
+        if self._is_harakiri:
+            north, east = velocity(speed or 0.0, course)
+            self._vehicle.hear(
+                GlobalPosition(now, Source.MAVLINK, message.lat, message.lon, message.alt / 1000, north, east)
+            )
+
+    def _global_position_int(self, message: Message, now: float) -> None:
+        if message.lat or message.lon:
+            self._vehicle.hear(Height(now, Source.MAVLINK, message.relative_alt / 1000, -message.vz / 100))
+            self._vehicle.hear(
+                GlobalPosition(
+                    now,
+                    Source.MAVLINK,
+                    message.lat,
+                    message.lon,
+                    message.alt / 1000,
+                    message.vx / 100,
+                    message.vy / 100,
+                )
+            )
+
+    def _vfr_hud(self, message: Message, now: float) -> None:
+        if self._is_harakiri and math.isfinite(message.alt) and math.isfinite(message.climb):
+            self._vehicle.hear(Height(now, Source.MAVLINK, message.alt, message.climb))
+
+    def _home_position(self, message: Message, _now: float) -> None:
+        self._vehicle.hear_home(message.latitude, message.longitude)
+
+    def _sys_status(self, message: Message, now: float) -> None:
+        well = message.onboard_control_sensors_present & message.onboard_control_sensors_health
+        sensors = Sensor(sum(sensor for bit, sensor in _SENSORS.items() if bit & well))
+        self._vehicle.hear(Health(now, Source.MAVLINK, sensors))
+        current = None if message.current_battery < 0 else message.current_battery / 100
+        before = self._vehicle.last(Power)
+        drawn = None if before is None or before.source is not Source.MAVLINK else before.drawn_mah
+        self._vehicle.hear(Power(now, Source.MAVLINK, _scaled(message.voltage_battery, 1000) or None, current, drawn))
+
+    def _battery_status(self, message: Message, now: float) -> None:
+        power = self._vehicle.last(Power)
+        if power is not None and message.current_consumed >= 0:
+            self._vehicle.hear(Power(now, Source.MAVLINK, power.voltage_v, power.current_a, message.current_consumed))
+
+    def _rc_channels(self, message: Message, now: float) -> None:
+        values = [getattr(message, f"chan{number}_raw", _UNKNOWN_U16) for number in range(1, _CHANNELS + 1)]
+        channels = tuple(value for value in values if value not in (0, _UNKNOWN_U16))
+        if channels:
+            self._vehicle.hear(Sticks(now, Source.MAVLINK, channels))
+        if self._is_harakiri:
+            if message.rssi or self._vehicle.last(Signal) is not None:
+                self._vehicle.hear(Signal(now, Source.MAVLINK, message.rssi / _HARAKIRI_MAX_RSSI))
+        elif message.rssi != _UNKNOWN_U8:
+            self._vehicle.hear(Signal(now, Source.MAVLINK, message.rssi / _MAX_RSSI))
+
+
+def _known(value: int, unknown: int) -> int | None:
+    return None if value == unknown else value
+
+
+def _scaled(value: int, parts: int) -> float | None:
+    return None if value == _UNKNOWN_U16 else value / parts

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Readings of the vehicle from MSP replies. The signs, orders and scales of MSP are known here and nowhere else."""
+
+import math
+from collections.abc import Mapping
+
+from bridge.fc.profile import Decoder, FlightController
+from bridge.model.flight_mode import flight_mode
+from bridge.model.vehicle import (
+    Fix,
+    FlightState,
+    GlobalPosition,
+    GpsFix,
+    Health,
+    Height,
+    ImuSample,
+    MissionLeg,
+    Orientation,
+    Power,
+    Reading,
+    Signal,
+    Source,
+    Sticks,
+    Vehicle,
+)
+from protocols.msp.commands import Msp
+from protocols.msp.frame import Direction, MspFrame
+from protocols.msp.nav import decode_nav_status
+from protocols.msp.telemetry import (
+    RawGps,
+    Sensor,
+    decode_altitude,
+    decode_analog,
+    decode_attitude,
+    decode_channels,
+    decode_home,
+    decode_raw_gps,
+    decode_raw_imu,
+    decode_status,
+)
+
+#: The poll whose reply carries a reading.
+POLL_FOR: Mapping[type[Reading], Msp] = {
+    Orientation: Msp.ATTITUDE,
+    GpsFix: Msp.RAW_GPS,
+    GlobalPosition: Msp.RAW_GPS,
+    Height: Msp.ALTITUDE,
+    FlightState: Msp.STATUS,
+    Health: Msp.STATUS,
+    Power: Msp.ANALOG,
+    Signal: Msp.ANALOG,
+    Sticks: Msp.RC,
+    ImuSample: Msp.RAW_IMU,
+    MissionLeg: Msp.NAV_STATUS,
+}
+_MAX_RSSI = 1020
+
+
+def hear_msp(vehicle: Vehicle, frame: MspFrame, controller: FlightController, now: float) -> None:
+    """Take one reply. Errors, replies that are too short and other commands change nothing."""
+    decode = controller.profile.decoders.get(frame.command) or _DECODERS.get(frame.command)
+    if decode is not None and frame.direction is Direction.REPLY:
+        decode(vehicle, frame.payload, controller, now)
+
+
+def _attitude(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    """MSP's pitch is nose-down positive on all firmware."""
+    told = decode_attitude(payload)
+    if told is not None:
+        health = vehicle.last(Health)
+        has_compass = health is not None and Sensor.COMPASS in health.sensors
+        heading_deg = float(told.heading_deg % 360)
+        vehicle.hear(Orientation(now, Source.MSP, told.roll_ddeg / 10, -told.pitch_ddeg / 10, heading_deg, has_compass))
+
+
+def _raw_gps(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+    gps = decode_raw_gps(payload)
+    if gps is None:
+        return
+    fix = Fix.NO_FIX
+    if gps.fix:
+        fix = Fix.TWO_D if controller.profile.has_2d_fix and gps.fix == 1 else Fix.THREE_D
+    if fix is Fix.NO_FIX:
+        vehicle.hear(GpsFix(now, Source.MSP, fix, gps.satellites))
+        return
+    speed, course = gps.speed_cms / 100, _course_deg(vehicle, gps)
+    hdop = None if gps.hdop_e2 is None else gps.hdop_e2 / 100
+    vehicle.hear(GpsFix(now, Source.MSP, fix, gps.satellites, speed, course, hdop))
+    north, east = velocity(speed, course)
+    vehicle.hear(GlobalPosition(now, Source.MSP, gps.lat_e7, gps.lon_e7, float(gps.altitude_m), north, east))
+
+
+def _course_deg(vehicle: Vehicle, gps: RawGps) -> float | None:
+    return vehicle.track.course_deg(gps) if gps.course_ddeg is None else gps.course_ddeg / 10 % 360
+
+
+def velocity(speed_m_s: float, course_deg: float | None) -> tuple[float | None, float | None]:
+    """North and east parts of a speed over ground; None while it moves and the course is unknown."""
+    if course_deg is None:
+        return (None, None) if speed_m_s else (0.0, 0.0)
+    course = math.radians(course_deg)
+    return speed_m_s * math.cos(course), speed_m_s * math.sin(course)
+
+
+def _altitude(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    """A board without a barometer answers zeros, which are no height."""
+    told, health = decode_altitude(payload), vehicle.last(Health)
+    if told is None or health is None:
+        return
+    if Sensor.BAROMETER in health.sensors or told.height_cm or told.climb_cms:
+        vehicle.hear(Height(now, Source.MSP, told.height_cm / 100, told.climb_cms / 100))
+
+
+def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+    status = decode_status(payload)
+    if status is None:
+        return
+    vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors))
+    armed = None if controller.arm_bit is None else bool(status.box_flags >> controller.arm_bit & 1)
+    mode = flight_mode(status.box_flags, controller.boxes) if controller.boxes else None
+    vehicle.hear(FlightState(now, Source.MSP, armed, mode))
+
+
+def _analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    """A voltage of 0 is not measured, nor is a current while none was drawn, nor a strength before the first signal."""
+    told = decode_analog(payload)
+    if told is None:
+        return
+    voltage = told.battery_dv / 10 or None
+    if told.current_ca is None or not (told.current_ca or told.drawn_mah):
+        vehicle.hear(Power(now, Source.MSP, voltage))
+    else:
+        vehicle.hear(Power(now, Source.MSP, voltage, told.current_ca / 100, told.drawn_mah))
+    if told.rssi or vehicle.last(Signal) is not None:
+        vehicle.hear(Signal(now, Source.MSP, min(told.rssi / _MAX_RSSI, 1.0)))
+
+
+def _rc(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    """MSP sends roll, pitch, yaw, throttle, aux."""
+    channels = decode_channels(payload)
+    if channels is not None:
+        roll, pitch, yaw, throttle, *aux = channels
+        vehicle.hear(Sticks(now, Source.MSP, (roll, pitch, throttle, yaw, *aux)))
+
+
+def _raw_imu(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    imu = decode_raw_imu(payload)
+    if imu is not None:
+        vehicle.hear(ImuSample(now, Source.MSP, imu.acc, imu.gyro, imu.mag))
+
+
+def _wp(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
+    home = decode_home(payload)
+    if home is not None:
+        vehicle.hear_home(home.lat_e7, home.lon_e7)
+
+
+def _nav_status(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    status = decode_nav_status(payload)
+    if status is not None:
+        vehicle.hear(MissionLeg(now, Source.MSP, status))
+
+
+_DECODERS: Mapping[int, Decoder] = {
+    Msp.ATTITUDE: _attitude,
+    Msp.RAW_GPS: _raw_gps,
+    Msp.ALTITUDE: _altitude,
+    Msp.STATUS: _status,
+    Msp.ANALOG: _analog,
+    Msp.RC: _rc,
+    Msp.RAW_IMU: _raw_imu,
+    Msp.WP: _wp,
+    Msp.NAV_STATUS: _nav_status,
+}

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The vehicle: everything known about it, whichever protocol the flight controller speaks at the moment.
+
+Decoders fill it (bridge/fc), and everything shown anywhere is made from it: MAVLink messages, zenoh, the status page,
+metrics. Units are SI, angles are in degrees. None means unknown. A reading keeps the time at which it was heard, so
+that an old value can be told from a current one; a lost link clears nothing.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum, IntEnum
+from typing import TypeVar
+
+from bridge.model.flight_mode import FlightMode
+from bridge.model.ground_track import GroundTrack, distance_m
+from protocols.msp.nav import NavStatus
+from protocols.msp.telemetry import Sensor
+
+#: A reading older than this is stale: it is shown as such, or not at all.
+STALE_S = 1.5
+#: Before the first arming, home is where the craft stands. Smaller moves than this are the receiver's noise.
+_STANDING_M = 10.0
+
+
+class Source(Enum):
+    """The protocol in which a reading was heard."""
+
+    MSP = "MSP"
+    MAVLINK = "MAVLink"
+    FRSKY = "FrSky"
+
+
+class Fix(IntEnum):
+    """MAVLink's GPS_FIX_TYPE."""
+
+    NO_FIX = 1
+    TWO_D = 2
+    THREE_D = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Values that arrive together. heard_at: monotonic seconds."""
+
+    heard_at: float
+    source: Source
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation(Reading):
+    """Right wing down and nose up are positive; heading 0 up to 360. rates_deg_s: roll, pitch, yaw.
+
+    is_north_known: False if the heading does not come from a compass (Harakiri then reports 0).
+    """
+
+    roll_deg: float
+    pitch_deg: float
+    heading_deg: float
+    is_north_known: bool = True
+    rates_deg_s: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class GpsFix(Reading):
+    """The GPS receiver's report. The course is the receiver's own, or follows from successive positions."""
+
+    fix: Fix
+    satellites: int | None
+    ground_speed_m_s: float | None = None
+    course_deg: float | None = None
+    hdop: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class GlobalPosition(Reading):
+    """Heard only while there is a fix. Degrees * 1e7, metres above mean sea level, m/s."""
+
+    lat_e7: int
+    lon_e7: int
+    altitude_m: float
+    north_m_s: float | None = None
+    east_m_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Height(Reading):
+    """Height above the launch point and climb rate, as the flight controller estimates them."""
+
+    height_m: float
+    climb_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Power(Reading):
+    """The battery. A flight controller without a sensor reports 0 V, which is unknown here."""
+
+    voltage_v: float | None
+    current_a: float | None = None
+    drawn_mah: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks(Reading):
+    """RC pulse widths in MAVLink's order: roll, pitch, throttle, yaw, aux 1.."""
+
+    channels_us: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Signal(Reading):
+    """The RC receiver's signal strength, 0..1."""
+
+    strength: float
+
+
+@dataclass(frozen=True, slots=True)
+class FlightState(Reading):
+    """armed: None if the flight controller cannot tell. mode: a FlightMode, or another autopilot's mode number."""
+
+    armed: bool | None
+    mode: FlightMode | str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Health(Reading):
+    """The flight controller itself. sensors: fitted and answering. i2c_errors: sensor reads that failed since boot."""
+
+    sensors: Sensor
+    cycle_time_us: int | None = None
+    i2c_errors: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ImuSample(Reading):
+    """Accelerometer, gyro and compass in the firmware's own units: x, y, z each."""
+
+    acc: tuple[int, int, int]
+    gyro: tuple[int, int, int]
+    mag: tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class MissionLeg(Reading):
+    """Progress through the mission, from flight controllers that report it."""
+
+    status: NavStatus
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Degrees * 1e7; altitude_m above mean sea level."""
+
+    lat_e7: int
+    lon_e7: int
+    altitude_m: float | None = None
+
+
+ReadingT = TypeVar("ReadingT", bound=Reading)
+
+
+class Vehicle:
+    """The latest reading of each kind, and home. mixer: MultiWii's MULTITYPE number."""
+
+    def __init__(self, mixer: int | None = None) -> None:
+        self.mixer = mixer
+        self.home: Home | None = None
+        #: When any reading was heard last.
+        self.heard_at: float | None = None
+        self.track = GroundTrack()
+        self._readings: dict[type[Reading], Reading] = {}
+        self._news: set[type[Reading]] = set()
+        #: False while home is only where the craft stands before its first arming.
+        self.is_home_settled = False
+
+    @property
+    def armed(self) -> bool | None:
+        """As last heard, however long ago."""
+        state = self.last(FlightState)
+        return None if state is None else state.armed
+
+    def hear(self, reading: Reading) -> None:
+        """Store a reading in place of the previous one of its kind."""
+        was_armed, kind = self.armed, type(reading)
+        self._readings[kind] = reading
+        self._news.add(kind)
+        self.heard_at = reading.heard_at
+        if kind in _PLACES_HOME:
+            self._place_home(has_armed=was_armed is False and self.armed is True)
+
+    def hear_home(self, lat_e7: int, lon_e7: int) -> None:
+        """Take the flight controller's own home, degrees * 1e7. It has none while these are 0."""
+        if not (lat_e7 and lon_e7):
+            return
+        self.is_home_settled = True
+        if self.home is None or (self.home.lat_e7, self.home.lon_e7) != (lat_e7, lon_e7):
+            self.home = Home(lat_e7, lon_e7, None if self.home is None else self.home.altitude_m)
+            self._place_home(has_armed=False)
+
+    def last(self, kind: type[ReadingT]) -> ReadingT | None:
+        """The latest reading of a kind, however old."""
+        return self._readings.get(kind)  # type: ignore[return-value]
+
+    def fresh(self, kind: type[ReadingT], now: float, stale_s: float = STALE_S) -> ReadingT | None:
+        """The latest reading of a kind, unless it is stale."""
+        reading = self.last(kind)
+        return reading if reading is not None and now <= reading.heard_at + stale_s else None
+
+    def take_news(self) -> frozenset[type[Reading]]:
+        """The kinds of readings heard since the last call."""
+        if not self._news:
+            return _NO_NEWS
+        news = frozenset(self._news)
+        self._news.clear()
+        return news
+
+    def home_or_position(self) -> Home | None:
+        """Home; before it is known, the present position."""
+        position = self.last(GlobalPosition)
+        if self.home is not None or position is None:
+            return self.home
+        return Home(position.lat_e7, position.lon_e7, position.altitude_m)
+
+    def _place_home(self, *, has_armed: bool) -> None:
+        """Home is where the craft was armed. It never moves in flight, nor by losing the link there.
+
+        Before the first arming it is where the craft stands. The flight controller's own home overrides both.
+        """
+        position, height = self.last(GlobalPosition), self.last(Height)
+        if position is None:
+            return
+        here = Home(position.lat_e7, position.lon_e7, position.altitude_m)
+        if has_armed:
+            self.home, self.is_home_settled = here, True
+        elif self.armed is False and not self.is_home_settled:
+            if self.home is None or distance_m(self.home, here) > _STANDING_M:
+                self.home = here
+        elif self.home is not None and self.home.altitude_m is None:
+            if self.armed is False:
+                self.home = replace(self.home, altitude_m=position.altitude_m)
+            elif self.armed and height is not None:
+                self.home = replace(self.home, altitude_m=position.altitude_m - height.height_m)
+
+
+_PLACES_HOME = frozenset((FlightState, GlobalPosition, Height))
+_NO_NEWS: frozenset[type[Reading]] = frozenset()
