@@ -27,6 +27,7 @@ from bridge.line.runner import Runner
 from bridge.model.vehicle import FlightState, Source, Vehicle
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.heartbeat import is_disarmed_heartbeat
 from protocols.msp.frame import MspFrame
 
 #: A flight controller that answers nothing for this long is gone: unplugged, reset, or switched to another protocol.
@@ -519,4 +520,6 @@ class _Foreign:
         self.size += skipped
         if skipped:
             for frame in self._splitter.feed(data):
-                self.mavlink = frame
+                # A disarmed Harakiri that hears no request sends heartbeats, and still answers MSP.
+                if not is_disarmed_heartbeat(frame):
+                    self.mavlink = frame
