@@ -19,6 +19,7 @@ import structlog
 from bridge.missions.mission_service import Delivery, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
+from bridge.model.vehicle_groups import Group
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
@@ -26,7 +27,8 @@ from service.control_socket import find_socket
 from service.daemon import Daemon
 from service.mission_data import Json, mission_items, to_json, verdict_data, whole_number
 from service.store_worker import as_dicts
-from storage.mission_store import MissionSummary, ReceivedMission, StoredMission, StoreError
+from service.version import version
+from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission, StoreError
 
 #: The greatest number that a request may hold.
 MOST = 2**31 - 1
@@ -38,6 +40,10 @@ T = TypeVar("T")
 
 class ControlError(Exception):
     """The daemon refused, or is not there; one sentence."""
+
+
+class NoDaemonError(ControlError):
+    """No daemon answers."""
 
 
 class MissionJobs:
@@ -119,7 +125,19 @@ class MissionJobs:
         report = bridge.report.whole()
         held = bridge.missions.held
         link = session.link
+        daemon = self._daemon
+        gps, status = bridge.report.group(Group.GPS), bridge.report.group(Group.STATUS)
+        web = daemon.settings.web
         return {
+            "version": version(),
+            "uptime_s": round(self._loop.time() - daemon.started_at, 1),
+            "where": daemon.fc_where,
+            "trouble": daemon.fc_trouble,
+            "found_s": None if daemon.found_at is None else round(self._loop.time() - daemon.found_at, 1),
+            "links": [str(address) for address in daemon.settings.gcs],
+            "page": None if web is None else str(web.listen),
+            "mode": status.mode,
+            "fix": gps.fix,
             "flight_controller": None if controller is None else controller.name,
             "state": session.state.name,
             "speed_baud": session.speed if controller else None,
@@ -139,22 +157,31 @@ class MissionJobs:
 
     async def list_missions(self, limit: int) -> Json:
         """List what came in, newest first."""
-        missions = await self._daemon.store.ask(lambda store: store.list(limit))
-        return {"missions": [_fields(mission) | {"checksum": _hex(mission.checksum)} for mission in missions]}
+        return await self._daemon.store.ask(lambda store: listed(store, limit))
 
     async def show_mission(self, number: int) -> Json:
         """Return one mission with all that is known of it."""
-        mission = await self._daemon.store.ask(lambda store: store.get(number))
-        if mission is None:
-            raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows which there are")
-        received = mission.received
-        as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
-        return _fields(mission) | {"received": _fields(received) | as_text}
+        return await self._daemon.store.ask(lambda store: shown(store, number))
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:
         """Push a stored mission again, as it was sent then: the rules of today apply."""
         data = await self.show_mission(number)
         return await self.push(mission_items(data["received"]["items"]), f"restore of mission {number}", progress)
+
+
+def listed(store: MissionStore, limit: int) -> Json:
+    """Answer the request "missions"."""
+    return {"missions": [_fields(mission) | {"checksum": _hex(mission.checksum)} for mission in store.list(limit)]}
+
+
+def shown(store: MissionStore, number: int) -> Json:
+    """Answer the request "mission"; ControlError if there is none of that number."""
+    mission = store.get(number)
+    if mission is None:
+        raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows which there are")
+    received = mission.received
+    as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
+    return _fields(mission) | {"received": _fields(received) | as_text}
 
 
 class ControlServer:
@@ -261,7 +288,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
             raise ControlError(f"no permission to ask the daemon on {path}: {remedy}") from error
         except OSError as error:
             remedy = "start one (sudo systemctl start naze-bridge, or naze-bridge run), or use --fc directly"
-            raise ControlError(f"no daemon answers on {path}: {remedy}") from error
+            raise NoDaemonError(f"no daemon answers on {path}: {remedy}") from error
         with suppress(ConnectionError):
             # Who is refused in the middle of a long request has its answer to read all the same.
             connection.sendall(to_json(request).encode() + b"\n")

@@ -76,6 +76,9 @@ class Daemon:
         self._loop = asyncio.get_running_loop()
         self._loop.set_exception_handler(self._fault)
         self.settings = settings
+        #: On the loop's clock; `found_at` None: no flight controller is there.
+        self.started_at = self._loop.time()
+        self.found_at: float | None = None
         self._recording = Recording(settings)
         self._signing = SigningState(settings)
         self.bridge = Bridge(
@@ -303,6 +306,10 @@ class Daemon:
 
     def _log_event(self, level: Level, event: str, /, **facts: object) -> None:
         getattr(_log, level)(event, **facts)
+        if event == "fc.found":
+            self.found_at = self._loop.time()
+        elif event in ("fc.lost", "fc.port_lost"):
+            self.found_at = None
         for follower in self._followers:
             follower.event(level, event, facts)
 

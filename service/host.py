@@ -76,6 +76,12 @@ class Host:
         except OSError:
             return False
 
+    def ipv4_addresses(self) -> list[str]:
+        """Return this machine's IPv4 addresses but the loopback's, Wi-Fi first."""
+        cards = [name for name in self.names("/sys/class/net") if name != "lo"]
+        cards.sort(key=lambda name: not self.path(f"/sys/class/net/{name}/wireless").exists())
+        return [address for name in cards if (address := self.address(name)) is not None]
+
     def address(self, interface: str) -> str | None:
         """Return a network card's IPv4 address. This is the kernel's word, not a file's."""
         request = struct.pack("256s", interface.encode()[:15])

@@ -53,11 +53,22 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
         return connection, aside
 
 
+def read_database(path: Path) -> sqlite3.Connection:
+    """Open the database to read it, beside a daemon or without one; StoreError if that is impossible."""
+    with explained(f"cannot read the mission store {path}"):
+        # Not created, not changed: the file may be another user's.
+        return _configured(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.5))
+
+
 def _connect(path: Path) -> sqlite3.Connection:
     # Transactions are begun and ended in our own words (isolation_level). One thread at a time uses the
     # connection, which the caller promises; it need not be the one that opened it. Only a curious person's
     # program can hold a lock, and a ground station waits meanwhile: hence the short time-out (seconds).
     connection = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
+    return _configured(connection)
+
+
+def _configured(connection: sqlite3.Connection) -> sqlite3.Connection:
     connection.row_factory = sqlite3.Row
     # A rotten byte in one text must not hide all the other missions.
     connection.text_factory = lambda raw: raw.decode(errors="replace")

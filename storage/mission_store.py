@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from storage.database import open_database
+from storage.database import open_database, read_database
 from storage.store_error import StoreError, explained
 
 __all__ = [
@@ -225,6 +225,11 @@ def open_store(path: Path, now: float) -> OpenedStore:
     """
     connection, set_aside = open_database(path, now)
     return OpenedStore(MissionStore(connection, path), set_aside)
+
+
+def read_store(path: Path) -> MissionStore:
+    """Open the store in file `path` only to read it, without the StateLock; StoreError if that is impossible."""
+    return MissionStore(read_database(path), path)
 
 
 def _text(text: str) -> str:

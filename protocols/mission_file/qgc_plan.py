@@ -8,7 +8,7 @@ item 0, as QGroundControl sends it to an ArduPilot vehicle.
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from protocols.mission_file.coordinate import file_degrees_to_e7
@@ -16,6 +16,8 @@ from protocols.mission_file.error import MissionFileError, shown
 from protocols.mission_item import Command, Frame, MissionItem
 
 _PARAM_COUNT = 7
+#: MAV_AUTOPILOT_ARDUPILOTMEGA and MAV_TYPE_QUADROTOR, as which QGroundControl meets the bridge.
+_ARDUPILOT, _QUADROTOR = 3, 2
 _SAVE_AGAIN = "save it again from QGroundControl"
 
 
@@ -35,6 +37,40 @@ def read_qgc_plan(text: str, name: str) -> list[MissionItem]:
         for simple in _simple_items(entry, name, where):
             items.append(_item(simple, len(items), name, where))
     return items
+
+
+def write_qgc_plan(items: Sequence[MissionItem]) -> str:
+    """Return the items as a file's text, the first one as the planned home; `read_qgc_plan` reads the same again."""
+    home = [_degrees(items[0].lat_e7), _degrees(items[0].lon_e7), items[0].alt_m] if items else [0, 0, 0]
+    mission = {
+        "version": 2,
+        "firmwareType": _ARDUPILOT,
+        "vehicleType": _QUADROTOR,
+        "cruiseSpeed": 15,
+        "hoverSpeed": 5,
+        "plannedHomePosition": [value or 0 for value in home],
+        "items": [_entry(item) for item in items[1:]],
+    }
+    parts = {"geoFence": {"circles": [], "polygons": [], "version": 2}, "rallyPoints": {"points": [], "version": 2}}
+    plan = {"fileType": "Plan", "version": 1, "groundStation": "naze-bridge", "mission": mission, **parts}
+    return json.dumps(plan, indent=4, allow_nan=False) + "\n"
+
+
+def _entry(item: MissionItem) -> dict[str, Any]:
+    values = (item.p1, item.p2, item.p3, item.p4, _degrees(item.lat_e7), _degrees(item.lon_e7), item.alt_m)
+    params = [None if value is None or math.isnan(value) else value for value in values]
+    return {
+        "type": "SimpleItem",
+        "autoContinue": True,
+        "doJumpId": item.seq,
+        "command": item.command,
+        "frame": item.frame,
+        "params": params,
+    }
+
+
+def _degrees(e7: int | None) -> float | None:
+    return None if e7 is None else e7 / 1e7
 
 
 def _parse(text: str, name: str) -> Any:

@@ -80,7 +80,7 @@ def _check_file(path: Path, rules: MissionRules, strict: bool, as_json: bool) ->
         if as_json:
             print_json({"file": name, "error": str(error)})
         else:
-            click.echo(f"Error: {error}", err=True)
+            click.echo(f"naze-bridge: {error}", err=True)
         return ExitCode.UNREADABLE
     verdict = check_list(sent, rules)
     if as_json:

@@ -12,25 +12,29 @@ _WIDTH = 100
 _HEAD = """\
 # The command line
 
-What every command says to `--help`. Exit codes that all share: 0 done, 1 refused or failed, 2 wrong usage or an
-unreadable file, 74 the output cannot be written.
+What every command says to `--help`. Common exit codes: 0 done, 1 refused or failed, 2 wrong usage or an unreadable
+file, 74 the output cannot be written, 130 interrupted.
 """
 
 
 def page() -> str:
     """Return the page."""
-    return _HEAD + "".join(f"\n## {name}\n\n```\n{text}\n```\n" for name, text in _helps(main, "naze-bridge", None))
+    return _HEAD + "".join(f"\n## {name}\n\n```\n{text}\n```\n" for name, text in helps(main))
 
 
-def _helps(command: click.Command, name: str, parent: click.Context | None) -> Iterator[tuple[str, str]]:
+def helps(
+    command: click.Command, name: str = "naze-bridge", parent: click.Context | None = None
+) -> Iterator[tuple[str, str]]:
+    """Yield each command's full name with what it says to --help."""
     short = name.split()[-1]
-    context = click.Context(command, parent=parent, info_name=short, terminal_width=_WIDTH, max_content_width=_WIDTH)
+    widths = {"terminal_width": _WIDTH, "max_content_width": _WIDTH}
+    context = click.Context(command, parent=parent, info_name=short, **{**command.context_settings, **widths})
     yield name, command.get_help(context)
     if isinstance(command, click.Group):
         for each in command.list_commands(context):
             inner = command.get_command(context, each)
             if inner is not None:
-                yield from _helps(inner, f"{name} {each}", context)
+                yield from helps(inner, f"{name} {each}", context)
 
 
 if __name__ == "__main__":

@@ -11,23 +11,30 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from service.api import ControlError, MissionJobs, ask_daemon
+from service.api import ControlError, MissionJobs, NoDaemonError, ask_daemon, listed, shown
 from service.cli.printing import fail
 from service.daemon import Daemon
 from service.links.connection import AddressError, AutoFc, FcAddress, parse_fc
 from service.log_setup import set_up_logging
 from service.mission_data import Json
-from service.settings import Settings, SettingsError
+from service.settings import Settings, SettingsError, default_state_dir
+from service.store_worker import DATABASE_NAME
+from storage.mission_store import read_store
 from storage.store_error import StoreError
 
 #: An unknown speed is found within 8 s.
 _SEARCH_PATIENCE_S = 12.0
 #: With `auto`: the header and two on USB.
 _PORTS_SEARCHED = 3
+_INTERRUPTED = 130  # as shells have it: 128 + SIGINT
+_GOES_ON = "interrupted; the daemon goes on with it: see `naze-bridge status` and `naze-bridge missions list`"
+_CANCELLED = "interrupted; what was not finished within 2 s was given up: see `naze-bridge pull`"
 #: A round of telemetry takes a second; at 9600 baud two.
 _TELEMETRY_PATIENCE_S = 3.0
 _INTERVAL_S = 0.05
 _TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
+#: Where the service keeps its missions.
+SERVICE_STATE = Path("/var/lib/naze-bridge")
 #: The request for how the bridge stands.
 STATUS = {"do": "status"}
 
@@ -60,6 +67,9 @@ def ask(
         if fc is None:
             return ask_daemon(state_dir, request, progress)
         return asyncio.run(ask_directly(parse_fc(fc), request, progress))
+    except KeyboardInterrupt:
+        click.echo(f"naze-bridge: {_GOES_ON if fc is None else _CANCELLED}", err=True)
+        raise SystemExit(_INTERRUPTED) from None
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error
     except (ControlError, StoreError) as error:
@@ -72,6 +82,31 @@ def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, tot
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("Flight controller", total=total)
         return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
+
+
+def ask_store(state_dir: Path | None, request: Json) -> Json:
+    """Ask the daemon for stored missions; if none runs, read its store. A refusal ends the program with status 1."""
+    try:
+        try:
+            return ask_daemon(state_dir, request)
+        except NoDaemonError:
+            return _read_store(state_dir, request)
+    except SettingsError as error:
+        raise click.UsageError(str(error)) from error
+    except (ControlError, StoreError) as error:
+        fail(str(error))
+
+
+def _read_store(state_dir: Path | None, request: Json) -> Json:
+    folders = [state_dir] if state_dir is not None else [default_state_dir(), SERVICE_STATE]
+    try:
+        path = next((path for folder in folders if (path := folder / DATABASE_NAME).exists()), None)
+    except PermissionError as error:
+        raise ControlError(f"{SERVICE_STATE} is closed to you: use sudo") from error
+    if path is None:
+        raise ControlError(f"no missions are stored in {' or '.join(map(str, folders))}: name the folder, --state-dir")
+    with read_store(path) as store:
+        return listed(store, request["limit"]) if request["do"] == "missions" else shown(store, request["number"])
 
 
 async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
@@ -92,6 +127,10 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
         if request == STATUS:
             await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
         return await jobs.do(request, lambda answer: progress(answer["progress"]))
+    except asyncio.CancelledError:
+        # A mission is either finished or given up cleanly, never left in the middle.
+        await daemon.finish()
+        raise
     finally:
         running.cancel()
         with suppress(asyncio.CancelledError):

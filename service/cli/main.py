@@ -5,36 +5,45 @@ import errno
 import importlib
 import os
 import sys
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
-#: Subcommand -> where it lives. A daemon on a Pi need not load what only `check` or `demo` use.
+from service.cli.command_group import LazyCommand, LazyGroup
+
 _COMMANDS = {
-    "run": "service.cli.run:run",
-    "check": "service.cli.check:check",
-    "push": "service.cli.mission_commands:push",
-    "pull": "service.cli.mission_commands:pull",
-    "clear": "service.cli.mission_commands:clear",
-    "status": "service.cli.mission_commands:status",
-    "missions": "service.cli.stored_missions:missions",
-    "fleet": "service.fleet.command:fleet",
-    "doctor": "service.doctor.command:doctor",
-    "sim": "simulator.command:sim",
-    "demo": "service.cli.demo:demo",
+    "run": LazyCommand("service.cli.run:run", "Run the bridge in the foreground."),
+    "status": LazyCommand("service.cli.status:status", "Show how the bridge and the vehicle are."),
+    "doctor": LazyCommand("service.doctor.command:doctor", "Diagnose setup problems."),
+    "check": LazyCommand("service.cli.check:check", "Show what would become of mission files, offline."),
+    "push": LazyCommand("service.cli.mission_commands:push", "Write a mission file and verify it."),
+    "pull": LazyCommand("service.cli.mission_commands:pull", "Read the mission from the flight controller."),
+    "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
+    "missions": LazyCommand("service.cli.stored_missions:missions", "List, show, compare and restore missions."),
+    "fleet": LazyCommand("service.fleet.command:fleet", "Serve many vehicles at once, over Eclipse zenoh."),
+    "sim": LazyCommand("simulator.command:sim", "Simulate a flight controller."),
+    "demo": LazyCommand("service.cli.demo:demo", "Show a mission written to a simulated Naze."),
 }
 
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+_INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 
 
-class _LazyGroup(click.Group):
-    def main(self, *args: Any, **kwargs: Any) -> Any:
-        """Run to the end of the program. A full disk behind standard output is one sentence and status 74 (EX_IOERR).
+class _Main(LazyGroup):
+    def main(self, *args: Any, **kwargs: Any) -> NoReturn:
+        """Run to the end of the program. Every failure is one sentence behind the program's name.
 
-        Click itself is silent about a reader who has seen enough (`| head`).
+        A full disk behind standard output is status 74 (EX_IOERR). Click itself is silent about a reader who has seen
+        enough (`| head`).
         """
         try:
-            return super().main(*args, **kwargs)
+            code = super().main(*args, **kwargs | {"standalone_mode": False})
+        except click.ClickException as error:
+            click.echo(f"naze-bridge: {error.format_message()}", err=True)
+            sys.exit(error.exit_code)
+        except click.Abort:
+            click.echo("naze-bridge: interrupted", err=True)
+            sys.exit(_INTERRUPTED)
         except OSError as error:
             if error.errno not in _UNWRITABLE:
                 raise
@@ -42,18 +51,12 @@ class _LazyGroup(click.Group):
             # What is still in the buffer would fail once more at the interpreter's end.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(os.EX_IOERR)
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_COMMANDS)
+        sys.exit(code if isinstance(code, int) else 0)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in _COMMANDS:
-            return None
         if cmd_name == "run":
             _load_structlog_alone()
-        module, _, name = _COMMANDS[cmd_name].partition(":")
-        command: click.Command = getattr(importlib.import_module(module), name)
-        return command
+        return super().get_command(ctx, cmd_name)
 
 
 def _load_structlog_alone() -> None:
@@ -65,7 +68,7 @@ def _load_structlog_alone() -> None:
     del sys.modules["rich"]
 
 
-@click.group(cls=_LazyGroup)
+@click.group(cls=_Main, commands=_COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="naze-bridge")
 def main() -> None:
     """Companion bridge between a MultiWii-family flight controller and MAVLink ground stations."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge push`, `pull`, `clear` and `status`."""
+"""`naze-bridge push`, `pull` and `clear`."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from bridge.model.finding import Finding
-from protocols.mission_file import MissionFileError, write_qgc_wpl
-from service.cli.daemon_client import STATUS, ask, ask_with_progress, bridge_options
+from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
+from service.cli.daemon_client import ask, ask_with_progress, bridge_options
 from service.cli.mission_source import load_mission, save_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import fail, print_json, print_table
@@ -40,7 +40,9 @@ def push(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) -> N
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @bridge_options
 def pull(file: Path | None, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
-    """Read the mission that the flight controller holds: into FILE (QGC WPL 110; - is standard output), or as a table.
+    """Read the mission that the flight controller holds: into FILE, or as a table.
+
+    FILE is written as QGC WPL 110, as a QGroundControl plan if it ends with .plan; - is standard output.
 
     Exit code 0: read, 1: there is no link, or FILE cannot be written.
     """
@@ -55,7 +57,7 @@ def pull(file: Path | None, state_dir: Path | None, fc: str | None, as_json: boo
         return
     if file is not None:
         try:
-            save_mission(file, write_qgc_wpl(items))
+            save_mission(file, write_mission_file(items, file.name))
         except MissionFileError as error:
             fail(str(error))
         summary += f", written to {click.format_filename(file)}"
@@ -72,20 +74,6 @@ def pull(file: Path | None, state_dir: Path | None, fc: str | None, as_json: boo
 def clear(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Clear the mission on the flight controller and verify that."""
     show_delivery(ask(state_dir, fc, {"do": "push", "items": [], "source": "clear"}), as_json=as_json)
-
-
-@click.command()
-@bridge_options
-def status(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
-    """Show how the bridge stands: flight controller, link, ground stations."""
-    facts = ask(state_dir, fc, STATUS)
-    if as_json:
-        print_json(facts)
-        return
-    width = max(map(len, facts))
-    for name, value in facts.items():
-        shown = "-" if value is None else ", ".join(value) or "none" if isinstance(value, list) else str(value)
-        click.echo(f"{name.replace('_', ' '):{width}}  {shown}")
 
 
 def show_delivery(delivery: Json, *, as_json: bool) -> None:

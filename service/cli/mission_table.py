@@ -11,9 +11,11 @@ from rich.text import Text
 from bridge.model.finding import DROPPED, Finding
 from protocols.mission_item import MissionItem
 from service.cli.command_name import command_name
+from service.mission_data import Json, mission_items
 
 _CHANGED = "yellow"
 _DROPPED = "red"
+_ADDED = "green"
 #: Names of commands that are stored are never cut up.
 _LONGEST_STORED = len("RETURN_TO_LAUNCH")
 
@@ -25,17 +27,7 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     in it, and stand below the table with their reasons.
     """
     reasons = Text("".join(f"\n{finding.full_text()}" for finding in findings))
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        padding=0,
-        show_edge=False,
-        caption=reasons,
-        caption_justify="left",
-    )
-    table.add_column("WP", justify="right", no_wrap=True)
-    table.add_column("Command", min_width=_LONGEST_STORED, overflow="fold")
-    for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):
-        table.add_column(title, justify="right", overflow="fold", no_wrap=True)
+    table = _empty_table(reasons)
     dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
     left = iter(stored)
     for item in sent:
@@ -46,6 +38,34 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
             held = next(left, None)
             table.add_row(*map(_cell, before, _values(held) if held else before))
     return table
+
+
+def _empty_table(caption: Text) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False, caption=caption, caption_justify="left")
+    table.add_column("WP", justify="right", no_wrap=True)
+    table.add_column("Command", min_width=_LONGEST_STORED, overflow="fold")
+    for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):
+        table.add_column(title, justify="right", overflow="fold", no_wrap=True)
+    return table
+
+
+def difference_table(rows: Sequence[Json], first: str, second: str) -> Table:
+    """Make one row per item that differs (see service.web.comparison.difference), values as "first->second"."""
+    table = _empty_table(Text(f"\n{first} -> {second}"))
+    for row in rows:
+        left, right = (None if row[side] is None else _values(_shown_item(row[side])) for side in ("left", "right"))
+        if left is not None and right is not None:
+            table.add_row(*map(_cell, left, right))
+        elif left is not None:
+            table.add_row(f"{left[0]}->-", *left[1:], style=_DROPPED)
+        elif right is not None:
+            table.add_row(f"-->{right[0]}", *right[1:], style=_ADDED)
+    return table
+
+
+def _shown_item(shown: Json) -> MissionItem:
+    (item,) = mission_items([{key: value for key, value in shown.items() if key != "name"}])
+    return item
 
 
 def _values(item: MissionItem) -> list[str]:

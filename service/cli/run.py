@@ -2,7 +2,6 @@
 """`naze-bridge run`: the daemon in the foreground."""
 
 import asyncio
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from service.api import ControlError, ControlServer
+from service.cli.printing import fail
 from service.control_socket import socket_of_daemon
 from service.daemon import Daemon
 from service.lifecycle import run_until_signal
@@ -65,8 +65,7 @@ def run(
     try:
         _serve(settings, load)
     except (ControlError, LinkError, StoreError, UartFileError, ZenohSettingsError) as error:
-        click.echo(f"naze-bridge: {error}", err=True)
-        sys.exit(1)
+        fail(str(error))
 
 
 def _serve(settings: Settings, load: Callable[[], Settings]) -> None:

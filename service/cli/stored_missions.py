@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge missions`: what came in, and what became of it."""
 
-import difflib
 from datetime import datetime
 from pathlib import Path
 
@@ -10,20 +9,24 @@ from rich.table import Table
 from rich.text import Text
 
 from bridge.model.finding import Finding
-from protocols.mission_file import write_qgc_wpl
 from service.api import MOST
-from service.cli.daemon_client import ask, ask_with_progress, daemon_options
+from service.cli.command_group import CommandGroup
+from service.cli.daemon_client import ask_store, ask_with_progress, bridge_options, daemon_options
 from service.cli.mission_commands import show_delivery
-from service.cli.mission_table import mission_table
+from service.cli.mission_table import difference_table, mission_table
 from service.cli.printing import print_json, print_table
 from service.mission_data import Json, mission_items
+from service.web.comparison import difference
 
 _NUMBER = click.IntRange(1, MOST)
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def missions() -> None:
-    """Look at missions that came in, accepted or not, and restore one."""
+    """List, show, compare and restore the missions that came in, accepted or not.
+
+    All but restore also work without a daemon.
+    """
 
 
 @missions.command("list")
@@ -31,7 +34,7 @@ def missions() -> None:
 @daemon_options
 def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
     """List the missions that came in, newest first."""
-    found = ask(state_dir, None, {"do": "missions", "limit": limit})["missions"]
+    found = ask_store(state_dir, {"do": "missions", "limit": limit})["missions"]
     if as_json:
         print_json(found)
         return
@@ -69,31 +72,33 @@ def show(number: int, state_dir: Path | None, as_json: bool) -> None:
 @daemon_options
 def diff(first: int, second: int, state_dir: Path | None, as_json: bool) -> None:
     """Compare missions FIRST and SECOND as sent. Exit code 1 if they differ."""
-    before, after = (
-        write_qgc_wpl(mission_items(_fetch(state_dir, number)["received"]["items"])).splitlines()
-        for number in (first, second)
-    )
-    lines = list(difflib.unified_diff(before, after, f"mission {first}", f"mission {second}", lineterm=""))
+    before, after = (_fetch(state_dir, number)["received"]["items"] for number in (first, second))
+    rows = difference(mission_items(before), mission_items(after))
+    changed = [row for row in rows if row["kind"] != "same"]
     if as_json:
-        print_json({"equal": not lines, "diff": lines})
+        print_json({"equal": not changed, "changes": changed})
+    elif changed:
+        print_table(difference_table(changed, f"Mission {first}", f"Mission {second}"))
     else:
-        click.echo("\n".join(lines) or "no difference")
-    if lines:
+        click.echo("no difference")
+    if changed:
         raise SystemExit(1)
 
 
 @missions.command()
 @click.argument("number", type=_NUMBER)
-@daemon_options
-def restore(number: int, state_dir: Path | None, as_json: bool) -> None:
+@bridge_options
+def restore(number: int, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Write mission NUMBER to the flight controller again, as it was sent then."""
-    count = len(_fetch(state_dir, number)["received"]["items"])
-    request = {"do": "restore", "number": number}
-    show_delivery(ask_with_progress(state_dir, None, request, count), as_json=as_json)
+    items = _fetch(state_dir, number)["received"]["items"]
+    request: Json = {"do": "restore", "number": number}
+    if fc is not None:
+        request = {"do": "push", "items": items, "source": f"restore of mission {number}"}
+    show_delivery(ask_with_progress(state_dir, fc, request, len(items)), as_json=as_json)
 
 
 def _fetch(state_dir: Path | None, number: int) -> Json:
-    return ask(state_dir, None, {"do": "mission", "number": number})
+    return ask_store(state_dir, {"do": "mission", "number": number})
 
 
 def _local_time(unix_s: float) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from service.api import ControlError, ask_daemon
-from service.cli.daemon_client import STATUS, ask_directly
+from service.cli.daemon_client import SERVICE_STATE, STATUS, ask_directly
 from service.cli.printing import print_json
 from service.doctor.checked import Checked, Grade
 from service.doctor.examination import examine
@@ -22,7 +22,6 @@ from storage.store_error import StoreError
 
 #: What the service is started with, and where it keeps its missions.
 _SERVICE_CONFIG = Path("/etc/naze-bridge/config.toml")
-_SERVICE_STATE = Path("/var/lib/naze-bridge")
 _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 
 
@@ -45,7 +44,7 @@ def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json:
     asked = partial(ask_daemon, state_dir, STATUS)
     if config is None and fc is None and _SERVICE_CONFIG.exists():
         config = _SERVICE_CONFIG
-        state_dir = state_dir or (_SERVICE_STATE if _SERVICE_STATE.is_symlink() else None)
+        state_dir = state_dir or (SERVICE_STATE if SERVICE_STATE.is_symlink() else None)
     worst = Grade.OK
     for checked in _examine(config, fc, state_dir, asked):
         _tell(checked, as_json=as_json)

@@ -15,6 +15,7 @@ from rich.live import Live
 from rich.text import Text
 
 from protocols.mission_file import MissionFileError, read_mission_file, write_qgc_wpl
+from service.cli.command_group import CommandGroup
 from service.cli.mission_source import mission_bytes, save_mission
 from service.cli.printing import fail, print_json, print_table
 from service.fleet.fleet_table import complaints, fleet_table
@@ -59,7 +60,7 @@ _vehicle_option = click.option(
 )
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def fleet() -> None:
     """See and serve many vehicles at once, over Eclipse zenoh (docs/fleet.md)."""
 

@@ -130,7 +130,7 @@ def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path])
 def test_an_unreadable_file_is_one_sentence_on_stderr(files: dict[str, Path]) -> None:
     result = run(files["damaged"])
     assert result.stdout == ""
-    assert result.stderr.startswith(f"Error: {files['damaged']}, line 3: ")
+    assert result.stderr.startswith(f"naze-bridge: {files['damaged']}, line 3: ")
     assert result.stderr.count("\n") == 1
 
 

@@ -55,8 +55,8 @@ def test_what_is_wrong_is_told_with_the_file(tmp_path: Path, name: str) -> None:
     fc = [] if b"fc =" in text else ["--fc", "sim:"]
     ended = run_naze_bridge("run", *fc, "--config", config, "--state-dir", tmp_path / "state")
     assert ended.returncode == 2
-    sentence = ended.stderr.splitlines()[-1]
-    assert sentence.startswith(f"Error: {config}:")
+    sentence = ended.stderr.splitlines()[0]
+    assert sentence.startswith(f"naze-bridge: {config}:")
     assert not [word for word in words if word not in sentence], sentence
     assert "Traceback" not in ended.stderr
 
@@ -65,5 +65,5 @@ def test_what_is_wrong_is_told_with_the_file(tmp_path: Path, name: str) -> None:
 def test_a_file_that_cannot_be_read(tmp_path: Path, path: str, words: str) -> None:
     ended = run_naze_bridge("run", "--fc", "sim:", "--config", path, "--state-dir", tmp_path)
     assert ended.returncode == 2
-    assert ended.stderr.splitlines()[-1].startswith(f"Error: {path}: this cannot be read: ")
+    assert ended.stderr.splitlines()[0].startswith(f"naze-bridge: {path}: this cannot be read: ")
     assert words in ended.stderr

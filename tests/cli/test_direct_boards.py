@@ -66,7 +66,7 @@ def test_the_same_as_json(board: Board, plan_file: Path) -> None:
 def assert_status(board: Board) -> None:
     status = json.loads(run_naze_bridge("status", "--json", "--fc", board.link).stdout)
     assert (status["state"], status["armed"]) == ("MSP", False)
-    assert "flight controller" in run_naze_bridge("status", "--fc", board.link).stdout
+    assert "Flight controller" in run_naze_bridge("status", "--fc", board.link).stdout
     assert "Traceback" not in (diagnosis := run_naze_bridge("doctor", "--fc", board.link)).stderr
     assert str(board.link) in diagnosis.stdout
 

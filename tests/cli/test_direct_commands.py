@@ -131,7 +131,7 @@ def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, command: list[st
         monkeypatch.delenv(name, raising=False)
     ended = CliRunner().invoke(main, command)
     assert ended.exit_code == 2
-    assert ended.stderr.splitlines()[-1].startswith("Error: this user has no home folder")
+    assert ended.stderr.splitlines()[0].startswith("naze-bridge: this user has no home folder")
     assert "--state-dir" in ended.stderr
 
 

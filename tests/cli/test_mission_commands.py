@@ -31,6 +31,12 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
         yield daemon
 
 
+@pytest.fixture
+def start_in(tmp_path: Path) -> Iterator[Starter]:
+    with ExitStack() as stack:
+        yield Starter(tmp_path, stack)
+
+
 def ask(daemon: Daemon, *arguments: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
     return run_naze_bridge(*arguments, "--state-dir", daemon.state_dir, **options)
 
@@ -55,6 +61,9 @@ def strict(text: str) -> Any:
 def write_plan(path: Path, plan: list[PlanRow]) -> Path:
     path.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
     return path
+
+
+_READING = (("list",), ("show", "2"), ("diff", "1", "2"))
 
 
 # -- what is printed -----------------------------------------------------------------------------------------
@@ -194,6 +203,54 @@ def test_pull_into_standard_output_is_a_mission_file(daemon: Daemon) -> None:
 
 def test_no_daemon(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--state-dir", tmp_path), 1, str(tmp_path), "naze-bridge run")
+
+
+def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: Path) -> None:
+    daemon = start_in.daemon("sim:")
+    daemon.wait()
+    first, second = plain_plan(5), [*plain_plan(4), waypoint(9)]
+    for plan in (first, second):
+        assert ask(daemon, "push", write_plan(tmp_path / "plan", plan)).returncode == 0
+    with_daemon = {words: ask(daemon, "missions", *words).stdout for words in _READING}
+    daemon.end()
+    assert {words: ask(daemon, "missions", *words).stdout for words in _READING} == with_daemon
+    difference = with_daemon["diff", "1", "2"].splitlines()
+    assert [line for line in difference if "->" in line and "WAYPOINT" in line]
+    assert "no daemon answers" in ask(daemon, "missions", "restore", "1").stderr
+    restored = ask(daemon, "missions", "restore", "1", "--fc", "sim")
+    assert restored.stdout.endswith("ACCEPTED: Mission verified: 5 records\n"), restored
+    assert_one_sentence(run_naze_bridge("missions", "list", "--state-dir", tmp_path), 1, "no missions are stored")
+
+
+def test_status_is_for_people(daemon: Daemon) -> None:
+    lines = dict(line.split("  ", 1) for line in ask(daemon, "status").stdout.splitlines())
+    assert "on sim:, MSP" in lines["Flight controller"]
+    assert ", for " in lines["Flight controller"]
+    assert "disarmed" in lines["Vehicle"]
+    assert lines["Connect to"].strip() == f"UDP 127.0.0.1, port {daemon.port}"
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["psuh"], "did you mean 'push'?"),
+        (["missions", "lst"], "did you mean 'list'?"),
+        (["fleet", "wacth"], "did you mean 'watch'?"),
+        (["status", "--jsn"], "Did you mean"),
+    ],
+)
+def test_a_misspelt_word_is_answered_with_the_nearest(words: list[str], hint: str) -> None:
+    ended = run_naze_bridge(*words)
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("naze-bridge: ")
+    assert hint in ended.stderr
+
+
+def test_the_list_of_commands_imports_none_of_them() -> None:
+    program = "import sys; from service.cli.main import main\ntry: main(['-h'])\nfinally: print(*sys.modules)"
+    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False).stdout
+    assert "Commands:" in printed
+    assert not {"asyncio", "rich", "pymavlink", "structlog"} & set(printed.split())
 
 
 def test_a_daemon_that_belongs_to_somebody_else(daemon: Daemon) -> None:

@@ -33,8 +33,8 @@ def test_a_connection_that_cannot_be_understood(tmp_path: Path, name: str) -> No
     arguments, hint = UNKNOWN[name]
     ended = run_naze_bridge("run", *arguments, "--state-dir", str(tmp_path))
     assert ended.returncode == 2
-    sentence = ended.stderr.splitlines()[-1]
-    assert sentence.startswith("Error: ")
+    sentence = ended.stderr.splitlines()[0]
+    assert sentence.startswith("naze-bridge: ")
     assert hint in sentence
     assert "Traceback" not in ended.stderr
 

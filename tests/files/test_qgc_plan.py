@@ -3,13 +3,14 @@
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.mission_file import MissionFileError, read_mission_file, write_mission_file
 from protocols.mission_item import MissionItem
 
 
@@ -176,3 +177,10 @@ def test_any_seven_numbers_make_an_item(params: list[float | None], home: Any) -
     refused = refusal(plan(simple(params=params), home=home))
     beyond = any(value is not None and math.isinf(value * 1e7) for value in params[4:6])
     assert refused is None or "plannedHomePosition" in refused or (beyond and "item 1" in refused)
+
+
+def test_a_plan_that_was_written_reads_back() -> None:
+    items = read_mission_file((Path(__file__).parents[2] / "examples/naze-field.waypoints").read_bytes(), "x")
+    home, *rest = read_mission_file(write_mission_file(items, "field.plan").encode(), "field.plan")
+    assert (home.lat_e7, home.lon_e7, home.alt_m) == (items[0].lat_e7, items[0].lon_e7, items[0].alt_m)
+    assert rest == items[1:]

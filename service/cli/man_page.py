@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The manual page, naze-bridge(1), from what each command says to --help: `python -m service.cli.man_page`."""
+
+import sys
+
+from service.cli.cli_page import helps
+from service.cli.main import main
+from service.version import version
+
+_HEAD = """\
+.TH NAZE-BRIDGE 1 "" "naze-bridge {version}" "User Commands"
+.SH NAME
+naze-bridge \\- bridge between a flight controller on a serial port and MAVLink ground stations
+.SH DESCRIPTION
+Sits on a Raspberry Pi between a Naze32 with Harakiri (or INAV, MultiWii) and Mission Planner, QGroundControl or
+MAVProxy. Missions are checked, written to the flight controller and verified there.
+First steps: sudo naze-bridge setup.
+"""
+_TAIL = """\
+.SH EXIT STATUS
+0 done; 1 refused or failed; 2 wrong usage or an unreadable file; 74 the output cannot be written; 130 interrupted.
+.SH FILES
+.TP
+/etc/naze-bridge/config.toml
+Settings, each with its default; files in conf.d override it.
+.TP
+/var/lib/naze-bridge
+Stored missions and telemetry logs.
+.SH SEE ALSO
+/usr/share/doc/naze-bridge
+"""
+
+
+def man_page() -> str:
+    """The page in roff."""
+    sections = "".join(f".SH {_escaped(name.upper())}\n.nf\n{_escaped(text)}\n.fi\n" for name, text in helps(main))
+    return _HEAD.format(version=version()) + sections + _TAIL
+
+
+def _escaped(text: str) -> str:
+    lines = text.replace("\\", "\\e").replace("-", "\\-").splitlines()
+    return "\n".join(f"\\&{line}" if line.startswith((".", "'")) else line for line in lines)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(man_page())

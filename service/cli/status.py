@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge status`: the bridge and the vehicle, for people; `--json` for scripts."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from service.cli.daemon_client import STATUS, ask, bridge_options
+from service.cli.printing import print_json
+from service.host import Host
+from service.mission_data import Json
+
+_MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
+
+
+@click.command()
+@bridge_options
+def status(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+    """Show how the bridge and the vehicle are: who is connected, where, for how long; mode, fix, battery, mission."""
+    facts = ask(state_dir, fc, STATUS)
+    if as_json:
+        print_json(facts)
+        return
+    lines = list(status_lines(facts, Host().ipv4_addresses()))
+    width = max(len(name) for name, _ in lines)
+    for name, text in lines:
+        click.echo(f"{name:{width}}  {text}")
+
+
+def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]:
+    """Yield a name and a text for each line; `addresses` are this machine's own."""
+    yield "Bridge", f"naze-bridge {facts['version']}, running for {duration(facts['uptime_s'])}"
+    yield "Flight controller", _flight_controller(facts)
+    if facts["flight_controller"] is not None:
+        armed = {True: "ARMED", False: "disarmed", None: "armed or not is unknown"}[facts["armed"]]
+        yield "Vehicle", ", ".join(filter(None, (armed, facts["mode"])))
+        yield "GPS", _gps(facts)
+        yield "Battery", "unknown" if facts["battery_v"] is None else f"{facts['battery_v']:.1f} V"
+        yield "Mission", _mission(facts)
+        if facts["round_trip_ms"] is not None:
+            lost = f"{facts['requests_lost']} requests lost, {facts['bad_checksums']} bad checksums"
+            yield "Serial line", f"round trip {facts['round_trip_ms']} ms, {lost}"
+    yield "Ground stations", ", ".join(facts["ground_stations"]) or "none"
+    for link in facts["links"]:
+        yield "Connect to", _reachable(link, addresses)
+    if facts["page"] is not None:
+        host, _, port = facts["page"].rpartition(":")
+        own = addresses[:1] if host == "0.0.0.0" and addresses else [host]  # noqa: S104
+        yield "Page", f"http://{own[0]}:{port}/"
+    for text in facts["recording"]:
+        yield "Recording", text
+    for text in facts.get("ports_passed_over", ()):
+        yield "Port passed over", text
+    for text in facts["refused"]:
+        yield "Refused", text
+
+
+def duration(seconds: float) -> str:
+    """A time in its two largest units: "2 h 5 min"."""
+    whole = int(seconds)
+    if whole < _MINUTE_S:
+        return f"{whole} s"
+    if whole < _HOUR_S:
+        return f"{whole // _MINUTE_S} min"
+    if whole < _DAY_S:
+        return f"{whole // _HOUR_S} h {whole % _HOUR_S // _MINUTE_S} min"
+    return f"{whole // _DAY_S} d {whole % _DAY_S // _HOUR_S} h"
+
+
+def _flight_controller(facts: Json) -> str:
+    if facts["flight_controller"] is None:
+        return facts["trouble"] or f"none yet: searching on {facts['where']}"
+    speed = "" if facts["speed_baud"] is None else f" at {facts['speed_baud']} baud"
+    since = "" if facts["found_s"] is None else f", for {duration(facts['found_s'])}"
+    return f"{facts['flight_controller']} on {facts['where']}, {facts['state']}{speed}{since}"
+
+
+def _gps(facts: Json) -> str:
+    if facts["satellites"] is None:
+        return "no data"
+    fix = {None: "fix unknown", "none": "no fix"}.get(facts["fix"], f"{facts['fix']} fix")
+    return f"{fix}, {facts['satellites']} satellites"
+
+
+def _mission(facts: Json) -> str:
+    count = facts["mission_records"]
+    if count is None:
+        return "not read yet"
+    return f"{count} records, checksum {facts['mission_checksum']}" if count else "none stored"
+
+
+def _reachable(link: str, addresses: list[str]) -> str:
+    """What to enter in a ground station for a link that listens; other links as they are written."""
+    kind, _, rest = link.partition(":")
+    host, _, port = rest.rpartition(":")
+    protocol = {"udpin": "UDP", "tcpin": "TCP"}.get(kind)
+    if protocol is None:
+        return link
+    own = addresses if host in ("0.0.0.0", "[::]") and addresses else [host]  # noqa: S104
+    return f"{protocol} {' or '.join(own)}, port {port}"
