@@ -200,10 +200,17 @@ class Ground:
             if self._stations.version(peer) != other:
                 self._write(peer, heartbeat, other)
 
-    def say(self, severity: Severity, text: str) -> None:
-        """Show a text on every ground station, in pieces that fit STATUSTEXT; the same refusal not again for 10 s."""
+    def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
+        """Show a text on one ground station or on all."""
+        self._say(severity, text, self.everyone() if to is None else [to.peer])
+
+    def say_to_others(self, severity: Severity, text: str, station: Station) -> None:
+        """Show a text on all ground stations but one."""
+        self._say(severity, text, [peer for peer in self.everyone() if peer != station.peer])
+
+    def _say(self, severity: Severity, text: str, peers: Sequence[Peer]) -> None:
+        """Send a text in pieces that fit STATUSTEXT; a refusal once an attempt."""
         self._log_event("debug", "gcs.text", text=text)
-        peers = self.everyone()
         if severity is Severity.ERROR:
             peers = self._texts.new_to(peers, text, self._now)
         for piece in split_text(text):

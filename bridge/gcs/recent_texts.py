@@ -1,28 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each ground station was told lately: Mission Planner asks seven times over, and one refusal is enough."""
+"""Which refusals belong to one attempt: Mission Planner asks up to seven times, and one text is enough."""
 
 from collections.abc import Iterable
 
 from bridge.gcs.station import Peer
 
-_QUIET_S = 10.0
+#: A client repeats a request within 0.7 s; a pilot who tries again takes longer, and hears the reason again.
+_QUIET_S = 1.0
 #: More are not remembered: at worst a text is repeated.
 _MAX_TEXTS = 256
 
 
 class RecentTexts:
-    """Remembers texts for 10 s."""
+    """Remembers texts for as long as they are asked for without a pause of 1 s."""
 
     def __init__(self) -> None:
         self._told: dict[tuple[Peer, str], float] = {}  # oldest first
 
     def new_to(self, peers: Iterable[Peer], text: str, now: float) -> list[Peer]:
-        """Return those of `peers` who were not told `text` lately; now they were."""
+        """Those of `peers` for whom `text` is new in this attempt."""
         while self._told:
             oldest = next(iter(self._told))
             if now < self._told[oldest] + _QUIET_S and len(self._told) <= _MAX_TEXTS:
                 break
             del self._told[oldest]
-        untold = [peer for peer in peers if (peer, text) not in self._told]
-        self._told.update({(peer, text): now for peer in untold})
-        return untold
+        new = []
+        for peer in peers:
+            if self._told.pop((peer, text), None) is None:
+                new.append(peer)
+            self._told[peer, text] = now
+        return new

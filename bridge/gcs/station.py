@@ -48,5 +48,8 @@ class Post(Protocol):
     def to(self, station: Station, message: Message) -> None:
         """Send to one ground station."""
 
-    def say(self, severity: Severity, text: str) -> None:
-        """Show a text on every ground station (STATUSTEXT)."""
+    def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
+        """Show a text (STATUSTEXT) on one ground station, or on every one."""
+
+    def say_to_others(self, severity: Severity, text: str, station: Station) -> None:
+        """Show a text on every ground station but this one."""

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
-from bridge.model.finding import Finding, Rejection, reject
+from bridge.missions.value_range import UNUSED, Range
+from bridge.model.finding import DROPPED, Finding, News, Rejection, reject, reject_list
 from bridge.model.verdict import CLEARED_LIST, Verdict, rejected
-from protocols.mission_item import Frame, MissionItem, MissionResult
+from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 
 MAX_LAT_E7 = 90 * 10**7
 MAX_LON_E7 = 180 * 10**7
@@ -57,8 +58,66 @@ class ListCheck(ABC):
     def _conclude(self) -> Verdict[Any]:
         """Return the verdict on a list that is not rejected."""
 
-    def _note(self, item: MissionItem, name: str, was: float | None, becomes: float | str | None, why: str) -> None:
-        self._findings.append(Finding(item.seq, name, was, becomes, why))
+    def _note(
+        self,
+        item: MissionItem,
+        name: str,
+        was: float | None,
+        becomes: float | str | None,
+        why: str,
+        news: News = News.NOTICE,
+    ) -> None:
+        if becomes == DROPPED and item.command != Command.DO_SET_ROI_NONE:
+            news = News.WARNING
+        self._findings.append(Finding(item.seq, name, was, becomes, why, item.command, news))
+
+    def _fit(self, item: MissionItem, name: str, allowed: Range, news: News = News.NOTICE) -> int:
+        """Make one field a whole number that can be stored."""
+        value: float = getattr(item, name)
+        stored = allowed.fit(value)
+        if stored != (0 if math.isnan(value) else value):
+            self._note(item, name, given(value), stored, allowed.reason(value), news)
+        return stored
+
+    def _no_position(self, item: MissionItem) -> None:
+        for name, value in (("lat_e7", item.lat_e7), ("lon_e7", item.lon_e7)):
+            if value:
+                self._note(item, name, value, 0, UNUSED.why)
+
+    def _note_home(self, item: MissionItem) -> None:
+        """Item 0 is home; MAVSDK's `mission` plugin puts none in front, and its first waypoint would be missing."""
+        if item.frame in RELATIVE_FRAMES:
+            why = "first item became home, not flown to"
+            self._note(item, "frame", item.frame, int(Frame.GLOBAL), why, News.WARNING)
+
+    def _now_relative(self, item: MissionItem) -> None:
+        """Tell that a height counts from another level than the one that was sent."""
+        level = "sea level" if item.frame in SEA_LEVEL_FRAMES else "terrain"
+        why = f"Alt flown above home, not above {level}"
+        self._note(item, "frame", item.frame, int(Frame.GLOBAL_RELATIVE_ALT), why, News.WARNING)
+
+
+class HomeOnly(ListCheck):
+    """The check of a list of one item: no mission, but in one case a client's way to clear.
+
+    MAVSDK clears an ARDUPILOTMEGA vehicle with one item of zeros; Mission Planner's empty Write sends home.
+    """
+
+    def _judge(self, item: MissionItem) -> Rejection | None:
+        numbers = (item.p1, item.p2, item.p3, item.p4, item.alt_m)
+        is_blank = missing_coordinate(item) is not None and not any(given(number) for number in numbers)
+        if item.command == Command.NAV_WAYPOINT and item.frame in RELATIVE_FRAMES and is_blank:
+            return None
+        return _HOME_ONLY
+
+    def _refuse_kept_list(self) -> Rejection | None:
+        return None
+
+    def _conclude(self) -> Verdict[Any]:
+        return CLEARED_LIST
+
+
+_HOME_ONLY = reject_list(MissionResult.INVALID, 1, "only a home point, no command")
 
 
 class MissionRules(Protocol):
@@ -74,12 +133,14 @@ class MissionRules(Protocol):
 
 def check_count(count: int, rules: MissionRules) -> Rejection | None:
     """Judge a MISSION_COUNT; 0 clears the list and is no fault."""
-    if count == 1:
-        return reject(MissionResult.INVALID, None, "count", count, "only a home point, no command")
     if count > rules.max_items:
-        why = f"{count} items, {rules.max_items} fit"
-        return reject(MissionResult.NO_SPACE, None, "count", count, why)
+        return reject_list(MissionResult.NO_SPACE, count, f"{count} items, but only {rules.max_items} fit")
     return None
+
+
+def begin_check(count: int, rules: MissionRules, fallback_home: tuple[int, int] | None) -> ListCheck:
+    """Begin the check of a list of `count` items, 1 or more."""
+    return HomeOnly(count) if count == 1 else rules.begin(count, fallback_home)
 
 
 def check_list(
@@ -90,7 +151,7 @@ def check_list(
         return CLEARED_LIST
     if rejection := check_count(len(items), rules):
         return rejected((), rejection)
-    check = rules.begin(len(items), fallback_home)
+    check = begin_check(len(items), rules, fallback_home)
     for item in items:
         if check.take(item):
             break
@@ -102,18 +163,15 @@ def refuse_frame(item: MissionItem, *, needs_position: bool) -> Rejection | None
     known = item.frame in (*RELATIVE_FRAMES, *SEA_LEVEL_FRAMES, *TERRAIN_FRAMES)
     if known or (item.frame == Frame.MISSION and not needs_position):
         return None
-    why = f"frame {item.frame} is not supported"
-    return reject(MissionResult.UNSUPPORTED_FRAME, item.seq, "frame", item.frame, why)
+    return reject(MissionResult.UNSUPPORTED_FRAME, item, "frame", f"frame {item.frame} not supported")
 
 
 def refuse_position(item: MissionItem) -> Rejection | None:
     """Refuse coordinates that are nowhere on earth."""
     if abs(item.lat_e7 or 0) > MAX_LAT_E7:
-        why = "latitude beyond 90 degrees"
-        return reject(MissionResult.INVALID_PARAM5_X, item.seq, "lat_e7", item.lat_e7, why)
+        return reject(MissionResult.INVALID_PARAM5_X, item, "lat_e7", "latitude beyond 90 deg")
     if abs(item.lon_e7 or 0) > MAX_LON_E7:
-        why = "longitude beyond 180 degrees"
-        return reject(MissionResult.INVALID_PARAM6_Y, item.seq, "lon_e7", item.lon_e7, why)
+        return reject(MissionResult.INVALID_PARAM6_Y, item, "lon_e7", "longitude beyond 180 deg")
     return None
 
 
@@ -125,5 +183,5 @@ def missing_coordinate(item: MissionItem) -> tuple[str, int | None] | None:
 
 
 def given(value: float) -> float | None:
-    """Return None for what is not given."""
+    """The value; None for NaN, "not given"."""
     return None if math.isnan(value) else value

@@ -11,24 +11,31 @@ from typing import Any
 from bridge.line.conversation import Conversation, LinkLost, Stopped, conclude, pause, recall, save
 from bridge.missions.fc_mission_store import LIST_IS_GONE, AnyFcMissionStore, PushFailure, StoreReport, StoreState
 from bridge.missions.list_check import MissionRules
+from bridge.missions.mission_texts import summary
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
 
-#: mission-rules.md, "a flash write is still running": wait for it up to 1 s.
+#: How long a flash write that is still running is waited for (docs/mission-rules.md).
 _BUSY_PATIENCE_S = 1.0
 _BUSY_INTERVAL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """How a mission ended. `number` is its number in the store, None if it could not be stored."""
+    """How a mission ended. `number` is its number in the store, None if it could not be stored.
+
+    `is_lossy`: accepted, but an item was lost, the list erased, or a height changed its meaning. `change`: what has
+    changed on the aircraft; empty if nothing has.
+    """
 
     ack: MissionResult
     text: str
     number: int | None
+    is_lossy: bool = False
+    change: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +144,7 @@ class MissionService:
         number = yield from save(arrived)
         verdict = arrived.verdict
         if verdict.result is Result.REJECTED:
-            reason = verdict.findings[-1].text() if verdict.findings else "Mission rejected"
+            reason = verdict.findings[-1].text()
             cancelled = verdict.ack is MissionResult.OPERATION_CANCELLED
             outcome = Outcome.CANCELLED if cancelled else Outcome.REJECTED
             return (yield from self._conclude(number, outcome, verdict.ack, reason))
@@ -164,15 +171,25 @@ class MissionService:
                 result.held,
                 dialect.items(result.held, verdict.sent_as),
             )
-        if verdict.result is not Result.CLEARED:
+        lossy = summary(len(arrived.items), verdict)
+        if lossy is not None:
+            text = lossy
+        elif verdict.result is not Result.CLEARED:
             text = f"Mission verified: {len(verdict.records)} records" + (", unchanged" if result.unchanged else "")
         elif result.unchanged:
             text = "The flight controller already held no mission"
         else:
             text = "Mission on the flight controller cleared"
+        is_erased = verdict.result is Result.CLEARED
+        change = (
+            "" if result.unchanged else "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
+        )
         if result.held is not None and result.held != verdict.records:
             text += ", places within 0.4 m"
-        return (yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text))
+        delivery = yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text)
+        if result.unchanged:
+            return replace(delivery, is_lossy=lossy is not None)
+        return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
         """Return what the flight controller holds; a copy answers only while it has the same checksum."""

@@ -1,29 +1,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finding: one thing about a mission that its pilot must hear of."""
+"""A finding: one thing that the rules changed, dropped or rejected in a mission, and how a pilot reads it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 
-from protocols.mission_item import MissionItem, MissionResult
+from protocols.mavlink.command_name import command_name
+from protocols.mission_item import Command, MissionItem, MissionResult
 
 DROPPED = "dropped"
 REJECTED = "rejected"
 CLEARED = "cleared"
 
-_STATUSTEXT_LENGTH = 50
-_LABELS = {"lat_e7": "lat", "lon_e7": "lon", "alt_m": "height"}
+_LABELS = {"lat_e7": "Lat", "lon_e7": "Long", "alt_m": "Alt"}
+#: Column heads of Mission Planner's plan screen, param1..4.
+_PARAMS: Mapping[int, tuple[str, ...]] = {
+    Command.NAV_WAYPOINT: ("Delay", "Hit Rad", "", "Yaw Ang"),
+    Command.NAV_LOITER_UNLIM: ("", "Hit Rad", "", "Yaw Ang"),
+    Command.NAV_LOITER_TURNS: ("Turns", "Hit Rad", "", "Yaw Ang"),
+    Command.NAV_LOITER_TIME: ("Time s", "Hit Rad", "", "yaw per"),
+    Command.CONDITION_YAW: ("Deg", "Sec", "Dir 1=CW", "0=Abs 1=Rel"),
+    Command.DO_JUMP: ("WP #", "Repeat#", "", ""),
+    Command.DO_CHANGE_SPEED: ("Type", "speed m/s", "", ""),
+}
+_METRES = ("alt_m", "Hit Rad")
 
 #: Makes a finding of an item: field, value as sent, what it becomes, why.
 Note = Callable[[MissionItem, str, float | None, float | str | None, str], None]
 
 
+class News(StrEnum):
+    """How much a finding matters to the pilot."""
+
+    WARNING = "warning"  # something is lost, or flown otherwise than it was drawn
+    NOTICE = "notice"
+    NONE = "none"  # a default was filled in
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A changed value, a dropped item or a rejected list (mission-rules.md).
+    """A changed value, a dropped item or a rejected list (docs/mission-rules.md).
 
     `seq` is the item's number as it was sent; None speaks of the whole list. `field` is an attribute of MissionItem,
     or "count". `was` is the value as sent, None if not given; `becomes` the value as stored, or DROPPED (the item),
-    REJECTED or CLEARED (the list).
+    REJECTED or CLEARED (the list). `command` is the item's MAV_CMD; None for the list, and in missions that an older
+    release stored.
     """
 
     seq: int | None
@@ -31,28 +52,47 @@ class Finding:
     was: str | float | int | None
     becomes: str | float | int | None
     why: str
+    command: int | None = None
+    news: News = News.NOTICE
 
-    def text(self) -> str:
-        """Say it in one line; a change leaves its reason out where a STATUSTEXT has no room for it."""
-        full = self.full_text()
-        if isinstance(self.becomes, str) or len(full) <= _STATUSTEXT_LENGTH:
-            return full
-        return full.removesuffix(f" ({self.why})")
+    def text(self, count: int = 1) -> str:
+        """One line with the reason; `count` items have the same finding."""
+        who = f"{count} items" if count > 1 else f"WP {self.seq}" if self.seq else "Home"
+        if self.becomes == REJECTED:
+            return f"Mission rejected: {self.why}" if self.seq is None else f"Rejected, {who}: {self.why}"
+        if self.becomes == CLEARED:
+            return f"Mission erased: {self.why}"
+        if self.becomes == DROPPED:
+            name = "item" if self.command is None else command_name(self.command)
+            return f"{who}: {name} dropped, {self.why}"
+        if self.seq is None:
+            return self.why
+        if self.field == "frame" or (self.news is News.WARNING and self.field in ("lat_e7", "lon_e7")):
+            return f"{who}: {self.why}"
+        label = self._label()
+        unit = " m" if self.field in _METRES or label in _METRES else ""
+        was, becomes = self._shown(self.was), self._shown(self.becomes)
+        if was == becomes:
+            was = f"{self.was:.9g}"  # single precision to the last digit
+        is_raised = self.field == "alt_m" and self.news is News.WARNING
+        verb = "raised" if is_raised else "changed"
+        change = f"set to {becomes}" if self.was is None else f"{verb} from {was} to {becomes}"
+        return f"{who}: {label} {change}{unit} ({self.why})"
 
-    def full_text(self) -> str:
-        """Say it in one line, with the reason."""
-        who = "Mission" if self.seq is None else f"WP {self.seq}" if self.seq else "Home"
-        if isinstance(self.becomes, str):
-            return f"{who}: {self.becomes}, {self.why}"
-        label = _LABELS.get(self.field, self.field)
-        unit = " m" if self.field == "alt_m" else ""
-        return f"{who}: {label} {self._shown(self.was)} -> {self._shown(self.becomes)}{unit} ({self.why})"
+    def _label(self) -> str:
+        if self.field in _LABELS:
+            return _LABELS[self.field]
+        if self.field not in ("p1", "p2", "p3", "p4"):
+            return self.field
+        number = int(self.field[1])
+        names = _PARAMS.get(self.command or 0, ("",) * 4)
+        return names[number - 1] or f"param{number}"
 
     def _shown(self, value: str | float | int | None) -> str:
-        if value is None:
-            return "none"
-        if isinstance(value, str):
-            return value
+        if value is None or isinstance(value, str):
+            return value or "none"
+        if self.field == "command":
+            return command_name(int(value))
         if self.field in ("lat_e7", "lon_e7"):
             return f"{value / 1e7:.7f}" if value else "0"
         return f"{value:g}"
@@ -60,12 +100,19 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """Why a list is refused: the answer to the ground station, and the words for its user."""
+    """Why a list is rejected: the answer to the ground station, and the words for its user."""
 
     ack: MissionResult
     finding: Finding
 
 
-def reject(ack: MissionResult, seq: int | None, name: str, was: float | None, why: str) -> Rejection:
-    """Make a rejection of the list because of item `seq`."""
-    return Rejection(ack, Finding(seq, name, was, REJECTED, why))
+def reject(ack: MissionResult, item: MissionItem, name: str, why: str) -> Rejection:
+    """Reject the list because of one item's field `name`."""
+    was = getattr(item, name)
+    # NaN is "not given": JSON, in which findings are stored, has no such number.
+    return Rejection(ack, Finding(item.seq, name, was if was == was else None, REJECTED, why, item.command))
+
+
+def reject_list(ack: MissionResult, count: int, why: str) -> Rejection:
+    """Reject a list as a whole."""
+    return Rejection(ack, Finding(None, "count", count, REJECTED, why))

@@ -62,7 +62,8 @@ class LocalMissions:
             if isinstance(result, LinkLost):
                 result = NO_LINK
             if arrived and isinstance(result, Delivery):
-                self._post.say(Severity.NOTICE, f"{source}: {result.text}")
+                severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
+                self._post.say(severity, f"{source}: {result.text}")
             self._log_event(
                 "info" if result.ack is MissionResult.ACCEPTED else "warning",
                 "mission.push_ended",

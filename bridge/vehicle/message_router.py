@@ -88,7 +88,7 @@ class MessageRouter:
 
     def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):
-            self._post.say(Severity.ERROR, "It is flown with the transmitter")
+            self._post.say(Severity.ERROR, "It is flown with the transmitter", station)
             self._post.to(
                 station, m.MAVLink_mission_ack_message(station.sysid, station.compid, MissionResult.DENIED, 0)
             )
@@ -108,8 +108,8 @@ class MessageRouter:
             self._downloads.forget(station)
             self._uploads.ack(station, message.type, now)
 
-    def _set_current(self, _station: Station, _message: Message, _now: float) -> None:
-        self._post.say(Severity.ERROR, "The current waypoint cannot be set")
+    def _set_current(self, station: Station, _message: Message, _now: float) -> None:
+        self._post.say(Severity.ERROR, "The current waypoint cannot be set", station)
 
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0

@@ -147,7 +147,7 @@ class MissionDownloads:
         return MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, lat_e7, lon_e7, 0)
 
     def _refuse(self, station: Station, refusal: Refusal) -> None:
-        self._post.say(Severity.ERROR, refusal.text)
+        self._post.say(Severity.ERROR, refusal.text, station)
         self._ack(station, refusal.ack)
 
     def _ack(self, station: Station, result: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:

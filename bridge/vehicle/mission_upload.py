@@ -14,10 +14,11 @@ from bridge.gcs.station import Peer, Post, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import StoreReport
-from bridge.missions.list_check import ListCheck, check_count
+from bridge.missions.list_check import ListCheck, begin_check, check_count
 from bridge.missions.mission_service import NO_LINK, Delivery, MissionService
+from bridge.missions.mission_texts import finding_lines
 from bridge.model.events import EventLog, Incidents
-from bridge.model.finding import Finding
+from bridge.model.finding import Finding, News
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
@@ -154,7 +155,9 @@ class MissionUploads:
             # Its answer is on the way: the final ack, or nothing.
             return
         if item.seq >= transfer.count:
-            self._post.say(Severity.ERROR, f"WP {item.seq} is beyond the {transfer.count} items that were announced")
+            self._post.say(
+                Severity.ERROR, f"WP {item.seq} is beyond the {transfer.count} items that were announced", station
+            )
             self._ack(station, MissionResult.INVALID_SEQUENCE)
             return
         if transfer.announced_again:
@@ -190,7 +193,7 @@ class MissionUploads:
         if answer is not None and answer.is_refusal:
             self._ack(station, answer.ack)
             return
-        self._post.say(Severity.ERROR, "A mission can only be written as a whole")
+        self._post.say(Severity.ERROR, "A mission can only be written as a whole", station)
         self._ack(station, MissionResult.UNSUPPORTED)
 
     def ack(self, station: Station, result: int, now: float) -> None:
@@ -259,7 +262,7 @@ class MissionUploads:
         if rejection is not None:
             self._abandon(transfer, Refusal(rejection.ack, rejection.finding.text()), now)
             return
-        transfer.check = answer.rules.begin(transfer.count, self._fallback_home())
+        transfer.check = begin_check(transfer.count, answer.rules, self._fallback_home())
         transfer.phase = Phase.RECEIVING
         transfer.progress_at = now
         self._log_event(
@@ -316,29 +319,24 @@ class MissionUploads:
     def _deliver(self, transfer: _Transfer, verdict: Verdict[Any], items: tuple[MissionItem, ...], now: float) -> None:
         self._transfer = transfer
         transfer.phase = Phase.DELIVERING
-        # The finding that rejects a list is said once, as the error that ends it.
-        self._tell(verdict.findings[:-1] if verdict.result is Result.REJECTED else verdict.findings)
         arrived = ArrivedMission(str(transfer.station), items, verdict)
         self._runner.start(
             self._missions.deliver(arrived, _ignore),
-            lambda delivery, at: self._delivered(transfer, delivery, at),
+            lambda delivery, at: self._delivered(transfer, arrived, delivery, at),
             now,
         )
 
-    def _tell(self, findings: tuple[Finding, ...]) -> None:
-        for finding in findings:
-            self._post.say(Severity.NOTICE, finding.text())
-
-    def _delivered(self, transfer: _Transfer, delivery: Delivery | LinkLost, now: float) -> None:
+    def _delivered(
+        self, transfer: _Transfer, arrived: ArrivedMission, delivery: Delivery | LinkLost, now: float
+    ) -> None:
         if isinstance(delivery, LinkLost):
             delivery = Delivery(NO_LINK.ack, NO_LINK.text, None)
-        accepted = delivery.ack is MissionResult.ACCEPTED
-        self._post.say(Severity.INFO if accepted else Severity.ERROR, delivery.text)
-        if delivery.number is None:
-            self._post.say(Severity.WARNING, "The mission could not be stored on the Pi")
+        self._tell_writer(transfer.station, arrived.verdict, delivery)
+        if delivery.ack is MissionResult.ACCEPTED:
+            self._tell_others(transfer.station, delivery)
         self._answer(transfer.station, transfer.count, delivery.ack, now)
         self._log_event(
-            "info" if accepted else "warning",
+            "info" if delivery.ack is MissionResult.ACCEPTED else "warning",
             "mission.upload_ended",
             station=str(transfer.station),
             mission=delivery.number,
@@ -347,6 +345,23 @@ class MissionUploads:
             incident=transfer.incident,
         )
         self._end(now)
+
+    def _tell_writer(self, station: Station, verdict: Verdict[Any], delivery: Delivery) -> None:
+        if delivery.ack is not MissionResult.ACCEPTED:
+            self._post.say(Severity.ERROR, delivery.text, station)
+        else:
+            self._post.say(Severity.WARNING if delivery.is_lossy else Severity.INFO, delivery.text, station)
+            for news, line in finding_lines(verdict.findings):
+                if line != delivery.text:
+                    self._post.say(Severity.WARNING if news is News.WARNING else Severity.NOTICE, line, station)
+        if delivery.number is None:
+            self._post.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
+
+    def _tell_others(self, writer: Station, delivery: Delivery) -> None:
+        """Other ground stations hear only what changed on the aircraft."""
+        if delivery.change:
+            severity = Severity.WARNING if delivery.change == "Mission erased" else Severity.INFO
+            self._post.say_to_others(severity, f"{delivery.change}, by {writer.peer}", writer)
 
     def _cancel(self, now: float, why: str) -> None:
         assert self._transfer is not None
@@ -365,7 +380,7 @@ class MissionUploads:
         self._refuse(transfer, refusal, now)
 
     def _refuse(self, transfer: _Transfer, refusal: Refusal, now: float) -> None:
-        self._post.say(Severity.ERROR, refusal.text)
+        self._post.say(Severity.ERROR, refusal.text, transfer.station)
         self._answer(transfer.station, transfer.count, refusal.ack, now)
         self._log_event(
             "warning",

@@ -9,8 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from bridge.model.finding import DROPPED, Finding
+from protocols.mavlink.command_name import command_name
 from protocols.mission_item import MissionItem
-from service.cli.command_name import command_name
 from service.mission_data import Json, mission_items
 
 _CHANGED = "yellow"
@@ -26,7 +26,7 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` tell which items are missing
     in it, and stand below the table with their reasons.
     """
-    reasons = Text("".join(f"\n{finding.full_text()}" for finding in findings))
+    reasons = Text("".join(f"\n{finding.text()}" for finding in findings))
     table = _empty_table(reasons)
     dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
     left = iter(stored)

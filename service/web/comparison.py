@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
 from bridge.model.finding import DROPPED, REJECTED, Finding
+from protocols.mavlink.command_name import command_name
 from protocols.mission_item import MissionItem
-from service.cli.command_name import command_name
 from service.mission_data import Json, mission_items
 
 #: No flight controller holds more; a longer list was refused, and its end tells nothing new.
@@ -30,7 +30,7 @@ def stored_mission(mission: Json) -> Json:
         "outcome": mission["outcome"],
         "detail": mission["detail"],
         "checksum": received["checksum"],
-        "findings": [finding.full_text() for finding in findings[:MAX_ROWS]],
+        "findings": [finding.text() for finding in findings[:MAX_ROWS]],
         "rows": sent_and_stored(sent[:MAX_ROWS], stored, findings),
         "rows_left_out": max(len(sent) - MAX_ROWS, 0),
         "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],

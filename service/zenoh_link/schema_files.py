@@ -7,6 +7,7 @@
 import json
 import types
 from dataclasses import is_dataclass
+from enum import Enum
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from bridge.model import vehicle_groups as groups
@@ -152,6 +153,8 @@ def _of(hint: Any) -> Json:
         return {"anyOf": several}
     if origin is tuple:
         return {"type": "array", "items": _of(arguments[0])}
+    if issubclass(hint, Enum):
+        return {"enum": [each.value for each in hint]}
     return {"type": _TYPES[hint]}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing a mission, row by row of mission-rules.md: "Before the first item" and "While items come in"."""
+"""Writing a mission, row by row of docs/mission-rules.md: "Before the first item" and "While items come in"."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,7 +22,7 @@ from world import Air, GroundStation, World, flash_holding
 from bridge.model.mission_log import Outcome
 from bridge.vehicle.mission_upload import Phase
 from protocols.mavlink.dialect import Message, messages
-from protocols.mission_item import MissionItem, MissionResult
+from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 
 OLD = waypoints(20, seed=77)
@@ -203,8 +203,20 @@ def test_armed_nothing_is_cleared() -> None:
 
 
 def test_home_alone_is_invalid() -> None:
+    """Mission Planner's empty Write; a count of 1 is first answered by asking for the item."""
     world, station = holding()
-    refused(world, station, 1, A.INVALID, "only a home point")
+    assert Upload(station, waypoints(1)).run() is A.INVALID
+    assert "Mission rejected: only a home point, no command" in station.texts()
+    assert_refusal_stands(world, station, A.INVALID)
+    assert world.stored == OLD_RECORDS
+
+
+def test_one_item_of_zeros_clears() -> None:
+    """MAVSDK's clear_mission on a vehicle that says ARDUPILOTMEGA."""
+    world, station = holding()
+    blank = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+    assert Upload(station, [blank]).run() is A.ACCEPTED
+    assert world.stored == ()
 
 
 @pytest.mark.parametrize("capacity", [146, 30])
@@ -214,7 +226,7 @@ def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> Non
     world.wait_ready()
     station = GroundStation(world)
     for count in (capacity + 1, 65535):
-        refused(world, station, count, A.NO_SPACE, f"{capacity} fit")
+        refused(world, station, count, A.NO_SPACE, f"only {capacity} fit")
         station.take()
     assert Upload(station, waypoints(capacity)).run() is A.ACCEPTED
 
@@ -369,7 +381,7 @@ def test_another_flight_controller_is_unsupported() -> None:
 
 def test_a_refusal_is_remembered_for_ten_seconds() -> None:
     world, station = holding()
-    refused(world, station, 1, A.INVALID, "only a home point")
+    refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     world.run(10.5)
     station.take()
     station.send(item_message(0, OLD[0]))
@@ -383,7 +395,7 @@ def test_a_refusal_is_remembered_for_ten_seconds() -> None:
 
 def test_a_new_count_makes_the_refusal_before_forgotten() -> None:
     world, station = holding()
-    refused(world, station, 1, A.INVALID, "only a home point")
+    refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
     station.take()
     station.send(item_message(1, OLD[1]))
@@ -667,7 +679,7 @@ def test_a_list_that_breaks_a_rule_is_refused_at_once_and_the_refusal_stands() -
     upload = Upload(station, items)
     assert upload.run() is A.INVALID
     assert upload.requested == list(range(13))
-    assert any("LAND must be the last item" in text for text in station.texts())
+    assert any("LAND must be last" in text for text in station.texts())
     assert_refusal_stands(world, station, A.INVALID)
     assert world.stored == OLD_RECORDS
     assert world.store.outcomes() == [Outcome.REJECTED]
@@ -679,7 +691,51 @@ def test_a_list_of_which_nothing_is_left_clears_and_says_so() -> None:
     items[1] = replace(items[1], command=178)
     assert Upload(station, items).run() is A.ACCEPTED
     assert world.stored == ()
-    assert any("list erased" in text for text in station.texts())
+    assert any("erased" in text for text in station.texts())
+
+
+def test_the_summary_comes_first_and_goes_to_the_writer_alone() -> None:
+    world, station = holding()
+    other = GroundStation(world, "other", sysid=254)
+    other.send(ack_message(A.ACCEPTED))
+    items = waypoints(40)
+    for seq in range(5, 25):
+        items[seq] = replace(items[seq], command=178)
+    items[30] = replace(items[30], frame=Frame.GLOBAL)
+    assert Upload(station, items).run() is A.ACCEPTED
+    world.run(0.1)
+    texts = [(text.severity, text.text) for text in station.said("STATUSTEXT") if "naze" not in text.text]
+    assert texts == [
+        (4, "20 of 40 stored: 20 dropped, 1 heights relative"),
+        (4, "20 items: DO_CHANGE_SPEED dropped, not supported"),
+        (4, "WP 30: Alt flown above home, not above sea level"),
+    ]
+    assert [text.text for text in other.said("STATUSTEXT")] == ["New mission, 20 items, by udp gcs"]
+
+
+def test_a_reason_is_said_on_every_attempt_but_once_an_attempt() -> None:
+    world, station = holding()
+    other = GroundStation(world, "other", sysid=254)
+    for _ in range(3):
+        station.take()
+        for _ in range(4):
+            station.send(count_message(147))
+            world.run(0.7)
+        assert station.texts() == ["Mission rejected: 147 items, but only 146 fit"]
+        world.run(1)
+    assert other.texts() == []
+
+
+def test_others_hear_that_the_list_was_erased() -> None:
+    world, station = holding()
+    other = GroundStation(world, "other", sysid=254)
+    other.send(ack_message(A.ACCEPTED))
+    station.send(clear_message())
+    world.run(1)
+    assert [(text.severity, text.text) for text in station.said("STATUSTEXT")] == [
+        (4, "Mission on the flight controller cleared")
+    ]
+    assert [(text.severity, text.text) for text in other.said("STATUSTEXT")] == [(4, "Mission erased, by udp gcs")]
 
 
 @pytest.mark.parametrize("lose", [World.unplug, World.power_off])

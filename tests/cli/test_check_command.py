@@ -87,7 +87,9 @@ def test_json_has_one_object_a_file_with_the_promised_keys(files: dict[str, Path
     assert "no such file" in missing["error"]
     item_keys = ["seq", "command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m"]
     assert {tuple(item) for item in accepted["items"]} == {tuple(item_keys)}
-    assert {tuple(finding) for finding in accepted["findings"]} == {("seq", "field", "was", "becomes", "why")}
+    assert {tuple(finding) for finding in accepted["findings"]} == {
+        ("seq", "field", "was", "becomes", "why", "command", "news")
+    }
     assert {len(record) for record in accepted["records"]} == {32}
     assert len(accepted["records"]) == len(accepted["items"])
 
@@ -118,13 +120,13 @@ def test_a_person_sees_sent_beside_stored_and_why() -> None:
     output = run(FIELD).stdout
     for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
         assert words in output
-    assert "WP 1: height 20 -> 15 m (take-off 2..15 m)" in output
+    assert "WP 1: Alt changed from 20 to 15 m (take-off 2..15)" in output
     assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: 7" in output
 
 
 def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:
-    assert "REJECTED: MAV_MISSION_INVALID, WP 1: rejected, LAND must not be alone" in run(files["rejected"]).stdout
-    assert "CLEARED: MAV_MISSION_ACCEPTED, Mission: cleared" in run(files["cleared"]).stdout
+    assert "REJECTED: MAV_MISSION_INVALID, Rejected, WP 1: LAND cannot be alone" in run(files["rejected"]).stdout
+    assert "CLEARED: MAV_MISSION_ACCEPTED, Mission erased" in run(files["cleared"]).stdout
 
 
 def test_an_unreadable_file_is_one_sentence_on_stderr(files: dict[str, Path]) -> None:

@@ -86,7 +86,7 @@ def test_a_mission_there_and_back(daemon: Daemon, tmp_path: Path) -> None:
 def test_a_refusal_is_told_and_ends_with_1(daemon: Daemon, tmp_path: Path) -> None:
     refused = ask(daemon, "push", write_plan(tmp_path / "plan", [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]))
     assert refused.returncode == 1
-    assert refused.stdout.splitlines()[-1] == "INVALID: WP 1: rejected, LAND must be the last item"
+    assert refused.stdout.splitlines()[-1] == "INVALID: Rejected, WP 1: LAND must be last"
 
 
 def test_an_unreadable_file_ends_with_2(daemon: Daemon, tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def test_refusals_come_with_a_reason_and_keep_the_list(bench: Bench, tmp_path: P
         mavproxy.load([HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
         assert "LAND must be the last item" in mavproxy.wait_for("TYPE_MISSION: INVALID")
         mavproxy.load(plain_plan(147))
-        assert "147 items, 146 fit" in mavproxy.wait_for("TYPE_MISSION: NO_SPACE")
+        assert "147 items, but only 146 fit" in mavproxy.wait_for("TYPE_MISSION: NO_SPACE")
         bench.board.set("armed 1")
         mavproxy.wait_for("ARMED")
         mavproxy.load(plain_plan(12, start=30))

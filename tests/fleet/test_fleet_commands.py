@@ -110,7 +110,7 @@ def test_a_list_against_the_rules(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
     pushed = fleet.pushed(file, "--all", code=1)
     assert {name: each["error"] for name, each in pushed.items()} == dict.fromkeys(
-        NAMES, "WP 1: rejected, LAND must be the last item"
+        NAMES, "Rejected, WP 1: LAND must be last"
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules once more, written from mission-rules.md alone and as differently as possible: no table, no records type.
+"""The rules once more, written from docs/mission-rules.md and as differently as possible: no table, no records type.
 
 What comes first of several faults is not the document's business, so a rejection is the set of codes that would do.
 """
@@ -20,7 +20,10 @@ def expected(
     if len(items) == 0:
         return []
     if len(items) == 1:
-        return {INVALID}
+        one = items[0]
+        zeros = all(value in (0, None) or value != value for value in (one.p1, one.p2, one.p3, one.p4, one.alt_m))
+        blank = zeros and (one.lat_e7 in (0, None) or one.lon_e7 in (0, None))
+        return [] if one.command == 16 and one.frame in (3, 6) and blank else {INVALID}
     if len(items) > capacity:
         return {NO_SPACE}
     faults = set().union(*(faults_as_received(items, n, fallback) for n in range(len(items))))
@@ -48,7 +51,10 @@ def faults_as_received(items: Sequence[MissionItem], n: int, fallback: tuple[int
     it, last = items[n], len(items) - 1
     faults = set()
     located = it.command in (16, 17, 18, 19, 80, 195, 201)
-    if it.frame not in (0, 3, 5, 6, 10, 11) and (it.frame != 2 or located):
+    used = located or it.command in (20, 21, 22)
+    lost = located and n > 0 and (it.lat_e7 in (0, None) or it.lon_e7 in (0, None))
+    lost = lost or (it.command in (16, 17, 18, 19, 22) and n > 0 and not math.isfinite(it.alt_m))
+    if used and not lost and it.frame not in (0, 3, 5, 6, 10, 11) and (it.frame != 2 or located):
         faults.add(INVALID_FRAME)
     if (n == 0 and it.command != 16) or (it.command in (17, 21) and n < last) or (it.command == 22 and n != 1):
         faults.add(INVALID)
@@ -79,9 +85,9 @@ def record(
         return None
     if it.command in (16, 17, 18, 19, 80, 195, 201) and (lat == 0 or lon == 0):
         return None
-    if it.command in (16, 17, 18, 19, 20, 22) and not math.isfinite(it.alt_m):
+    if it.command in (16, 17, 18, 19, 22) and not math.isfinite(it.alt_m):
         return None
-    height = sorted((-32768, whole(it.alt_m), 32767))[1]
+    height = sorted((-32767, whole(it.alt_m), 32767))[1]
     height = 2 if height == 0 else height
     smallest = 0
     while smallest * 100 < radius_cm and smallest < 255:

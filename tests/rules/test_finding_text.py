@@ -2,53 +2,128 @@
 """The words that a pilot reads."""
 
 import math
+from dataclasses import replace
 
 import pytest
-from rule_items import LAND, ROI, SET_ROI, SPEED, TAKEOFF, TIME, WAYPOINT, item, mission
+from rule_items import (
+    HOME,
+    LAND,
+    ROI,
+    ROI_LOCATION,
+    RTL,
+    SET_ROI,
+    SPEED,
+    TAKEOFF,
+    TIME,
+    UNLIM,
+    WAYPOINT,
+    item,
+    mission,
+)
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
-from bridge.model.finding import DROPPED, Finding
+from bridge.missions.mission_texts import finding_lines, summary
+from bridge.model.finding import DROPPED, REJECTED, Finding, News
 
 
 @pytest.mark.parametrize(
     ("finding", "text"),
     [
-        (Finding(3, "alt_m", 0.0, 2, "0 is no flying height"), "WP 3: height 0 -> 2 m (0 is no flying height)"),
-        (Finding(3, "p2", None, 2, "hit radius 2..255 m"), "WP 3: p2 none -> 2 (hit radius 2..255 m)"),
-        (Finding(0, "p1", 7.0, 1, "brake"), "Home: p1 7 -> 1 (brake)"),
-        (Finding(12, "lat_e7", 453838000, 0, "not used by LAND"), "WP 12: lat 45.3838000 -> 0 (not used by LAND)"),
-        (Finding(12, "p1", 1.5, 1, "x" * 29), f"WP 12: p1 1.5 -> 1 ({'x' * 29})"),  # 50 characters
-        (Finding(12, "p1", 1.5, 1, "x" * 30), "WP 12: p1 1.5 -> 1"),
+        (
+            Finding(3, "alt_m", 0.0, 2, "0 not allowed", WAYPOINT, News.WARNING),
+            "WP 3: Alt raised from 0 to 2 m (0 not allowed)",
+        ),
+        (Finding(3, "p2", None, 2, "2..255", WAYPOINT), "WP 3: Hit Rad set to 2 m (2..255)"),
+        (Finding(3, "p2", 3.25, 3, "whole", WAYPOINT), "WP 3: Hit Rad changed from 3.25 to 3 m (whole)"),
+        (Finding(0, "p1", 7.0, 1, "1 = brake", WAYPOINT), "Home: Delay changed from 7 to 1 (1 = brake)"),
+        (Finding(4, "p1", 300.0, 255, "seconds 1..255", TIME), "WP 4: Time s changed from 300 to 255 (seconds 1..255)"),
+        (Finding(12, "lat_e7", 453838000, 0, "not used", LAND), "WP 12: Lat changed from 45.3838000 to 0 (not used)"),
+        (Finding(12, "p1", 1.5, 0, "not used", LAND), "WP 12: param1 changed from 1.5 to 0 (not used)"),
+        (Finding(4, "command", 178, DROPPED, "not supported", SPEED), "WP 4: DO_CHANGE_SPEED dropped, not supported"),
+        (
+            Finding(None, "count", 147, "rejected", "147 items, but only 146 fit"),
+            "Mission rejected: 147 items, but only 146 fit",
+        ),
+        (Finding(1, "p1", math.inf, 0, "not used", RTL), "WP 1: param1 changed from inf to 0 (not used)"),
+        # As an older release stored it.
         (
             Finding(4, "command", 178, DROPPED, "command 178 is not supported"),
-            "WP 4: dropped, command 178 is not supported",
+            "WP 4: item dropped, command 178 is not supported",
         ),
-        (Finding(None, "count", 147, "rejected", "147 items, 146 fit"), "Mission: rejected, 147 items, 146 fit"),
-        (Finding(1, "p1", math.inf, 0, "not used"), "WP 1: p1 inf -> 0 (not used)"),
     ],
 )
 def test_text(finding: Finding, text: str) -> None:
     assert finding.text() == text
 
 
-def test_every_reason_that_the_rules_give_fits_a_statustext() -> None:
-    """With three-digit item numbers, and the longest coordinates and heights."""
-    far = {"lat_e7": -899999999, "lon_e7": -1799999999}
+def test_every_warning_and_rejection_fits_a_statustext() -> None:
+    """With three-digit item numbers: Mission Planner's HUD shows the last piece of a longer one."""
     before = [item(WAYPOINT)] * 98
     texts = []
     for tail in (
-        [item(WAYPOINT, p1=5, p2=300, p3=1, p4=1, alt_m=-40000, frame=10), item(LAND, alt_m=-40000, **far)],
-        [item(TIME, p1=300, alt_m=0.5), item(SPEED), item(WAYPOINT, lat_e7=0), item(WAYPOINT, alt_m=math.nan)],
+        [item(WAYPOINT, alt_m=0.5, frame=10), item(WAYPOINT, alt_m=0, frame=0), item(RTL, alt_m=math.nan)],
+        [item(SPEED), item(ROI_LOCATION, lat_e7=0), item(WAYPOINT, alt_m=math.nan), item(WAYPOINT)],
         [item(WAYPOINT, frame=255)],
         [item(WAYPOINT, lat_e7=900000001)],
         [item(WAYPOINT, lon_e7=1800000001)],
-        [item(LAND), item(WAYPOINT)],
+        [item(UNLIM), item(WAYPOINT)],
         [item(TAKEOFF), item(WAYPOINT)],
         [item(WAYPOINT), item(SET_ROI)],
         [item(ROI), item(SPEED)],
     ):
         verdict = check_list(mission(*before, *tail), HarakiriRules())
-        texts += [finding.text() for finding in verdict.findings]
+        texts += [each.text() for each in verdict.findings if each.news is News.WARNING or each.becomes == REJECTED]
+    for command in (RTL, LAND, TAKEOFF):
+        texts += [each.text() for each in check_list(mission(item(command)), HarakiriRules()).findings]
     assert len(texts) > 15
     assert [text for text in texts if len(text) > 50] == []
+
+
+def test_a_value_never_becomes_itself() -> None:
+    """Neither a number with noise in its last digit nor a coordinate that was there."""
+    verdict = check_list(mission(item(WAYPOINT, p2=3.0000002384185791, p3=0.5)), HarakiriRules())
+    assert [each.text() for each in verdict.findings] == [
+        "WP 1: Hit Rad changed from 3.00000024 to 3 m (whole numbers only)",
+        "WP 1: param3 changed from 0.5 to 0 (not used)",
+    ]
+    home = replace(HOME, lon_e7=0)
+    verdict = check_list([home, item(WAYPOINT)], HarakiriRules(), (home.lat_e7 or 0, 5))
+    assert [each.text() for each in verdict.findings] == ["Home: no Lat/Long sent, GPS position used"]
+
+
+def test_equal_findings_are_one_line_and_warnings_come_first() -> None:
+    items = [item(WAYPOINT, p1=3)] * 4 + [item(SPEED)] * 3 + [item(WAYPOINT, frame=0), item(WAYPOINT, p2=0)]
+    verdict = check_list(mission(*items), HarakiriRules())
+    assert summary(10, verdict) == "7 of 10 stored: 3 dropped, 1 heights relative"
+    assert finding_lines(verdict.findings) == [
+        (News.WARNING, "3 items: DO_CHANGE_SPEED dropped, not supported"),
+        (News.WARNING, "WP 8: Alt flown above home, not above sea level"),
+        (News.NOTICE, "4 items: Delay changed from 3 to 1 (0 = fly through, 1 = brake; to hold use LOITER_TIME)"),
+    ]
+
+
+def test_a_filled_in_default_is_no_news() -> None:
+    """Mission Planner sends no radius for home, and 0 where its field is empty."""
+    verdict = check_list([replace(HOME, p2=0.0), item(WAYPOINT, p2=0.0), item(TIME, p2=math.nan)], HarakiriRules())
+    assert {each.news for each in verdict.findings} == {News.NONE}
+    assert summary(3, verdict) is None
+    assert finding_lines(verdict.findings) == []
+
+
+def test_no_more_than_ten_lines() -> None:
+    verdict = check_list(mission(*(item(WAYPOINT, p1=number) for number in range(2, 40))), HarakiriRules())
+    lines = finding_lines(verdict.findings)
+    assert len(lines) == 11
+    assert lines[-1][1] == "and 28 more: see the list on the status page or naze-bridge missions show"
+
+
+def test_a_list_of_which_nothing_is_left_is_a_warning() -> None:
+    assert summary(2, check_list(mission(item(SPEED)), HarakiriRules())) == "Mission erased: no command left"
+
+
+def test_a_list_without_a_home_says_what_became_of_its_first_item() -> None:
+    """MAVSDK's `mission` plugin."""
+    verdict = check_list([item(WAYPOINT, frame=6), item(WAYPOINT)], HarakiriRules())
+    assert [each.text() for each in verdict.findings] == ["Home: first item became home, not flown to"]
+    assert summary(2, verdict) == "2 of 2 stored: look at home"

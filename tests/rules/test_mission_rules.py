@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every row of mission-rules.md, one by one."""
+"""Every row of docs/mission-rules.md, one by one."""
 
 import math
 from dataclasses import replace
@@ -29,7 +29,7 @@ from rule_items import (
 
 from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
 from bridge.missions.list_check import check_count, check_list
-from bridge.model.finding import CLEARED, DROPPED, REJECTED
+from bridge.model.finding import CLEARED, DROPPED, REJECTED, News
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.wp_record import WpCommand, WpRecord
@@ -105,8 +105,8 @@ VALUES = [
         for command in (WAYPOINT, UNLIM, TURNS, TIME, RTL)
         for sent, becomes in [(1, 1), (0, 2), (0.99, 2), (-0.99, 2), (-1, -1), (-50.7, -50), (18.5, 18)]
     ],
-    *[(WAYPOINT, "alt_m", sent, becomes) for sent, becomes in [(32767, 32767), (32768, 32767), (-32768, -32768)]],
-    *[(WAYPOINT, "alt_m", sent, becomes) for sent, becomes in [(-40000, -32768), (1e30, 32767), (-1e30, -32768)]],
+    *[(WAYPOINT, "alt_m", sent, becomes) for sent, becomes in [(32767, 32767), (32768, 32767), (-32768, -32767)]],
+    *[(WAYPOINT, "alt_m", sent, becomes) for sent, becomes in [(-40000, -32767), (1e30, 32767), (-1e30, -32767)]],
     *[(TAKEOFF, "alt_m", sent, becomes) for sent, becomes in [(2, 2), (15, 15), (15.9, 15), (16, 15), (255, 15)]],
     *[(TAKEOFF, "alt_m", sent, becomes) for sent, becomes in [(1.9, 2), (0, 2), (-5, 2), (1e30, 15)]],
     *[(command, "alt_m", sent, 0) for command in (LAND, ROI, ROI_LOCATION, SET_ROI) for sent in (0, 5, -5, NAN, INF)],
@@ -222,7 +222,14 @@ def test_a_last_loiter_without_coordinates_is_dropped() -> None:
 
 
 @pytest.mark.parametrize("height", [NAN, INF, -INF])
-@pytest.mark.parametrize("command", [WAYPOINT, TURNS, TIME, RTL])
+def test_a_return_without_a_finite_height_gets_the_least_one(height: float) -> None:
+    verdict = verdict_on(item(WAYPOINT), item(RTL, alt_m=height))
+    assert (verdict.items[2].command, verdict.items[2].alt_m) == (RTL, 2)
+    assert [(f.field, f.becomes, f.news) for f in verdict.findings] == [("alt_m", 2, News.WARNING)]
+
+
+@pytest.mark.parametrize("height", [NAN, INF, -INF])
+@pytest.mark.parametrize("command", [WAYPOINT, TURNS, TIME])
 def test_without_a_finite_height_an_item_is_dropped(command: int, height: float) -> None:
     verdict = verdict_on(item(WAYPOINT), item(command, alt_m=height), item(WAYPOINT))
     assert len(verdict.items) == 3
@@ -269,7 +276,15 @@ def test_the_mission_frame_rejects_the_list_where_a_position_is_used(command: in
 
 
 @pytest.mark.parametrize("frame", [1, 4, 7, 8, 9, 12, 20, 255])
-@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, RTL, LAND, TAKEOFF, ROI, SET_ROI, SPEED])
+@pytest.mark.parametrize("faulty", [item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0), item(TIME, alt_m=NAN)])
+def test_the_frame_of_an_item_that_is_dropped_rejects_nothing(faulty: MissionItem, frame: int) -> None:
+    verdict = verdict_on(replace(faulty, frame=frame), item(WAYPOINT))
+    assert verdict.result is Result.ACCEPTED
+    assert len(verdict.items) == 2
+
+
+@pytest.mark.parametrize("frame", [1, 4, 7, 8, 9, 12, 20, 255])
+@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, RTL, LAND, TAKEOFF, ROI, SET_ROI])
 def test_every_other_frame_rejects_the_list(command: int, frame: int) -> None:
     items, seq = placed(item(command, frame=frame))
     assert_rejected(check_list(items, PROFILE), MissionResult.UNSUPPORTED_FRAME, seq, "frame")
@@ -362,7 +377,7 @@ def test_no_items_clear_the_list() -> None:
     assert (verdict.result, verdict.ack, verdict.records) == (Result.CLEARED, MissionResult.ACCEPTED, ())
 
 
-@pytest.mark.parametrize("dropped", [item(SPEED), item(WAYPOINT, lon_e7=0), item(RTL, alt_m=NAN), item(ROI_NONE)])
+@pytest.mark.parametrize("dropped", [item(SPEED), item(WAYPOINT, lon_e7=0), item(TIME, alt_m=NAN), item(ROI_NONE)])
 def test_a_list_of_which_only_home_is_kept_clears_the_list(dropped: MissionItem) -> None:
     for items in (mission(dropped), mission(dropped, item(SPEED), item(SPEED))):
         verdict = check_list(items, PROFILE)
@@ -374,8 +389,14 @@ def test_a_list_of_which_only_home_is_kept_clears_the_list(dropped: MissionItem)
 # ---------------------------------------------------------------- count
 
 
-def test_a_home_alone_is_invalid() -> None:
-    assert_rejected(check_list([HOME], PROFILE), MissionResult.INVALID, None, "count")
+@pytest.mark.parametrize("home", [HOME, replace(HOME, frame=3), replace(HOME, lat_e7=0, lon_e7=0, alt_m=0.0, p2=0.0)])
+def test_a_home_alone_is_invalid(home: MissionItem) -> None:
+    assert_rejected(check_list([home], PROFILE), MissionResult.INVALID, None, "count")
+
+
+def test_an_item_of_zeros_alone_clears_as_mavsdk_wants_it() -> None:
+    blank = MissionItem(0, WAYPOINT, 3, 0.0, 0.0, 0.0, NAN, 0, None, 0.0)
+    assert check_list([blank], PROFILE).result is Result.CLEARED
 
 
 @pytest.mark.parametrize("capacity", [2, 120, 146])
@@ -421,7 +442,7 @@ def test_homes_own_coordinates_come_first() -> None:
     assert (verdict.items[0].lat_e7, verdict.items[0].lon_e7) == (LAT, LON)
 
 
-@pytest.mark.parametrize("frame", [0, 3, 5, 6, 10, 11])
+@pytest.mark.parametrize("frame", [0, 5, 10, 11])
 def test_homes_height_is_the_number_that_was_sent_whatever_its_datum(frame: int) -> None:
     verdict = check_list([replace(HOME, frame=frame, alt_m=584.0), item(WAYPOINT)], PROFILE)
     assert (verdict.items[0].frame, verdict.items[0].alt_m, verdict.findings) == (0, 584.0, ())

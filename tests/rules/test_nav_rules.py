@@ -310,8 +310,7 @@ profiles = st.sampled_from([INAV, MULTIWII])
 def test_nothing_raises_and_nothing_dangerous_is_kept(sent: list[MissionItem], rules: NavRules) -> None:
     verdict = check_list([HOME, *sent], rules)
     event(verdict.result.name)
-    assert all(len(finding.text()) <= 50 for finding in verdict.findings)
-    assert all("\n" not in finding.full_text() for finding in verdict.findings)
+    assert all("\n" not in finding.text() for finding in verdict.findings)
     if verdict.result is not Result.ACCEPTED:
         assert verdict.records == ()
         return

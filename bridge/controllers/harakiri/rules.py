@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Harakiri can hold, command by command: the table of mission-rules.md ("Each item")."""
+"""What Harakiri can hold, command by command: the table of docs/mission-rules.md."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from bridge.missions.value_range import UNUSED, Range
 from protocols.mission_item import Command
 from protocols.wp_record import WpCommand
 
@@ -29,21 +30,6 @@ TAKEOFF_MAX_M = 15
 _MAX_RADIUS_M = 255
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
-    """The whole numbers that a field can hold; `instead_of_zero` is stored where a 0 would mean nothing."""
-
-    low: int
-    high: int
-    why: str
-    instead_of_zero: int = 0
-
-    def fit(self, value: float) -> int:
-        """Truncate toward zero, then clamp; what is not a finite number counts as 0."""
-        whole = math.trunc(value) if math.isfinite(value) else 0
-        return min(max(whole, self.low), self.high) or self.instead_of_zero
-
-
 class Place(Enum):
     """Where a command may stand, in the list as received and in what is kept of it."""
 
@@ -53,13 +39,12 @@ class Place(Enum):
     NOT_LAST = auto()
 
 
-UNUSED = Range(0, 0, "not used")
-BRAKE = Range(0, 1, "0 fast corner, 1 brake")
-TURNS = Range(-127, 127, "turns -127..127, not 0", instead_of_zero=1)
+BRAKE = Range(0, 1, "0 = fly through, 1 = brake; to hold use LOITER_TIME")
+TURNS = Range(-127, 127, "turns -127..127", instead_of_zero=1)
 SECONDS = Range(1, 255, "seconds 1..255")
 NOSE_ON_ROI = Range(0, 1, "1 = nose on the ROI")
 NO_ROI_KNOWN = Range(0, 0, "no ROI is known")
-CRUISE = Range(-32768, 32767, "0 is no flying height", instead_of_zero=2)
+CRUISE = Range(-32767, 32767, "-32767..32767", instead_of_zero=2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +70,9 @@ class CommandRule:
         return "ROI" if self.record is WpCommand.SETROI else self.record.name
 
     @property
-    def uses_height(self) -> bool:
-        """Tell whether the height that was sent matters."""
-        return self.height is not UNUSED
+    def needs_height(self) -> bool:
+        """Whether the item is faulty without a finite height; RETURN_TO_LAUNCH gets the least one."""
+        return self.height is not UNUSED and self.record is not WpCommand.RETURN_TO_LAUNCH
 
 
 def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, CommandRule]:
@@ -96,8 +81,8 @@ def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, Command
     gps_wp_radius is rounded up to whole metres, so that no stored radius is smaller than it.
     """
     least = min(math.ceil(wp_radius_cm / 100), _MAX_RADIUS_M)
-    radius = Range(least, _MAX_RADIUS_M, f"hit radius {least}..{_MAX_RADIUS_M} m")
-    climb = Range(2, takeoff_max_m, f"take-off 2..{takeoff_max_m} m")
+    radius = Range(least, _MAX_RADIUS_M, f"{least}..{_MAX_RADIUS_M}")
+    climb = Range(2, takeoff_max_m, f"take-off 2..{takeoff_max_m}")
     # fmt: off
     rows = (
         #           record                      p1       p2      p4           position height  place           alone

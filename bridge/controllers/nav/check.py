@@ -15,11 +15,9 @@ from bridge.controllers.nav.rules import (
     NAV_RULES,
     REPEATS,
     ROI_COMMANDS,
-    UNUSED,
     Height,
     NavProfile,
     NavRule,
-    WholeRange,
 )
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
@@ -30,10 +28,11 @@ from bridge.missions.list_check import (
     refuse_frame,
     refuse_position,
 )
-from bridge.model.finding import DROPPED, Rejection, reject
+from bridge.missions.value_range import UNUSED
+from bridge.model.finding import DROPPED, Rejection, reject, reject_list
 from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single
-from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord
 
 #: So high a single-precision number still holds a centimetre.
@@ -82,27 +81,27 @@ class NavCheck(ListCheck):
 
     def _judge(self, item: MissionItem) -> Rejection | None:
         rule = NAV_RULES.get(item.command)
-        if rejection := refuse_frame(item, needs_position=rule is not None and rule.position):
-            return rejection
         self._jumps.places.append(len(self._records))
         if item.seq == 0:
             return self._take_home(item)
         if rule is not None:
             rejection = self._take(item, rule)
         elif special := self._special.get(item.command):
-            rejection = special(item)
+            rejection = refuse_frame(item, needs_position=False) or special(item)
         else:
             takes_off = item.command == Command.NAV_TAKEOFF
-            why = "it does not take off by itself" if takes_off else f"command {item.command} is not supported"
+            why = "it does not take off by itself" if takes_off else "not supported"
             rejection = self._drop(item, "command", item.command, why)
         if rejection is None and len(self._records) > self._profile.capacity:
-            why = f"more than the {self._profile.capacity} that fit"
-            return reject(MissionResult.NO_SPACE, item.seq, "count", self._count, why)
+            return reject(MissionResult.NO_SPACE, item, "command", f"more than the {self._profile.capacity} that fit")
         return rejection
 
     def _take_home(self, home: MissionItem) -> Rejection | None:
         if home.command != Command.NAV_WAYPOINT:
-            return reject(MissionResult.INVALID, 0, "command", home.command, "must be a WAYPOINT")
+            return reject(MissionResult.INVALID, home, "command", "must be a WAYPOINT")
+        if rejection := refuse_frame(home, needs_position=True):
+            return rejection
+        self._note_home(home)
         if home.lat_e7 and home.lon_e7 and refuse_position(home) is None:
             alt_m = home.alt_m if math.isfinite(home.alt_m) else 0.0
             self._home = home_item((home.lat_e7, home.lon_e7), alt_m)
@@ -113,19 +112,23 @@ class NavCheck(ListCheck):
         if rule.position and (rejection := refuse_position(item)):
             return rejection
         if not math.isfinite(item.alt_m):
-            return self._drop(item, "alt_m", given(item.alt_m), "height is not a number")
+            if rule.height is Height.FLOWN and item.command not in ROI_COMMANDS:
+                return self._drop(item, "alt_m", given(item.alt_m), "Alt is not a number")
+            item = replace(item, alt_m=0.0)
         if item.command == Command.NAV_LAND:
             if missing_coordinate(item) and self._records and self._records[-1].action == NavAction.RTH:
                 self._records[-1] = replace(self._records[-1], p1=LANDS.high)
                 return self._drop(item, "command", item.command, "the RTL before it lands now")
             item = placed_landing(item, self._records, self._note)
         if rule.position and (missing := missing_coordinate(item)):
-            return self._drop(item, *missing, "it has no coordinates")
-        p1 = self._fit(item, "p1", item.p1, rule.p1)
+            return self._drop(item, *missing, "no Lat/Long")
+        if rejection := refuse_frame(item, needs_position=rule.position):
+            return rejection
+        p1 = self._fit(item, "p1", rule.p1)
         for name in ("p2", "p3", "p4"):
-            self._fit(item, name, getattr(item, name), UNUSED)
+            self._fit(item, name, UNUSED)
         if not rule.position:
-            self._no_position(item, rule.name)
+            self._no_position(item)
         self._keep(item, self._record(item, rule, p1))
         return None
 
@@ -159,24 +162,23 @@ class NavCheck(ListCheck):
             return self._drop(item, "p4", item.p4, "it turns to no relative heading")
         if not math.isfinite(item.p1):
             return self._drop(item, "p1", given(item.p1), "no heading is given")
-        heading = self._fit(item, "p1", item.p1, HEADING)
-        self._unused(item, "CONDITION_YAW", "p2", "p3", "p4")
+        heading = self._fit(item, "p1", HEADING)
+        self._unused(item, "p2", "p3", "p4")
         self._keep(item, NavRecord(NavAction.SET_HEAD, p1=heading))
         return None
 
     def _take_roi_none(self, item: MissionItem) -> Rejection | None:
         """DO_SET_ROI_NONE becomes SET_HEAD -1, which ends a region of interest and a heading alike."""
-        self._unused(item, "ROI_NONE", "p1", "p2", "p3", "p4")
+        self._unused(item, "p1", "p2", "p3", "p4")
         self._keep(item, NavRecord(NavAction.SET_HEAD, p1=-1))
         return None
 
     def _take_jump(self, item: MissionItem) -> Rejection | None:
         """Keep a place for the record: where it goes is known when all items are there."""
         if not (math.isfinite(item.p1) and item.p1 == math.trunc(item.p1) and 1 <= item.p1 < self._count):
-            why = "there is no such item to jump to"
-            return reject(MissionResult.INVALID_PARAM1, item.seq, "p1", given(item.p1), why)
-        repeats = self._fit(item, "p2", item.p2, REPEATS)
-        self._unused(item, "JUMP", "p3", "p4")
+            return reject(MissionResult.INVALID_PARAM1, item, "p1", "there is no such item to jump to")
+        repeats = self._fit(item, "p2", REPEATS)
+        self._unused(item, "p3", "p4")
         self._jumps.wanted.append((len(self._records), item))
         self._keep(item, NavRecord(NavAction.JUMP, p2=repeats))
         return None
@@ -188,12 +190,12 @@ class NavCheck(ListCheck):
         if fault := self._speed.fault(item):
             return self._drop(item, *fault)
         self._speed.change(item, self._note)
-        self._unused(item, "CHANGE_SPEED", *(() if item.p3 in _NO_THROTTLE else ("p3",)), "p4")
+        self._unused(item, *(() if item.p3 in _NO_THROTTLE else ("p3",)), "p4")
         return None
 
     def _refuse_kept_list(self) -> Rejection | None:
         if not any(record.action in LEGS for record in self._records):
-            return reject(MissionResult.INVALID, None, "count", self._count, "no waypoint is left to fly to")
+            return reject_list(MissionResult.INVALID, self._count, "no waypoint is left to fly to")
         if rejection := self._jumps.aim(self._records, self._note):
             return rejection
         if lost := self._speed.waiting:
@@ -220,7 +222,7 @@ class NavCheck(ListCheck):
     def _height(self, item: MissionItem, rule: NavRule) -> tuple[int, int]:
         """Return centimetres, and the bit that says what they count from."""
         if rule.height is Height.RTH and not self._profile.rth_height:
-            self._fit(item, "alt_m", item.alt_m, UNUSED)
+            self._fit(item, "alt_m", UNUSED)
             return 0, 0
         alt_cm = _centimetres(item.alt_m)
         if not is_single(item.alt_m, alt_cm / 100):
@@ -229,26 +231,14 @@ class NavCheck(ListCheck):
         if rule.height is Height.RTH or (above_sea and self._profile.sea_level):
             return alt_cm, int(above_sea and self._profile.sea_level and rule.height is not Height.RTH)
         if above_sea or item.frame in TERRAIN_FRAMES:
-            self._note(item, "frame", item.frame, int(Frame.GLOBAL_RELATIVE_ALT), "height taken as relative")
+            self._now_relative(item)
         return alt_cm, 0
 
-    def _fit(self, item: MissionItem, name: str, value: float, allowed: WholeRange) -> int:
-        stored = allowed.fit(value)
-        if stored != (0 if math.isnan(value) else value):
-            truncated = math.isfinite(value) and stored == math.trunc(value)
-            self._note(item, name, given(value), stored, "whole numbers only" if truncated else allowed.why)
-        return stored
-
-    def _unused(self, item: MissionItem, command: str, *names: str) -> None:
+    def _unused(self, item: MissionItem, *names: str) -> None:
         """Tell of values that mean nothing here, in `names` and where a place would be."""
         for name in (*names, "alt_m"):
-            self._fit(item, name, getattr(item, name), UNUSED)
-        self._no_position(item, command)
-
-    def _no_position(self, item: MissionItem, command: str) -> None:
-        for name, value in (("lat_e7", item.lat_e7), ("lon_e7", item.lon_e7)):
-            if value:
-                self._note(item, name, value, 0, f"not used by {command}")
+            self._fit(item, name, UNUSED)
+        self._no_position(item)
 
 
 def _centimetres(height_m: float) -> int:

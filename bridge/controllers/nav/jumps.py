@@ -31,7 +31,7 @@ class Jumps:
             target = self.places[wanted]
             fault = self._fault(place, wanted, records)
             if fault is not None:
-                return reject(MissionResult.INVALID_PARAM1, item.seq, "p1", item.p1, fault)
+                return reject(MissionResult.INVALID_PARAM1, item, "p1", fault)
             if wanted in self.dropped:
                 goes_to = next(seq for seq in range(wanted, len(self.places)) if seq not in self.dropped)
                 note(item, "p1", wanted, goes_to, f"item {wanted} is dropped")

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What INAV and MultiWii NAV can hold, command by command: the table of docs/inav.md."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from bridge.missions.value_range import UNUSED, Range
 from protocols.mission_item import Command
 from protocols.msp.nav import NavAction
 
@@ -79,25 +79,10 @@ class Height(Enum):
     APPROACH = auto()
 
 
-@dataclass(frozen=True, slots=True)
-class WholeRange:
-    """The whole numbers that a parameter can hold."""
-
-    low: int
-    high: int
-    why: str
-
-    def fit(self, value: float) -> int:
-        """Truncate toward zero, then clamp; what is not a finite number counts as 0."""
-        whole = math.trunc(value) if math.isfinite(value) else 0
-        return min(max(whole, self.low), self.high)
-
-
-UNUSED = WholeRange(0, 0, "not used")
-HOLD = WholeRange(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
-LANDS = WholeRange(0, 1, "1 = land at home")
-HEADING = WholeRange(0, 359, "degrees 0..359")
-REPEATS = WholeRange(-1, 32767, "repeats -1..32767")
+HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
+LANDS = Range(0, 1, "1 = land at home")
+HEADING = Range(0, 359, "degrees 0..359")
+REPEATS = Range(-1, 32767, "repeats -1..32767")
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +90,7 @@ class NavRule:
     """One row. p1: what the first parameter can hold. position: needed; if False, none is kept."""
 
     name: str
-    p1: WholeRange
+    p1: Range
     position: bool
     height: Height
 

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a pilot reads of a mission that was written: one summary line first, then the findings, equal ones as one."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from bridge.model.finding import DROPPED, Finding, News
+from bridge.model.verdict import Verdict
+
+_MOST_LINES = 10
+
+
+def summary(sent: int, verdict: Verdict[Any]) -> str | None:
+    """What became of `sent` items and the worst news; None if nothing was lost or changed its meaning."""
+    warnings = [finding for finding in verdict.findings if finding.news is News.WARNING]
+    if not warnings:
+        return None
+    if not verdict.items:
+        return warnings[-1].text()
+    dropped = sum(finding.becomes == DROPPED for finding in warnings)
+    relative = sum(finding.field == "frame" and finding.seq != 0 for finding in warnings)
+    raised = sum(finding.field == "alt_m" and finding.becomes != DROPPED for finding in warnings)
+    counts = {"dropped": dropped, "heights relative": relative, "raised from 0": raised}
+    news = [f"{count} {what}" for what, count in counts.items() if count]
+    return f"{len(verdict.items)} of {sent} stored: {', '.join(news) or 'look at home'}"
+
+
+def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:
+    """The lines after the summary: warnings first, at most ten."""
+    first: dict[Finding, Finding] = {}
+    counts: Counter[Finding] = Counter()
+    for finding in findings:
+        if finding.news is not News.NONE:
+            kind = replace(finding, seq=min(finding.seq or 0, 1))
+            first.setdefault(kind, finding)
+            counts[kind] += 1
+    lines = [(finding.news, finding.text(counts[kind])) for kind, finding in first.items()]
+    lines.sort(key=lambda line: line[0] is not News.WARNING)
+    if len(lines) > _MOST_LINES:
+        more = f"and {len(lines) - _MOST_LINES} more: see the list on the status page or naze-bridge missions show"
+        lines[_MOST_LINES:] = [(News.NOTICE, more)]
+    return lines
