@@ -66,9 +66,14 @@ def test_fuzzer_finds_nothing_in_a_few_seconds() -> None:
 @pytest.mark.parametrize(("pages", "compiles"), [(128, True), (64, False)])
 def test_slots_and_linker_script_cannot_part(pages: int, compiles: bool) -> None:
     """A build for 64 KB of flash would put the slots where stm32_flash.ld lets the program go."""
-    includes = ["-I", FIRMWARE, "-I", FIRMWARE / "tests" / "harakiri"]
-    source = FIRMWARE / "harakiri_mission.c"
-    command = ["gcc", "-std=c99", "-fsyntax-only", f"-DFLASH_PAGE_COUNT={pages}", *includes, source]
+    flags = [
+        "-std=c99",
+        "-fsyntax-only",
+        f"-DFLASH_PAGE_COUNT={pages}",
+        f"-I{FIRMWARE}",
+        f"-I{FIRMWARE}/tests/harakiri",
+    ]
+    command = ["gcc", *flags, str(FIRMWARE / "harakiri_mission.c")]
     run = subprocess.run(command, capture_output=True, text=True)
     assert (run.returncode == 0) is compiles
     assert ("slots_lie_where_stm32_flash_ld_says" in run.stderr) is not compiles
