@@ -12,6 +12,7 @@ import click
 from service.cli.command_group import LazyCommand, LazyGroup
 
 _COMMANDS = {
+    "setup": LazyCommand("service.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
     "run": LazyCommand("service.cli.run:run", "Run the bridge in the foreground."),
     "status": LazyCommand("service.cli.status:status", "Show how the bridge and the vehicle are."),
     "doctor": LazyCommand("service.doctor.command:doctor", "Diagnose setup problems."),

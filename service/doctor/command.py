@@ -40,18 +40,25 @@ def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json:
 
     Nothing is changed, and a daemon that runs is not disturbed. Exit code 0: no problem, 1: a problem was found.
     """
+    if not diagnose(fc, config, state_dir, as_json=as_json):
+        raise SystemExit(1)
+
+
+def diagnose(
+    fc: str | None = None, config: Path | None = None, state_dir: Path | None = None, *, as_json: bool = False
+) -> bool:
+    """Print what each check finds; False if there is a problem."""
     # A service's control socket is not in its state directory: only what was named is asked there.
     asked = partial(ask_daemon, state_dir, STATUS)
     if config is None and fc is None and _SERVICE_CONFIG.exists():
         config = _SERVICE_CONFIG
         state_dir = state_dir or (SERVICE_STATE if SERVICE_STATE.is_symlink() else None)
-    worst = Grade.OK
+    is_well = True
     for checked in _examine(config, fc, state_dir, asked):
         _tell(checked, as_json=as_json)
         if checked.grade is Grade.PROBLEM:
-            worst = Grade.PROBLEM
-    if worst is Grade.PROBLEM:
-        raise SystemExit(1)
+            is_well = False
+    return is_well
 
 
 def _examine(

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changes that setup makes to a machine: files and commands. Each says what it does before it is done."""
+
+import os
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from service.host import Host
+from storage.atomic_file import replace_file
+
+
+class SetupError(Exception):
+    """A change that failed; one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteFile:
+    """Replace a file, or make it. `secret`: only its owner may read it, and its text is not shown."""
+
+    path: str
+    text: str
+    secret: bool = False
+
+    def describe(self) -> str:
+        """What it does."""
+        return f"write {self.path}"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Run a program to its end."""
+
+    command: tuple[str, ...]
+
+    def describe(self) -> str:
+        """What it does."""
+        return f"run {' '.join(self.command)}"
+
+
+Change = WriteFile | Run
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Changes with one purpose. `needs_reboot`: they count only after the next start."""
+
+    purpose: str
+    changes: Sequence[Change]
+    needs_reboot: bool = False
+
+
+class Machine:
+    """Carries changes out; SetupError says which one failed, and why."""
+
+    def __init__(self, host: Host) -> None:
+        self._host = host
+
+    def carry_out(self, change: Change) -> None:
+        """Make one change."""
+        if isinstance(change, Run):
+            self.run(change.command)
+            return
+        path = self._host.path(change.path)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(path, change.text.encode())
+            if not change.secret:
+                path.chmod(0o644)
+        except OSError as error:
+            raise SetupError(f"{change.path} cannot be written: {error.strerror}; run setup with sudo") from error
+
+    def run(self, command: Sequence[str]) -> None:
+        """Run a program on this machine."""
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)  # noqa: S603  # our own words
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise SetupError(f"`{' '.join(command)}` failed: {error}") from error
+        if done.returncode:
+            said = (done.stderr or done.stdout).strip().splitlines()
+            why = said[-1] if said else f"exit code {done.returncode}"
+            raise SetupError(f"`{' '.join(command)}` failed: {why}")
+
+
+def is_root() -> bool:
+    """Whether this user may change the machine."""
+    return os.geteuid() == 0

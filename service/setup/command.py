@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge setup`."""
+
+import socket
+from pathlib import Path
+
+import click
+
+from service.cli.printing import fail
+from service.doctor.command import diagnose
+from service.host import Host
+from service.links.connection import AddressError, parse_fc
+from service.raspberry_pi import pi_model
+from service.setup.change import Machine, SetupError, Step, is_root
+from service.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, Answers, missing_steps
+from service.web.token import DEFAULT_NAME
+
+_LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
+_ADDRESS_OF_HOTSPOT = "10.42.0.1"
+
+
+@click.command()
+@click.option("--fc", default="auto", show_default=True, metavar="FC", help="The flight controller, as of `run`.")
+@click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name; without: keep the present one.")
+@click.option("--password-file", type=click.Path(path_type=Path, exists=True), help="File with the hotspot's password.")
+@click.option("--country", metavar="CC", help="Wi-Fi country, as DE: the radio stays off without one.")
+@click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
+@click.option("--no-page", is_flag=True, help="Do not serve the status page.")
+@click.option(
+    "--key-file", type=click.Path(path_type=Path, exists=True), help="File with a MAVLink signing passphrase."
+)
+@click.option("--yes", is_flag=True, help="Ask nothing: the options and their defaults are the answers.")
+@click.option("--dry-run", is_flag=True, help="Show what would be changed, and end.")
+@click.option("--root", type=click.Path(path_type=Path), default="/", hidden=True)
+def setup(
+    fc: str,
+    hotspot: str | None,
+    password_file: Path | None,
+    country: str | None,
+    name: str | None,
+    no_page: bool,
+    key_file: Path | None,
+    yes: bool,
+    dry_run: bool,
+    root: Path,
+) -> None:
+    """Set this Raspberry Pi up: UART, settings, Wi-Fi, status page, service. May be run again at any time.
+
+    Exit code 0: done, 1: a change failed, or doctor found a problem.
+    """
+    host = Host(root)
+    try:
+        fc = str(parse_fc(fc))
+    except AddressError as error:
+        raise click.UsageError(str(error)) from error
+    click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is no Raspberry Pi that is known.")
+    password = None if password_file is None else _line_of(password_file)
+    page = not no_page
+    if not yes and not dry_run:
+        if hotspot is None and click.confirm("Open a Wi-Fi hotspot, for the field? (no: keep the present network)"):
+            hotspot = click.prompt("Its name", default=socket.gethostname())
+            country = country or click.prompt("Your country, two letters")
+        page = page and click.confirm("Serve the status page to browsers on the network?", default=True)
+    if hotspot is not None and password is None:
+        if yes or dry_run:
+            raise click.UsageError("a hotspot needs a password: --password-file FILE")
+        password = click.prompt("Its password, 8 characters or more", hide_input=True, confirmation_prompt=True)
+    _check_wifi(hotspot, password)
+    answers = Answers(
+        fc=fc,
+        page=page,
+        hotspot=None if hotspot is None or password is None else (hotspot, password),
+        country=None if country is None else country.upper(),
+        name=name,
+        key=None if key_file is None else _line_of(key_file),
+    )
+    steps = missing_steps(host, answers)
+    _show(steps)
+    if dry_run:
+        return
+    if steps:
+        if not is_root():
+            fail("these changes need root: run it again as `sudo naze-bridge setup`")
+        if not yes and not click.confirm("Make these changes?", default=True):
+            raise click.Abort
+        _carry_out(steps, Machine(host))
+    _tell_where(host, answers)
+    if any(step.needs_reboot for step in steps):
+        click.echo("\nReboot once for the UART: sudo reboot. After that: naze-bridge doctor")
+    elif host.path("/run/systemd/system").exists() and not diagnose():
+        raise SystemExit(1)
+
+
+def _show(steps: list[Step]) -> None:
+    if not steps:
+        click.echo("Everything is set up already.")
+        return
+    click.echo("\nTo do:")
+    for number, step in enumerate(steps, 1):
+        click.echo(f"{number}. {step.purpose}{' (needs a reboot)' if step.needs_reboot else ''}")
+        for change in step.changes:
+            click.echo(f"     {change.describe()}")
+
+
+def _carry_out(steps: list[Step], machine: Machine) -> None:
+    for step in steps:
+        click.echo(f"{step.purpose} ... ", nl=False)
+        try:
+            for change in step.changes:
+                machine.carry_out(change)
+        except SetupError as error:
+            click.echo("failed")
+            fail(f"{error}; what was done before stays, and setup can be run again")
+        click.echo("done")
+
+
+def _tell_where(host: Host, answers: Answers) -> None:
+    addresses = [_ADDRESS_OF_HOTSPOT] if answers.hotspot else host.ipv4_addresses()
+    name = answers.name or host.read("/etc/hostname").strip()
+    local = [f"{name}.local"] if name and host.path("/etc/avahi").exists() else []
+    where = " or ".join([*local, *addresses]) or "this machine's address"
+    click.echo(f"\nMission Planner: choose UDPCl, Connect, host {where}, port {GCS_PORT}")
+    if not answers.page:
+        return
+    url = f"http://{(addresses or local or ['localhost'])[0]}:{PAGE_PORT}/"
+    click.echo(f"Status page: {url}")
+    token = host.read(f"{STATE_FOLDER}/{DEFAULT_NAME}").strip()
+    if token:
+        click.echo(f"Its token, for changes: {token}")
+    import segno  # only here: no other command draws
+
+    segno.make(url, error="l").terminal(compact=True)
+
+
+def _check_wifi(ssid: str | None, password: str | None) -> None:
+    if ssid is not None and not (0 < len(ssid.encode()) <= _MOST_SSID and ssid.isprintable()):
+        raise click.UsageError(f"{ssid!r} can be no network's name: 1 to {_MOST_SSID} characters")
+    if password is not None and not (_LEAST_PASSWORD <= len(password) <= _MOST_PASSWORD and password.isascii()):
+        raise click.UsageError(f"a Wi-Fi password has {_LEAST_PASSWORD} to {_MOST_PASSWORD} plain characters")
+
+
+def _line_of(path: Path) -> str:
+    try:
+        lines = path.read_text().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise click.UsageError(f"{path} cannot be read: {error}") from error
+    if len(lines) != 1 or not lines[0].strip():
+        raise click.UsageError(f"{path} must hold one line")
+    return lines[0].strip()

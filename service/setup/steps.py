@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a Raspberry Pi needs before it can carry the bridge: each function yields what is missing of one thing."""
+
+import json
+import re
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from service.host import Host
+from service.links.port_memory import PORTS_FILE
+from service.raspberry_pi import boot_file, pi_model
+from service.setup.change import Change, Run, Step, WriteFile
+
+SETTINGS_FILE = "/etc/naze-bridge/conf.d/setup.toml"
+KEY_FILE = "/etc/naze-bridge/gcs.key"
+STATE_FOLDER = "/var/lib/naze-bridge"
+PAGE_PORT = 8080
+GCS_PORT = 14550
+_HOTSPOT_FILE = "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection"
+_AVAHI_FILE = "/etc/avahi/services/naze-bridge.service"
+_OTHERS_FILE = "/etc/udev/rules.d/59-naze-bridge-others.rules"
+_WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
+#: On every model but the Pi 5 the console's names mean the UART on the header.
+_HEADER_CONSOLES = ("serial0", "ttyAMA0", "ttyS0")
+_PI_5_CONSOLES = ("ttyAMA0",)
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What the pilot wants.
+
+    `hotspot`: its name and password; None keeps the network. `name`: the host's, for NAME.local.
+    `key`: the passphrase of MAVLink signing; None: anyone on the network may write, or the present key stays.
+    """
+
+    fc: str = "auto"
+    page: bool = True
+    hotspot: tuple[str, str] | None = None
+    country: str | None = None
+    name: str | None = None
+    key: str | None = None
+
+
+def missing_steps(host: Host, answers: Answers) -> list[Step]:
+    """The steps that are left to do on this machine, in order."""
+    makers = (_console, _uart, _country, _name, _key, _settings, _others, _announcement, _service, _hotspot)
+    return [step for make in makers for step in make(host, answers)]
+
+
+def _console(host: Host, answers: Answers) -> Iterator[Step]:
+    model = pi_model(host)
+    consoles = _PI_5_CONSOLES if model is not None and model.header_uart == "/dev/ttyAMA0" else _HEADER_CONSOLES
+    file = boot_file(host, "cmdline.txt")
+    changes: list[Change] = []
+    if file is not None:
+        words = host.read(file).split()
+        kept = [word for word in words if not re.fullmatch(rf"console=(?:{'|'.join(consoles)})(?:,\S*)?", word)]
+        if kept != words:
+            changes.append(WriteFile(file, " ".join(kept) + "\n"))
+    in_cmdline = bool(changes)
+    for console in consoles:
+        wanted = f"serial-getty@{console}.service"
+        is_running = any(process.name == "agetty" and console in process.arguments for process in host.processes())
+        if is_running or host.path(f"/etc/systemd/system/getty.target.wants/{wanted}").is_symlink():
+            changes.append(Run(("systemctl", "disable", *_now(host), wanted)))
+    if changes:
+        yield Step("free the UART on the header from the login console", changes, needs_reboot=in_cmdline)
+
+
+def _uart(host: Host, answers: Answers) -> Iterator[Step]:
+    file = boot_file(host, "config.txt")
+    if file is None:
+        return
+    model = pi_model(host)
+    # An image that is set up elsewhere may start on any model.
+    wanted = ["enable_uart=1", "dtparam=uart0=on"] if model is None else [model.config_line]
+    text = host.read(file)
+    lines = [line for line in wanted if not _is_on(text, line)]
+    if lines:
+        added = "\n[all]\n# naze-bridge: the UART on GPIO 14 and 15\n" + "".join(f"{line}\n" for line in lines)
+        yield Step("switch the UART on the header on", [WriteFile(file, text.rstrip("\n") + "\n" + added)], True)
+
+
+def _is_on(text: str, line: str) -> bool:
+    """Whether config.txt has `line` as its last word on that key."""
+    key, _, _ = line.rpartition("=")
+    given = re.findall(rf"^[ \t]*{re.escape(key)}(=\S*)?[ \t]*$", text, re.MULTILINE)
+    return bool(given) and f"{key}{given[-1] or '=on'}" == line
+
+
+def _country(host: Host, answers: Answers) -> Iterator[Step]:
+    if answers.country is not None and host.path("/usr/bin/raspi-config").exists():
+        if f"cfg80211.ieee80211_regdom={answers.country}" in host.read(boot_file(host, "cmdline.txt") or ""):
+            return
+        command = ("raspi-config", "nonint", "do_wifi_country", answers.country)
+        yield Step(f"set the Wi-Fi country to {answers.country}", [Run(command)])
+
+
+def _name(host: Host, answers: Answers) -> Iterator[Step]:
+    if answers.name is None or host.read("/etc/hostname").strip() == answers.name:
+        return
+    old = host.read("/etc/hostname").strip()
+    hosts = host.read("/etc/hosts")
+    renamed = re.sub(rf"^(127\.0\.1\.1\s+){re.escape(old)}$", rf"\g<1>{answers.name}", hosts, flags=re.MULTILINE)
+    changes: list[Change] = [WriteFile("/etc/hosts", renamed)] if old and renamed != hosts else []
+    change = Run(("hostnamectl", "set-hostname", answers.name)) if _now(host) else None
+    yield Step(
+        f"name this machine {answers.name}.local",
+        [*changes, change or WriteFile("/etc/hostname", f"{answers.name}\n")],
+    )
+
+
+def _key(host: Host, answers: Answers) -> Iterator[Step]:
+    if answers.key is not None and host.read(KEY_FILE).strip() != answers.key:
+        owner = Run(("chown", "naze-bridge:", KEY_FILE))
+        yield Step("set the key without which nobody may write", [WriteFile(KEY_FILE, f"{answers.key}\n", True), owner])
+
+
+def settings_text(host: Host, answers: Answers) -> str:
+    """The drop-in file with the answers."""
+    lines = ["# Written by `naze-bridge setup`, which may be run again.", f'fc = "{answers.fc}"']
+    if answers.key is not None or host.path(KEY_FILE).exists():
+        lines.append(f'gcs = [{{address = "udpin:0.0.0.0:{GCS_PORT}", key_file = "{KEY_FILE}"}}]')
+    if answers.page:
+        lines += ["", "[web]", f'listen = "0.0.0.0:{PAGE_PORT}"']
+    return "\n".join(lines) + "\n"
+
+
+def _settings(host: Host, answers: Answers) -> Iterator[Step]:
+    text = settings_text(host, answers)
+    if host.read(SETTINGS_FILE) != text:
+        what = f"fc = {answers.fc}, status page {'on' if answers.page else 'off'}"
+        changes: list[Change] = [WriteFile(SETTINGS_FILE, text)]
+        if _now(host) and host.path(_WANTED_BY).is_symlink():
+            changes.append(Run(("systemctl", "restart", "naze-bridge.service")))
+        yield Step(f"settings: {what}", changes)
+
+
+def _others(host: Host, answers: Answers) -> Iterator[Step]:
+    """Keep the name /dev/naze from USB devices that the bridge has heard to be none."""
+    try:
+        others = json.loads(host.read(f"{STATE_FOLDER}/{PORTS_FILE}") or "{}").get("others", {})
+        keys = [re.fullmatch(r"usb (\S+) (\w{4}):(\w{4}).*", key) for key in others]
+    except (ValueError, AttributeError):
+        return
+    rules = [
+        f'SUBSYSTEM=="tty", KERNELS=="{key[1]}", ATTRS{{idVendor}}=="{key[2]}", ATTRS{{idProduct}}=="{key[3]}",'
+        ' ENV{NAZE_BRIDGE_OTHER}="1"\n'
+        for key in keys
+        if key
+    ]
+    text = "# Written by `naze-bridge setup`: not flight controllers, so not /dev/naze.\n" + "".join(rules)
+    if rules and host.read(_OTHERS_FILE) != text:
+        reload = [Run(("udevadm", "control", "--reload")), Run(("udevadm", "trigger", "--subsystem-match=tty"))]
+        changes: list[Change] = [WriteFile(_OTHERS_FILE, text), *(reload if _now(host) else [])]
+        yield Step("keep the name /dev/naze from radios and GPS receivers", changes)
+
+
+def _announcement(host: Host, answers: Answers) -> Iterator[Step]:
+    if not host.path(Path(_AVAHI_FILE).parent).exists():
+        return  # without Avahi there is no NAME.local either, which the last words say
+    services = [("_mavlink._udp", GCS_PORT)] + ([("_http._tcp", PAGE_PORT)] if answers.page else [])
+    entries = "".join(
+        f"  <service><type>{escape(kind)}</type><port>{port}</port></service>\n" for kind, port in services
+    )
+    text = (
+        '<?xml version="1.0" standalone="no"?>\n<!DOCTYPE service-group SYSTEM "avahi-service.dtd">\n'
+        f'<service-group>\n  <name replace-wildcards="yes">naze-bridge on %h</name>\n{entries}</service-group>\n'
+    )
+    if host.read(_AVAHI_FILE) != text:
+        yield Step("announce the bridge on the network (zeroconf)", [WriteFile(_AVAHI_FILE, text)])
+
+
+def _service(host: Host, answers: Answers) -> Iterator[Step]:
+    if not host.path(_WANTED_BY).is_symlink():
+        yield Step("start the bridge with the machine", [Run(("systemctl", "enable", *_now(host), "naze-bridge"))])
+
+
+def _hotspot(host: Host, answers: Answers) -> Iterator[Step]:
+    """The last step: it may end the connection over which setup is run."""
+    if answers.hotspot is None:
+        return
+    ssid, password = answers.hotspot
+    text = (
+        "# Written by `naze-bridge setup`.\n"
+        f"[connection]\nid=naze-bridge-hotspot\nuuid={uuid.uuid5(uuid.NAMESPACE_DNS, ssid)}\ntype=wifi\n"
+        "interface-name=wlan0\nautoconnect=true\nautoconnect-priority=100\n\n"
+        f"[wifi]\nmode=ap\nband=bg\nssid={_keyfile(ssid)}\n\n[wifi-security]\nkey-mgmt=wpa-psk\n"
+        f"psk={_keyfile(password)}\n\n"
+        "[ipv4]\nmethod=shared\naddress1=10.42.0.1/24\n\n[ipv6]\nmethod=disabled\n"
+    )
+    if host.read(_HOTSPOT_FILE) != text:
+        changes: list[Change] = [WriteFile(_HOTSPOT_FILE, text, secret=True)]
+        if _now(host):
+            changes += [
+                Run(("nmcli", "connection", "reload")),
+                Run(("nmcli", "connection", "up", "naze-bridge-hotspot")),
+            ]
+        yield Step(f"open the Wi-Fi hotspot {ssid!r}", changes)
+
+
+def _keyfile(text: str) -> str:
+    """A value as NetworkManager's key files have it (GKeyFile)."""
+    escaped = text.replace("\\", "\\\\")
+    return escaped.replace(" ", "\\s", 1) if escaped.startswith(" ") else escaped
+
+
+def _now(host: Host) -> tuple[str, ...]:
+    """`--now` where systemd runs; an image that is only being made has nothing to start."""
+    return ("--now",) if host.path("/run/systemd/system").exists() else ()

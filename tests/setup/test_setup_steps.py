@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Setup on each Raspberry Pi model, under a root of files: what it changes, and that a second run changes nothing."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from faulty_machine import FaultyMachine
+from programs import run_naze_bridge
+
+from service.setup.change import Machine, Run, Step, WriteFile
+from service.setup.steps import SETTINGS_FILE, Answers, missing_steps
+
+#: Model, what /dev/serial0 is, the console's word as Raspberry Pi OS writes it, and the line that config.txt needs.
+MODELS = {
+    "3": ("Raspberry Pi 3 Model B Plus Rev 1.3", "ttyS0", "enable_uart=1"),
+    "4": ("Raspberry Pi 4 Model B Rev 1.4", "ttyS0", "enable_uart=1"),
+    "5": ("Raspberry Pi 5 Model B Rev 1.0", "ttyAMA10", "dtparam=uart0=on"),
+    "Zero 2 W": ("Raspberry Pi Zero 2 W Rev 1.0", "ttyS0", "enable_uart=1"),
+}
+CMDLINE, CONFIG = "/boot/firmware/cmdline.txt", "/boot/firmware/config.txt"
+HOTSPOT = "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection"
+
+
+class FreshPi(FaultyMachine):
+    """Raspberry Pi OS as it was flashed, and the package installed."""
+
+    def __init__(self, root: Path, model: str) -> None:
+        super().__init__(root)
+        name, serial0, _ = MODELS[model]
+        self.write("/proc/device-tree/model", f"{name}\0")
+        self.path("/dev/serial0").unlink()
+        self.path("/dev/serial0").symlink_to(serial0)
+        self.write(CMDLINE, "console=serial0,115200 console=tty1 root=PARTUUID=1-02 rootwait\n")
+        self.write(CONFIG, "dtparam=audio=on\n[cm4]\notg_mode=1\n[all]\n")
+        self.write("/etc/hostname", "raspberrypi\n")
+        self.write("/etc/hosts", "127.0.0.1\tlocalhost\n127.0.1.1\traspberrypi\n")
+        self.write("/usr/bin/raspi-config")
+        self.write("/etc/avahi/services/.keep")
+        self.write("/run/systemd/system/.keep")
+        self.write("/etc/systemd/system/multi-user.target.wants/.keep")
+        self.ran: list[str] = []
+
+    def carry_out(self, steps: list[Step]) -> None:
+        """Write the files; do to other files what the programs would do."""
+        for change in (change for step in steps for change in step.changes):
+            if isinstance(change, WriteFile):
+                Machine(self).carry_out(change)
+                continue
+            assert isinstance(change, Run)
+            self.ran.append(" ".join(change.command))
+            match change.command:
+                case ("systemctl", "enable", "--now", "naze-bridge"):
+                    self.path("/etc/systemd/system/multi-user.target.wants/naze-bridge.service").symlink_to("x")
+                case ("systemctl", "disable", "--now", unit):
+                    self.path(f"/etc/systemd/system/getty.target.wants/{unit}").unlink()
+                case ("hostnamectl", "set-hostname", name):
+                    self.write("/etc/hostname", f"{name}\n")
+                case ("raspi-config", "nonint", "do_wifi_country", country):
+                    self.write(CMDLINE, f"{self.read(CMDLINE).strip()} cfg80211.ieee80211_regdom={country}\n")
+
+
+@pytest.fixture(params=MODELS)
+def model(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def test_a_fresh_card(tmp_path: Path, model: str) -> None:
+    pi = FreshPi(tmp_path, model)
+    answers = Answers(hotspot=("naze field", "long-enough"), country="DE", name="naze", key="secret words")
+    steps = missing_steps(pi, answers)
+    pi.carry_out(steps)
+    _, _, line = MODELS[model]
+    assert pi.read(CONFIG).splitlines()[-1] == line
+    assert "dtparam=audio=on\n[cm4]" in pi.read(CONFIG)
+    # serial0 is the Pi 5's debug socket: its console is in nobody's way.
+    has_console = "console=serial0,115200" in pi.read(CMDLINE)
+    assert has_console is (model == "5")
+    assert "console=tty1 root=PARTUUID=1-02 rootwait" in pi.read(CMDLINE)
+    settings = tomllib.loads(pi.read(SETTINGS_FILE))
+    assert settings["fc"] == "auto"
+    assert settings["web"]["listen"] == "0.0.0.0:8080"
+    assert settings["gcs"][0]["key_file"] == "/etc/naze-bridge/gcs.key"
+    assert pi.path("/etc/naze-bridge/gcs.key").stat().st_mode & 0o777 == 0o600
+    assert pi.path(HOTSPOT).stat().st_mode & 0o777 == 0o600
+    assert "ssid=naze field\n" in pi.read(HOTSPOT)
+    assert "127.0.1.1\tnaze\n" in pi.read("/etc/hosts")
+    assert "_mavlink._udp" in pi.read("/etc/avahi/services/naze-bridge.service")
+    assert [step.purpose for step in steps if step.needs_reboot]
+    # The step that may end the connection over which this is typed.
+    assert pi.ran[-1] == "nmcli connection up naze-bridge-hotspot"
+    assert missing_steps(pi, answers) == []
+
+
+def test_a_second_run_keeps_the_key_and_the_hotspot(tmp_path: Path, model: str) -> None:
+    pi = FreshPi(tmp_path, model)
+    pi.carry_out(missing_steps(pi, Answers(key="secret words")))
+    (step,) = missing_steps(pi, Answers(page=False))[:1]
+    pi.carry_out(missing_steps(pi, Answers(page=False)))
+    assert step.purpose == "settings: fc = auto, status page off"
+    settings = tomllib.loads(pi.read(SETTINGS_FILE))
+    assert "web" not in settings
+    assert "key_file" in settings["gcs"][0]
+    assert "systemctl restart naze-bridge.service" in pi.ran
+
+
+def test_a_getty_that_is_enabled_is_disabled(tmp_path: Path) -> None:
+    pi = FreshPi(tmp_path, "4")
+    pi.write(CMDLINE, "console=tty1 rootwait\n")
+    wants = pi.path("/etc/systemd/system/getty.target.wants")
+    wants.mkdir(parents=True)
+    (wants / "serial-getty@ttyS0.service").symlink_to("x")
+    (console, *_) = missing_steps(pi, Answers())
+    assert not console.needs_reboot
+    pi.carry_out([console])
+    assert pi.ran == ["systemctl disable --now serial-getty@ttyS0.service"]
+
+
+@pytest.mark.parametrize(
+    ("given", "is_on"),
+    [
+        ("enable_uart=1\n", True),
+        ("#enable_uart=1\n", False),
+        ("enable_uart=1\n[all]\nenable_uart=0\n", False),
+        ("enable_uart=10\n", False),
+    ],
+)
+def test_the_last_word_of_config_txt_counts(tmp_path: Path, given: str, is_on: bool) -> None:
+    pi = FreshPi(tmp_path, "4")
+    pi.write(CONFIG, given)
+    purposes = [step.purpose for step in missing_steps(pi, Answers())]
+    assert ("switch the UART on the header on" not in purposes) is is_on
+
+
+def test_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
+    pi = FreshPi(tmp_path, "4")
+    pi.path("/proc/device-tree/model").unlink()
+    pi.path("/run/systemd/system/.keep").unlink()
+    pi.path("/run/systemd/system").rmdir()
+    steps = missing_steps(pi, Answers(name="naze", hotspot=("naze", "long-enough")))
+    commands = [change.command for step in steps for change in step.changes if isinstance(change, Run)]
+    assert commands == [("systemctl", "enable", "naze-bridge")]
+    (uart,) = [change for step in steps for change in step.changes if change.describe().endswith("config.txt")]
+    assert isinstance(uart, WriteFile)
+    assert uart.text.endswith("[all]\n# naze-bridge: the UART on GPIO 14 and 15\nenable_uart=1\ndtparam=uart0=on\n")
+
+
+def test_what_was_heard_on_usb_is_not_called_naze(tmp_path: Path) -> None:
+    pi = FreshPi(tmp_path, "4")
+    pi.write("/var/lib/naze-bridge/ports.json", '{"others": {"usb 1-1.3 10c4:ea60 0001": "a SiK telemetry radio"}}')
+    pi.carry_out(missing_steps(pi, Answers()))
+    rules = pi.read("/etc/udev/rules.d/59-naze-bridge-others.rules")
+    assert 'KERNELS=="1-1.3", ATTRS{idVendor}=="10c4", ATTRS{idProduct}=="ea60"' in rules
+    assert missing_steps(pi, Answers()) == []
+
+
+def test_the_command_shows_what_it_would_do(tmp_path: Path, model: str) -> None:
+    pi = FreshPi(tmp_path, model)
+    ended = run_naze_bridge("setup", "--dry-run", "--root", tmp_path)
+    assert ended.returncode == 0, ended
+    assert ended.stdout.startswith(f"This is a {MODELS[model][0]}.")
+    assert f"write {CONFIG}" in ended.stdout
+    assert MODELS[model][2] not in pi.read(CONFIG)
+    assert [line for line in ended.stdout.splitlines() if len(line) > 80] == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--hotspot", "naze"], "a hotspot needs a password"),
+        (["--hotspot", "n" * 33, "--password-file", "{}"], "can be no network's name"),
+        (["--fc", "naze"], "is no flight controller connection"),
+    ],
+)
+def test_answers_that_cannot_be_used(tmp_path: Path, options: list[str], words: str) -> None:
+    file = tmp_path / "password"
+    file.write_text("long-enough\n")
+    ended = run_naze_bridge("setup", "--yes", "--root", tmp_path, *(option.format(file) for option in options))
+    assert ended.returncode == 2
+    assert words in ended.stderr
