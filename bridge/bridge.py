@@ -22,8 +22,9 @@ from bridge.fc.actions import FcActions
 from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
 from bridge.fc.session import FcSession
 from bridge.fc.states import Autopilot, Mavlink
+from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground, Tap
-from bridge.gcs.guard import Guard, GuardRefusal, LinkAccess, denial
+from bridge.gcs.guard import Guard, GuardRefusal, LinkAccess, Standing, denial
 from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.line.conversation import StoreEffect
@@ -54,7 +55,8 @@ _AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
 class BridgeConfig:
     """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed.
 
-    `links`: who may write over which link, by its name; over others everyone may.
+    `links`: who may write over which link, by its name; over others everyone may. `passes_everything`: an autopilot
+    that speaks MAVLink for itself gets commands over those others, too.
     """
 
     speeds: Sequence[int | None]
@@ -64,6 +66,7 @@ class BridgeConfig:
     autopilot: Autopilot = Autopilot.AUTO
     profiles: Sequence[Profile] = PROFILES
     links: Mapping[str, LinkAccess] = field(default_factory=dict)
+    passes_everything: bool = False
 
 
 class Bridge:
@@ -84,8 +87,8 @@ class Bridge:
             for name, access in config.links.items()
             if access.signing is not None
         }
-        self.guard = Guard(config.links, log_event)
-        self.ground = Ground(config.sysid, config.compid, log_event, lambda: self._vehicle.newcomer(), tap, signers)
+        self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
+        self.ground = Ground(config.sysid, config.compid, log_event, self._newcomer, tap, self.guard.standing, signers)
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(
             config.speeds,
@@ -98,7 +101,9 @@ class Bridge:
             config.autopilot,
         )
         self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
-        self.missions = MissionService(lambda mission, delivery: self._mission_endings.append((mission, delivery)))
+        self.missions = MissionService(
+            lambda mission, delivery: self._mission_endings.append((mission, delivery)), self._is_armed
+        )
         self._vehicle = OwnVehicle(self.session, self.missions, self.ground, now)
         self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
         home = self._vehicle.home
@@ -157,15 +162,36 @@ class Bridge:
         """Take bytes from a ground station. A datagram holds whole frames only."""
         for frame in self.ground.received(peer, data, now, datagram=datagram):
             refused = self.guard.refusal(peer, frame)
+            if refused is not None and refused.is_forged:
+                continue
+            self.ground.heard(peer, frame, now)
+            station = Station(peer, frame.sysid, frame.compid)
             if refused is not None:
-                self._answer_refused(refused, Station(peer, frame.sysid, frame.compid), frame)
+                self._answer_refused(refused, station, frame)
             elif self._pass_through is not None:
-                if self._pass_through.from_station(peer, frame):
-                    self.session.send_mavlink(frame.raw)
-            elif self._router.understands(frame.msgid):
-                message = self._decoder.decode(frame)
-                if message is not None and self._is_for_us(message):
-                    self._router.take(Station(peer, frame.sysid, frame.compid), message, now)
+                self._pass_on(self._pass_through, station, frame, now)
+            else:
+                self.ground.record(peer, frame, now)
+                if self._router.understands(frame.msgid):
+                    message = self._decoder.decode(frame)
+                    if message is not None and self._is_for_us(message):
+                        self._router.take(station, message, now)
+
+    def _pass_on(self, routes: PassThrough, station: Station, frame: MavlinkFrame, now: float) -> None:
+        """Send a frame on to those it is meant for, as far as its sender may."""
+        peer = station.peer
+        if not self.ground.budgets.allows(Cost.PASSED, peer, now):
+            return
+        may_speak_to_others = self.guard.standing(peer) is not Standing.LISTENER
+        if not routes.from_station(peer, frame, to_stations=may_speak_to_others):
+            self.ground.record(peer, frame, now)
+            return
+        refused = self.guard.command_refusal(peer, frame)
+        if refused is None:
+            self.ground.record(peer, frame, now)
+            self.session.send_mavlink(frame.raw)
+        else:
+            self._answer_refused(refused, station, frame)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""
@@ -256,7 +282,7 @@ class Bridge:
         else:
             answers = partial(self.ground.to_as, system, component or _AUTOPILOT, station)
             is_vehicle = self._pass_through.is_aboard(system)
-        if not (refused.is_told and is_vehicle):
+        if not (is_vehicle and self.ground.allows(station, Cost.ANSWER)):
             return
         message = self._decoder.decode(frame)
         answer = None if message is None else denial(message, station)
@@ -267,6 +293,11 @@ class Bridge:
             self._parameters.send_one(station, message.param_id, -1)
         if refused.is_first:
             answers(messages.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
+
+    def _newcomer(self, peer: Peer) -> None:
+        # An autopilot that speaks for itself is not spoken for.
+        if self._pass_through is None:
+            self._vehicle.newcomer(peer)
 
     def _left(self, peer: Peer) -> None:
         self.guard.forget(peer)

@@ -12,6 +12,7 @@ import structlog
 
 from bridge.bridge import Bridge, BridgeConfig
 from bridge.fc.autosense import SPEEDS
+from bridge.gcs.guard import LinkAccess
 from bridge.gcs.station import Peer
 from bridge.line.conversation import StoreEffect
 from bridge.missions.mission_service import Delivery
@@ -27,7 +28,7 @@ from service.links.port_finder import PortFinder
 from service.links.signing_state import SigningState
 from service.mission_data import Json
 from service.recording.recorder import Recording
-from service.settings import Settings
+from service.settings import PassThroughRule, Settings
 from service.store_worker import StoreWorker
 from service.version import version
 
@@ -38,6 +39,8 @@ _FINISH_S = 1.0
 _ABORT_S = 0.6
 _STORE_PATIENCE_S = 0.2
 _REST_INTERVAL_S = 0.02
+#: Frames come in over zenoh only if its transport is authenticated, or if the owner said that it need not be.
+_ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
 _WHO_MAY_WRITE = "whoever reaches it may write missions and parameters; docs/signing.md tells how to limit that"
 
 _log = structlog.get_logger()
@@ -87,7 +90,8 @@ class Daemon:
                 sysid=settings.sysid,
                 takeoff_max_m=settings.takeoff_max_m,
                 autopilot=settings.autopilot,
-                links=self._signing.links,
+                links={**self._signing.links, **_ZENOH},
+                passes_everything=settings.pass_through is PassThroughRule.EVERYTHING,
             ),
             self._log_event,
             self._loop.time(),

@@ -69,6 +69,9 @@ class FcActions:
             # Without an arm flag it is unknown whether the craft is flying.
             on_done(ActionResult.NO_LINK)
             return
+        if self._session.vehicle.armed:
+            on_done(ActionResult.ARMED)
+            return
         if self._runner.is_busy or self._missions.acquire(self) is not None:
             on_done(ActionResult.OCCUPIED)
             return

@@ -4,6 +4,9 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from bridge.gcs.budget import Budgets
+from bridge.gcs.cost import Cost
+from bridge.gcs.guard import Standing
 from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.gcs.stations import Stations
@@ -21,7 +24,10 @@ Tap = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
-    """All ground stations together. Implements `Post`. `on_newcomer`: somebody was heard for the first time.
+    """All ground stations together. Implements `Post`. `on_newcomer`: a peer was heard for the first time.
+
+    `standing`: what a peer may do (bridge.gcs.guard). One that may only read gets telemetry and answers, but no texts
+    for everyone, and is not recorded.
 
     On a link that has a signer, by its name, all that we say is signed, and so MAVLink 2.
     """
@@ -31,8 +37,9 @@ class Ground:
         sysid: int,
         compid: int,
         log_event: EventLog,
-        on_newcomer: Callable[[], None],
+        on_newcomer: Callable[[Peer], None],
         tap: Tap,
+        standing: Callable[[Peer], Standing],
         signers: Mapping[str, Signer],
     ) -> None:
         self._sysid = sysid
@@ -40,8 +47,10 @@ class Ground:
         self._log_event = log_event
         self._on_newcomer = on_newcomer
         self.tap = tap
+        self._standing = standing
         self._signers = signers
         self._stations = Stations()
+        self.budgets = Budgets(self._has_standing)
         self._default_peers: dict[Peer, bool] = {}
         self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._writers: dict[Peer, FrameWriter] = {}
@@ -81,7 +90,7 @@ class Ground:
         return self._stations.peers()
 
     def everyone(self) -> Sequence[Peer]:
-        """Return all who are to be sent what is for everyone."""
+        """All peers that are sent what is for everyone."""
         if self._everyone is None:
             self._everyone = self._count_everyone()
         return self._everyone
@@ -111,6 +120,9 @@ class Ground:
         silent = self._stations.expire(now)
         for peer in silent:
             self._forget(peer)
+        if silent:
+            self.budgets.keep(self._stations.peers())
+        for peer in silent:
             self._log_event("info", "gcs.silent", peer=str(peer))
         return silent
 
@@ -138,22 +150,27 @@ class Ground:
         if datagram:
             frames += splitter.reset()
         self.bad_frames += splitter.bad_frames - bad_before
-        return [frame for frame in frames if self._is_welcome(peer, frame, now)]
+        # Our own frames come back from a broadcast, or from a router that sends everything everywhere.
+        return [frame for frame in frames if (frame.sysid, frame.compid) != (self._sysid, self._compid)]
 
-    def _is_welcome(self, peer: Peer, frame: MavlinkFrame, now: float) -> bool:
-        if (frame.sysid, frame.compid) == (self._sysid, self._compid):
-            # What we sent, come back: a broadcast, or a router that sends everything everywhere.
-            return False
+    def heard(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
+        """Note a whole frame from a peer, which is there from now on."""
+        self.frames_received[peer.link, frame.msgid] += 1
         station = Station(peer, frame.sysid, frame.compid)
-        if not self._stations.heard(station, frame.version, now):
-            if not self._stations.add(station, frame.version, now):
-                return False
+        is_listener = self._standing(peer) is Standing.LISTENER
+        if self._stations.heard(station, frame.version, now, is_listener=is_listener):
             self._everyone = None
             self._log_event("info", "gcs.found", station=str(station))
-            self._on_newcomer()
-        self.frames_received[peer.link, frame.msgid] += 1
-        self.tap([frame.raw])
-        return True
+            self._on_newcomer(peer)
+
+    def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
+        """Record a frame that is served."""
+        if not self._stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
+            self.tap([frame.raw])
+
+    def _has_standing(self, peer: Peer) -> bool:
+        standing = self._standing(peer)
+        return standing is Standing.PROVEN or (standing is Standing.OPEN and self._stations.is_senior(peer))
 
     # What they are sent.
 
@@ -165,14 +182,25 @@ class Ground:
     def to(self, station: Station, message: Message) -> None:
         """Send a message to one ground station."""
         peer = station.peer
-        self.tap([self._write(peer, message, self._version(peer))])
+        frame = self._write(peer, message, self._version(peer))
+        if not self._stations.is_listener(peer):
+            self.tap([frame])
+
+    def allows(self, station: Station, cost: Cost) -> bool:
+        """Count something that a ground station makes the bridge do; False if that is too much."""
+        return self.budgets.allows(cost, station.peer, self._now)
 
     def to_as(self, sysid: int, compid: int, station: Station, message: Message) -> None:
         """Send a message to one ground station in the name of who was asked."""
         peer = station.peer
         frame = FrameWriter(sysid, compid, self._signers.get(peer.link)).frame(pack(message), self._version(peer))
         self._datagrams.append((peer, frame))
-        self.tap([frame])
+        if not self._stations.is_listener(peer):
+            self.tap([frame])
+
+    def greet(self, peer: Peer, heartbeat: Message) -> None:
+        """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it goes on."""
+        self._write(peer, heartbeat, self._version(peer))
 
     def broadcast(self, message: Message) -> None:
         """Send a message to everyone."""
@@ -202,11 +230,14 @@ class Ground:
 
     def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
         """Show a text on one ground station or on all."""
-        self._say(severity, text, self.everyone() if to is None else [to.peer])
+        if to is None:
+            self._say(severity, text, self._readers_of_texts())
+        elif self.allows(to, Cost.TEXT):
+            self._say(severity, text, [to.peer])
 
     def say_to_others(self, severity: Severity, text: str, station: Station) -> None:
         """Show a text on all ground stations but one."""
-        self._say(severity, text, [peer for peer in self.everyone() if peer != station.peer])
+        self._say(severity, text, [peer for peer in self._readers_of_texts() if peer != station.peer])
 
     def _say(self, severity: Severity, text: str, peers: Sequence[Peer]) -> None:
         """Send a text in pieces that fit STATUSTEXT; a refusal once an attempt."""
@@ -216,6 +247,9 @@ class Ground:
         for piece in split_text(text):
             message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"))
             self.multicast(pack(message), peers)
+
+    def _readers_of_texts(self) -> list[Peer]:
+        return [peer for peer in self.everyone() if self._standing(peer) is not Standing.LISTENER]
 
     def forward(self, frames: Sequence[bytes], peers: Iterable[Peer]) -> None:
         """Send frames on as they came: `frames` are datagrams of one whole frame or more."""
@@ -231,7 +265,10 @@ class Ground:
     def _writer(self, peer: Peer) -> FrameWriter:
         writer = self._writers.get(peer)
         if writer is None:
-            writer = self._writers[peer] = FrameWriter(self._sysid, self._compid, self._signers.get(peer.link))
+            writer = FrameWriter(self._sysid, self._compid, self._signers.get(peer.link))
+            # An answer may come after its peer has left, and would keep a writer for it for ever.
+            if peer in self.everyone():
+                self._writers[peer] = writer
         return writer
 
     def _version(self, peer: Peer) -> int:

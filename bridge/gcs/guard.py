@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Who may write over which link: the one place that every frame from a ground station passes first. Sans-IO.
 
-Reading is free for all who reach a link. Everything else may change what the aircraft does, be it a message that nobody
-has thought of yet: so what passes without leave is listed here, and not what needs it.
+Reading is free for every peer that reaches a link. Everything else may change what the aircraft does, even a message
+that nobody has thought of yet: so the lists here name what passes unproven, not what needs proof.
 """
 
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 from bridge.gcs.station import Peer, Station
@@ -28,9 +29,6 @@ _READS = frozenset(
         m.MAVLINK_MSG_ID_PING,
         m.MAVLINK_MSG_ID_TIMESYNC,
         m.MAVLINK_MSG_ID_STATUSTEXT,
-        m.MAVLINK_MSG_ID_RADIO,  # from a telemetry radio, which has no key
-        m.MAVLINK_MSG_ID_RADIO_STATUS,
-        m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM,
         m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST,
         m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST,
         m.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
@@ -45,7 +43,6 @@ _COMMANDS = frozenset({m.MAVLINK_MSG_ID_COMMAND_LONG, m.MAVLINK_MSG_ID_COMMAND_I
 _QUESTIONS = frozenset(
     {
         m.MAV_CMD_REQUEST_MESSAGE,
-        m.MAV_CMD_SET_MESSAGE_INTERVAL,
         m.MAV_CMD_GET_MESSAGE_INTERVAL,
         m.MAV_CMD_GET_HOME_POSITION,
         m.MAV_CMD_REQUEST_PROTOCOL_VERSION,
@@ -54,13 +51,60 @@ _QUESTIONS = frozenset(
         m.MAV_CMD_DO_SEND_BANNER,
     }
 )
-#: Where the number of the command stands in the payload of both command messages.
+#: What an autopilot that speaks MAVLink for itself gets over an open link besides: neither arms, disarms, steers nor
+#: restarts. A message that nobody has thought of is not among it.
+_PASSES_OPEN = _READS | {
+    m.MAVLINK_MSG_ID_RADIO,
+    m.MAVLINK_MSG_ID_RADIO_STATUS,
+    m.MAVLINK_MSG_ID_SYSTEM_TIME,
+    m.MAVLINK_MSG_ID_COMMAND_ACK,
+    m.MAVLINK_MSG_ID_MISSION_ACK,
+    m.MAVLINK_MSG_ID_MISSION_COUNT,
+    m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+    m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
+    m.MAVLINK_MSG_ID_PARAM_SET,
+    m.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST,
+    m.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ,
+    m.MAVLINK_MSG_ID_PARAM_EXT_SET,
+    m.MAVLINK_MSG_ID_FENCE_FETCH_POINT,
+    m.MAVLINK_MSG_ID_FENCE_POINT,
+    m.MAVLINK_MSG_ID_RALLY_FETCH_POINT,
+    m.MAVLINK_MSG_ID_RALLY_POINT,
+    m.MAVLINK_MSG_ID_LOG_REQUEST_LIST,
+    m.MAVLINK_MSG_ID_LOG_REQUEST_DATA,
+    m.MAVLINK_MSG_ID_LOG_REQUEST_END,
+}
+_ITEMS = frozenset({m.MAVLINK_MSG_ID_MISSION_ITEM, m.MAVLINK_MSG_ID_MISSION_ITEM_INT})
+_SET_RATE = int(m.MAV_CMD_SET_MESSAGE_INTERVAL)
+_REQUEST_STREAM = int(m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM)
+#: FTP: opcodes that read or end a session (https://mavlink.io/en/services/ftp.html); others write files.
+_FTP_READS = frozenset({0, 1, 2, 3, 4, 5, 14, 15, 128, 129})
+
+#: Offset of the command number in the payload of both command messages.
 _COMMAND_AT = slice(28, 30)
-#: Where the result stands in a MISSION_ACK.
+#: Offset of the result in a MISSION_ACK.
 _RESULT_AT = 2
+#: Offset of `current` in both item messages; 2 and 3 are "fly to here" and "change altitude", not part of a list.
+_CURRENT_AT = 35
+#: Offset of the opcode in FILE_TRANSFER_PROTOCOL: three bytes of target, then the FTP header.
+_OPCODE_AT = 6
+
+#: Offsets of the sign bit of SET_MESSAGE_INTERVAL's param2, and of REQUEST_DATA_STREAM's rate and start_stop.
+_INTERVAL_SIGN_AT = 7
+_STREAM_RATE_AT, _STREAM_STARTS_AT = slice(0, 2), 5
 
 _SETUP = "set the key in naze-bridge's settings"
 _ADDRESS = "this address may only read"
+#: At most 50 characters with "Refused: ".
+_NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
+
+
+class Standing(Enum):
+    """What a peer has shown of itself."""
+
+    LISTENER = "may only read"
+    OPEN = "its link asks for nothing"
+    PROVEN = "has the key or the address that its link asks for"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,72 +124,132 @@ _OPEN = LinkAccess()
 
 
 class GuardRefusal(NamedTuple):
-    """Why a frame is not let in; `is_first`: for this reason, of this peer. `is_told`: whether the sender may know."""
+    """Why a frame is not let in.
+
+    `is_first`: for this reason, of this peer. `is_forged`: the peer has the key, but this frame is not signed with it
+    or a copy. It gets no answer and has no effect, not even on when the peer was last heard.
+    """
 
     why: str
     is_first: bool
-    is_told: bool
+    is_forged: bool
 
 
 class Guard:
-    """Lets in what may come in, counts the rest, and tells of it once for each peer and reason."""
+    """Decides what may come in from which peer, counts the rest, and logs it once for each peer and reason.
 
-    def __init__(self, links: Mapping[str, LinkAccess], log_event: EventLog) -> None:
+    `passes_everything`: an autopilot that speaks MAVLink for itself gets all commands over open links, too.
+    """
+
+    def __init__(
+        self, links: Mapping[str, LinkAccess], log_event: EventLog, *, passes_everything: bool = False
+    ) -> None:
         self._links = links
         self._log_event = log_event
-        self._proven: set[Peer] = set()
+        self._passes_everything = passes_everything
+        self._signed: set[Peer] = set()
         self._told: dict[Peer, set[str]] = {}
         #: How often something was refused: (link, why).
         self.refused: Counter[tuple[str, str]] = Counter()
 
+    def standing(self, peer: Peer) -> Standing:
+        """What a peer may do, as far as it has shown."""
+        access = self._links.get(peer.link, _OPEN)
+        if access.signing is None and access.may_write is None:
+            return Standing.OPEN
+        has_key = access.signing is None or peer in self._signed
+        has_address = access.may_write is None or access.may_write(peer)
+        return Standing.PROVEN if has_key and has_address else Standing.LISTENER
+
     def refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
-        """Say why a frame is not let in; None: it is."""
-        why = self._reason(peer, frame)
-        if why is None:
+        """Why a frame is not let in; None: it is."""
+        access = self._links.get(peer.link, _OPEN)
+        # Frames that only ask are checked, too: each valid one makes older recordings worthless.
+        check = Check.VALID if access.signing is None else access.signing.check(frame)
+        was_signing = peer in self._signed
+        if access.signing is not None and check is Check.VALID:
+            self._signed.add(peer)
+        if frame.msgid == m.MAVLINK_MSG_ID_SETUP_SIGNING:
+            return self._refuse(peer, frame, _SETUP)
+        if check is not Check.VALID and was_signing:
+            # The network's second copy of a frame, or another sender in this peer's name.
+            return self._refuse(peer, frame, str(check.value), is_forged=True)
+        if only_reads(frame):
             return None
+        if check is not Check.VALID:
+            return self._refuse(peer, frame, str(check.value))
+        if access.may_write is not None and not access.may_write(peer):
+            return self._refuse(peer, frame, _ADDRESS)
+        return None
+
+    def command_refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
+        """Why a frame is not passed to an autopilot that obeys it: it might arm, disarm, steer or restart.
+
+        For frames that `refusal` let in. A link without a key or addresses proves nothing.
+        """
+        if self._passes_everything or self.standing(peer) is Standing.PROVEN or not may_command(frame):
+            return None
+        return self._refuse(peer, frame, _NOT_OVER_OPEN_LINK)
+
+    def forget(self, peer: Peer) -> None:
+        """A ground station is gone."""
+        self._signed.discard(peer)
+        self._told.pop(peer, None)
+
+    def _refuse(self, peer: Peer, frame: MavlinkFrame, why: str, *, is_forged: bool = False) -> GuardRefusal:
         self.refused[peer.link, why] += 1
         told = self._told.setdefault(peer, set())
-        is_first = why not in told
+        is_first = why not in told and not _asks_for_rates(frame)
         if is_first:
             told.add(why)
             station = Station(peer, frame.sysid, frame.compid)
             self._log_event("warning", "gcs.refused", station=str(station), message=_name(frame), why=why)
-        # Whoever has shown the key is not told of wrong signatures: this is the network's second copy of what he sent,
-        # or somebody who sends in his name so that a refusal may end his upload.
-        return GuardRefusal(why, is_first, is_told=peer not in self._proven or why in (_ADDRESS, _SETUP))
-
-    def forget(self, peer: Peer) -> None:
-        """A ground station is gone."""
-        self._proven.discard(peer)
-        self._told.pop(peer, None)
-
-    def _reason(self, peer: Peer, frame: MavlinkFrame) -> str | None:
-        if frame.msgid == m.MAVLINK_MSG_ID_SETUP_SIGNING:
-            return _SETUP
-        access = self._links.get(peer.link, _OPEN)
-        # Frames that only ask are checked, too: each valid one makes older recordings worthless.
-        check = Check.VALID if access.signing is None else access.signing.check(frame)
-        if access.signing is not None and check is Check.VALID:
-            self._proven.add(peer)
-        if only_reads(frame):
-            return None
-        if check is not Check.VALID:
-            return str(check.value)
-        if access.may_write is not None and not access.may_write(peer):
-            return _ADDRESS
-        return None
+        return GuardRefusal(why, is_first, is_forged)
 
 
 def only_reads(frame: MavlinkFrame) -> bool:
-    """Tell whether a frame changes nothing, whoever sent it."""
+    """True if a frame changes nothing, for its sender and for others."""
     msgid = frame.msgid
     if msgid in _COMMANDS:
-        # MAVLink 2 leaves trailing zeros out.
-        return int.from_bytes(frame.payload[_COMMAND_AT], "little") in _QUESTIONS
+        return _command(frame) in _QUESTIONS
     if msgid == m.MAVLINK_MSG_ID_MISSION_ACK:
         # Thanks for a list that was read; any other result would end somebody's transfer.
         return not any(frame.payload[_RESULT_AT : _RESULT_AT + 1])
     return msgid in _READS
+
+
+def may_command(frame: MavlinkFrame) -> bool:
+    """True if a frame might arm, disarm, steer or restart an autopilot that obeys it."""
+    msgid, payload = frame.msgid, frame.payload
+    if _asks_for_rates(frame):
+        # They hold for all ground stations: one may ask for more, but not silence the vehicle.
+        return _silences(frame)
+    if msgid in _COMMANDS:
+        return _command(frame) not in _QUESTIONS
+    if msgid in _ITEMS:
+        return payload[_CURRENT_AT : _CURRENT_AT + 1] > b"\1"
+    if msgid == m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
+        return int.from_bytes(payload[_OPCODE_AT : _OPCODE_AT + 1]) not in _FTP_READS
+    return msgid not in _PASSES_OPEN
+
+
+def _asks_for_rates(frame: MavlinkFrame) -> bool:
+    if frame.msgid in _COMMANDS:
+        return _command(frame) == _SET_RATE
+    return frame.msgid == _REQUEST_STREAM
+
+
+def _silences(frame: MavlinkFrame) -> bool:
+    """True if a request for a rate asks for none: an interval below 0, a rate of 0, or a stream's end."""
+    payload = frame.payload.ljust(_CURRENT_AT, b"\0")
+    if frame.msgid in _COMMANDS:
+        return bool(payload[_INTERVAL_SIGN_AT] & 0x80)
+    return not (any(payload[_STREAM_RATE_AT]) and payload[_STREAM_STARTS_AT])
+
+
+def _command(frame: MavlinkFrame) -> int:
+    # MAVLink 2 leaves trailing zeros out.
+    return int.from_bytes(frame.payload[_COMMAND_AT], "little")
 
 
 def denial(message: Message, station: Station) -> Message | None:

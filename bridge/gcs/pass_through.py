@@ -44,12 +44,17 @@ class PassThrough:
         """Tell whether a system was heard on the autopilot's side."""
         return any(system == sysid for sysid, _ in self._aboard)
 
-    def from_station(self, peer: Peer, frame: MavlinkFrame) -> bool:
-        """Send a frame that the guard has let in on to other stations; tell whether it is for the autopilot, too."""
+    def from_station(self, peer: Peer, frame: MavlinkFrame, *, to_stations: bool = True) -> bool:
+        """Send a frame that the guard has let in on to other stations; True if it is for the autopilot, too.
+
+        `to_stations` False: its sender may only read, and speaks to no other station.
+        """
         speaker = frame.sysid, frame.compid
         if speaker in self._aboard:
             # The autopilot's own frame, come back by a router that sends everything everywhere.
             return False
+        if not to_stations:
+            return target_of(frame)[0] == 0 or self.is_aboard(target_of(frame)[0])
         behind = self._heard.setdefault(peer, set())
         if len(behind) < _MAX_SPEAKERS:
             behind.add(speaker)

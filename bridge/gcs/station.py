@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
+from bridge.gcs.cost import Cost
 from protocols.mavlink.dialect import Message
 
 
@@ -15,6 +16,11 @@ class Peer:
 
     link: str
     key: Hashable
+
+    @property
+    def host(self) -> Hashable:
+        """The machine: several peers may be on one."""
+        return self.key[0] if isinstance(self.key, tuple) else self.key
 
     def __str__(self) -> str:
         address = ":".join(str(part) for part in self.key[:2]) if isinstance(self.key, tuple) else str(self.key)
@@ -47,6 +53,9 @@ class Post(Protocol):
 
     def to(self, station: Station, message: Message) -> None:
         """Send to one ground station."""
+
+    def allows(self, station: Station, cost: Cost) -> bool:
+        """Count something that a ground station makes the bridge do; False if that is too much."""
 
     def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
         """Show a text (STATUSTEXT) on one ground station, or on every one."""

@@ -56,11 +56,14 @@ _OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 class MissionService:
     """Holds the lock of the one transfer, the dialect of the present flight controller, and the list it holds.
 
-    `on_ending` is told of each mission that was dealt with.
+    `on_ending` is told of each mission that was dealt with. `is_armed`: as far as telemetry says.
     """
 
-    def __init__(self, on_ending: Callable[[ArrivedMission, Delivery], None]) -> None:
+    def __init__(
+        self, on_ending: Callable[[ArrivedMission, Delivery], None], is_armed: Callable[[], bool | None]
+    ) -> None:
         self._on_ending = on_ending
+        self._is_armed = is_armed
         self._dialect: AnyFcMissionStore | None = None
         self._refusal = NO_LINK
         self._owner: object | None = None
@@ -92,6 +95,10 @@ class MissionService:
         self._owner = owner
         return None
 
+    def armed_refusal(self) -> Refusal | None:
+        """The refusal if the craft is known to be armed: the board need not be asked, and has other things to do."""
+        return ARMED if self._dialect is not None and self._is_armed() else None
+
     def close(self) -> None:
         """Begin no more transfers, because the bridge is about to end."""
         self._closed = True
@@ -103,6 +110,8 @@ class MissionService:
 
     def preflight(self) -> Conversation[StoreReport | Refusal]:
         """Ask the flight controller whether it would take a list now."""
+        if (armed := self.armed_refusal()) is not None:
+            return armed
         waited_s = 0.0
         try:
             while True:
@@ -134,14 +143,21 @@ class MissionService:
             return NO_LINK
         return NO_LINK if report is None else report.rules
 
-    def deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Conversation[Delivery]:
-        """Store the mission, bring it to the flight controller if the rules let it, store how that ended."""
-        delivery = yield from self._deliver(arrived, progress)
+    def deliver(
+        self, arrived: ArrivedMission, progress: Callable[[int], None], *, is_kept: bool = True
+    ) -> Conversation[Delivery]:
+        """Store the mission, bring it to the flight controller if the rules let it, store how that ended.
+
+        `is_kept` False: too many lists came to store this one.
+        """
+        delivery = yield from self._deliver(arrived, progress, is_kept=is_kept)
         self._on_ending(arrived, delivery)
         return delivery
 
-    def _deliver(self, arrived: ArrivedMission, progress: Callable[[int], None]) -> Conversation[Delivery]:
-        number = yield from save(arrived)
+    def _deliver(
+        self, arrived: ArrivedMission, progress: Callable[[int], None], *, is_kept: bool
+    ) -> Conversation[Delivery]:
+        number = (yield from save(arrived)) if is_kept else None
         verdict = arrived.verdict
         if verdict.result is Result.REJECTED:
             reason = verdict.findings[-1].text()

@@ -15,6 +15,7 @@ from bridge.fc.actions import (
     FcAction,
     FcActions,
 )
+from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.station import Post, Severity, Station
 from bridge.vehicle.own_vehicle import OwnVehicle
 from protocols.mavlink.command_result import CommandResult
@@ -87,12 +88,15 @@ class CommandService:
         elif self._actions.present == action:
             # Its user is impatient, or the network doubled it.
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
+        elif not self._post.allows(station, Cost.FLASH):
+            self._post.say(Severity.ERROR, TOO_MANY_WRITES, station)
+            self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:
             self._actions.start(action, lambda outcome: self._acted(station, command, outcome), now)
 
-    def refuse_mode(self) -> None:
+    def refuse_mode(self, station: Station) -> None:
         """SET_MODE has no acknowledgement; the text is all there is."""
-        self._post.say(Severity.ERROR, _REFUSED[messages.MAV_CMD_DO_SET_MODE])
+        self._post.say(Severity.ERROR, _REFUSED[messages.MAV_CMD_DO_SET_MODE], station)
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
         self._post.to(
@@ -102,7 +106,7 @@ class CommandService:
 
     def _acted(self, station: Station, command: int, outcome: ActionResult) -> None:
         result = _OUTCOMES[outcome]
-        self._post.say(Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR, outcome.value)
+        self._post.say(Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR, outcome.value, station)
         self._acknowledge(station, command, result)
 
     def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:
@@ -114,12 +118,12 @@ class CommandService:
             case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
                 return self._tell_interval(station, _msgid(params[0]))
             case messages.MAV_CMD_DO_SEND_BANNER:
-                self._post.say(Severity.INFO, self._banner())
+                self._post.say(Severity.INFO, self._banner(), station)
                 return CommandResult.ACCEPTED
         if command in _ASKS_FOR:
             return self._send_once(station, _ASKS_FOR[command])
         if command in _REFUSED:
-            self._post.say(Severity.ERROR, _REFUSED[command])
+            self._post.say(Severity.ERROR, _REFUSED[command], station)
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
 

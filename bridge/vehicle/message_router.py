@@ -4,6 +4,7 @@
 from collections.abc import Callable
 from math import inf
 
+from bridge.gcs.cost import Cost
 from bridge.gcs.station import Post, Severity, Station
 from bridge.vehicle import vehicle_messages
 from bridge.vehicle.commands import CommandService
@@ -19,6 +20,18 @@ from protocols.mission_item import MissionItem, MissionResult
 
 #: MISSION_ITEM.current of what is no part of a list: Mission Planner's "Fly to here" and "Change altitude".
 _GUIDED = (2, 3)
+
+#: A mission transfer is as fast as both ends can be; other messages are seldom.
+_OF_A_TRANSFER = frozenset(
+    {
+        m.MAVLINK_MSG_ID_MISSION_COUNT,
+        m.MAVLINK_MSG_ID_MISSION_ITEM,
+        m.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST,
+        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+        m.MAVLINK_MSG_ID_MISSION_ACK,
+    }
+)
 
 _Handler = Callable[[Station, Message, float], None]
 
@@ -64,7 +77,7 @@ class MessageRouter:
                 s, msg.command, (msg.param1, msg.param2, msg.param3, msg.param4, msg.x, msg.y, msg.z), now
             ),
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
-            m.MAVLINK_MSG_ID_SET_MODE: lambda _s, _msg, _now: commands.refuse_mode(),
+            m.MAVLINK_MSG_ID_SET_MODE: lambda s, _msg, _now: commands.refuse_mode(s),
             m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, _now: post.to(
                 s, vehicle_messages.autopilot_version()
             ),
@@ -83,8 +96,10 @@ class MessageRouter:
         return msgid in self._handlers
 
     def take(self, station: Station, message: Message, now: float) -> None:
-        """Deal with a message that `understands` said yes to."""
-        self._handlers[message.get_msgId()](station, message, now)
+        """Deal with a message that `understands` said yes to, unless its sender floods us."""
+        msgid = message.get_msgId()
+        if self._post.allows(station, Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
+            self._handlers[msgid](station, message, now)
 
     def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):

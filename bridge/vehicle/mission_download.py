@@ -4,6 +4,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bridge.gcs.cost import Cost
 from bridge.gcs.station import Post, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
@@ -96,7 +97,13 @@ class MissionDownloads:
         """Read the list once for all who wait for it: who hammers the bridge must not fill its queue."""
         if len(self._questions) < _MAX_QUESTIONS:
             self._questions[question] = None
-        if not self._is_reading:
+        if self._is_reading:
+            return
+        held = self._missions.held
+        if held is not None and (self._is_armed() or not self._post.allows(question.station, Cost.BOARD)):
+            # Armed it cannot have changed; and a station that asks too often gets the copy.
+            self._read(held, now)
+        else:
             self._is_reading = True
             self._runner.start(self._missions.read_back(), self._read, now)
 

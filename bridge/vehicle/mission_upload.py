@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.station import Peer, Post, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
@@ -30,6 +31,7 @@ from protocols.mission_item import MissionItem, MissionResult
 MISSION_TYPE_MISSION = 0
 MISSION_TYPE_ALL = 255
 _GIVE_UP_S = 5.0
+_TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 
 
 class Phase(Enum):
@@ -113,7 +115,7 @@ class MissionUploads:
             self._end(now)
         self._answers.forget(station)
         transfer = _Transfer(self._incidents.begin("upload"), station, count)
-        refusal = self._missions.acquire(station)
+        refusal = self._missions.armed_refusal() or self._limit(station) or self._missions.acquire(station)
         if refusal is not None:
             self._refuse(transfer, refusal, now)
             return
@@ -248,6 +250,9 @@ class MissionUploads:
             return None
         return min(transfer.request.due, transfer.progress_at + _GIVE_UP_S)
 
+    def _limit(self, station: Station) -> Refusal | None:
+        return None if self._post.allows(station, Cost.BOARD) else _TOO_MANY_UPLOADS
+
     def _asked(self, answer: StoreReport | Refusal | LinkLost, now: float) -> None:
         self._is_asking = False
         if isinstance(answer, LinkLost):
@@ -318,13 +323,21 @@ class MissionUploads:
 
     def _deliver(self, transfer: _Transfer, verdict: Verdict[Any], items: tuple[MissionItem, ...], now: float) -> None:
         self._transfer = transfer
+        is_rejected = verdict.result is Result.REJECTED
+        if not is_rejected and not self._post.allows(transfer.station, Cost.FLASH):
+            self._abandon(transfer, Refusal(MissionResult.DENIED, TOO_MANY_WRITES), now)
+            return
         transfer.phase = Phase.DELIVERING
         arrived = ArrivedMission(str(transfer.station), items, verdict)
         self._runner.start(
-            self._missions.deliver(arrived, _ignore),
+            self._missions.deliver(arrived, _ignore, is_kept=not is_rejected or self._is_kept(transfer)),
             lambda delivery, at: self._delivered(transfer, arrived, delivery, at),
             now,
         )
+
+    def _is_kept(self, transfer: _Transfer) -> bool:
+        """False if so many lists came from there that were not flown that this one is not stored."""
+        return self._post.allows(transfer.station, Cost.STORED)
 
     def _delivered(
         self, transfer: _Transfer, arrived: ArrivedMission, delivery: Delivery | LinkLost, now: float
@@ -375,7 +388,8 @@ class MissionUploads:
             finding = Finding(None, "list", len(items), None, refusal.text)
             verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
             arrived = ArrivedMission(str(transfer.station), items, verdict)
-            self._runner.start(self._missions.deliver(arrived, _ignore), lambda _delivery, _at: None, now)
+            delivery = self._missions.deliver(arrived, _ignore, is_kept=self._is_kept(transfer))
+            self._runner.start(delivery, lambda _delivery, _at: None, now)
         self._end(now)
         self._refuse(transfer, refusal, now)
 

@@ -51,9 +51,10 @@ class OwnVehicle:
         self._also_wanted: Mapping[type[Reading], float] = {}
         self._announced: tuple[bool | None, FlightMode | str | None] | None = None
 
-    def newcomer(self) -> None:
-        """Somebody new is there: who comes later must hear of home, too."""
+    def newcomer(self, peer: Peer) -> None:
+        """Greet a ground station that was just heard for the first time; it must hear of home, too."""
         self._announced_home = None
+        self._ground.greet(peer, self._make_heartbeat())
 
     def tick(self, now: float) -> None:
         """Send what comes every second."""
@@ -166,10 +167,12 @@ class OwnVehicle:
 
     def _heartbeat(self) -> Message:
         self._announced = self._shown_state()
-        is_linked = self._session.controller is not None
-        heartbeat = vehicle_messages.heartbeat(self._session.vehicle, linked=is_linked)
+        heartbeat = self._make_heartbeat()
         self._ground.broadcast(heartbeat)
         return heartbeat
+
+    def _make_heartbeat(self) -> Message:
+        return vehicle_messages.heartbeat(self._session.vehicle, linked=self._session.controller is not None)
 
     def _mission_current(self) -> Message:
         held = self._missions.held

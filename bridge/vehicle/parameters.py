@@ -3,6 +3,7 @@
 
 import math
 
+from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.station import Post, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
@@ -47,7 +48,7 @@ class Parameters:
             self._send(station, name)
             return
         if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
-            self._post.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm")
+            self._post.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm", station)
             self._send(station, name)
             return
         # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
@@ -59,13 +60,21 @@ class Parameters:
         if self._is_setting:
             # Its answer is on the way; who asked for another value asks again.
             return
+        if self._missions.armed_refusal() is not None:
+            self._post.say(Severity.ERROR, _stays(dialect.wp_radius_cm), station)
+            self._send(station, name)
+            return
+        if not self._post.allows(station, Cost.FLASH):
+            self._post.say(Severity.ERROR, TOO_MANY_WRITES, station)
+            self._send(station, name)
+            return
 
         def done(radius_cm: int | LinkLost | None, _at: float) -> None:
             self._is_setting = False
             if radius_cm is None or isinstance(radius_cm, LinkLost):
-                self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer")
+                self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer", station)
             elif radius_cm != wanted_cm:
-                self._post.say(Severity.ERROR, f"{WP_RADIUS} stays {radius_cm}: disarm, or try again")
+                self._post.say(Severity.ERROR, _stays(radius_cm), station)
             self._send(station, name)
 
         self._is_setting = True
@@ -88,3 +97,7 @@ class Parameters:
         return messages.MAVLink_param_value_message(
             name.encode(), values[name], _REAL32, len(values), list(values).index(name)
         )
+
+
+def _stays(radius_cm: int) -> str:
+    return f"{WP_RADIUS} stays {radius_cm}: disarm, or try again"

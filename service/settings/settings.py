@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
@@ -26,6 +27,13 @@ class TlogLimits:
     days: int = 30
 
 
+class PassThroughRule(Enum):
+    """What an autopilot that speaks MAVLink for itself gets over links without a key or a list of writers."""
+
+    MISSIONS = "missions"
+    EVERYTHING = "everything"
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
@@ -42,6 +50,7 @@ class Settings:
     tlog: TlogLimits | None = None
     record_uart: Path | None = None
     autopilot: Autopilot = Autopilot.AUTO
+    pass_through: PassThroughRule = PassThroughRule.MISSIONS
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
     zenoh: ZenohSettings | None = None
     web: WebSettings | None = None

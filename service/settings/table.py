@@ -12,6 +12,7 @@ from service.settings.settings import (
     DEFAULT_GCS,
     DEFAULT_LOG_LEVEL,
     DEFAULT_SYSID,
+    PassThroughRule,
     TlogLimits,
 )
 from service.web.settings import DEFAULT_LISTEN, parse_listen
@@ -71,6 +72,13 @@ KEYS = (
         Choice([each.value for each in Autopilot], Autopilot),
         'Whose MAVLink is heard on the port: "auto" finds out, "harakiri" is served, "other" is passed through.',
         f'"{Autopilot.AUTO.value}"',
+    ),
+    Key(
+        "pass_through",
+        Choice([each.value for each in PassThroughRule], PassThroughRule),
+        "What an autopilot that is passed through gets over links with neither key_file nor writers: "
+        '"missions" (and parameters and requests), or "everything": arming, modes and steering, too.',
+        f'"{PassThroughRule.MISSIONS.value}"',
     ),
     Key("record_tlog", YesNo(), "Whether telemetry is recorded, for Mission Planner to replay.", "true"),
     Key("tlog_file_mb", Whole(1, 1024), "Size of one telemetry log, megabytes, 1..1024.", str(_LIMITS.file_size >> 20)),

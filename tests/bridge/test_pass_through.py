@@ -51,10 +51,12 @@ class Autopilot(QuietLine):
         return min(super().next_wakeup(now), self._due)
 
 
-def passing(autopilot: Autopilot | None = None, stations: int = 2) -> tuple[World, Autopilot, list[GroundStation]]:
-    """An autopilot that was found, and ground stations that were heard."""
+def passing(
+    autopilot: Autopilot | None = None, stations: int = 2, *, everything: bool = False
+) -> tuple[World, Autopilot, list[GroundStation]]:
+    """An autopilot that was found, and ground stations that were heard. `everything`: commands pass an open link."""
     autopilot = autopilot or Autopilot()
-    world = World(peer=autopilot)
+    world = World(peer=autopilot, passes_everything=everything)
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     heard = [GroundStation(world, f"gcs{number}", sysid=255 - number) for number in range(stations)]
     for station in heard:
@@ -99,7 +101,7 @@ def test_nothing_of_our_own_is_said_where_the_autopilot_speaks() -> None:
 
 
 def test_what_ground_stations_send_arrives_as_it_was_sent() -> None:
-    world, autopilot, (one, other) = passing()
+    world, autopilot, (one, other) = passing(everything=True)
     sent = b""
     for message in (
         mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),

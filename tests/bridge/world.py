@@ -118,6 +118,7 @@ class World:
         late_s: float = 0.0,
         links: Mapping[str, LinkAccess] | None = None,
         profiles: Sequence[Profile] = PROFILES,
+        passes_everything: bool = False,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
@@ -135,7 +136,8 @@ class World:
         self._plugged = False
         self._late_s = late_s
         self._lateness_s = 0.0
-        self.bridge = Bridge(BridgeConfig(speeds, links=links or {}, profiles=profiles), self._note, self.now)
+        config = BridgeConfig(speeds, links=links or {}, profiles=profiles, passes_everything=passes_everything)
+        self.bridge = Bridge(config, self._note, self.now)
         if powered:
             self.naze.power_on_booted(self.now)
         if plugged:
