@@ -280,8 +280,9 @@ class Bridge:
         if self._pass_through is None:
             answers, is_vehicle = partial(self.ground.to, station), self._is_ours(system, component)
         else:
-            answers = partial(self.ground.to_as, system, component or _AUTOPILOT, station)
-            is_vehicle = self._pass_through.is_aboard(system)
+            asked = self._pass_through.addressed(system)
+            answers = partial(self.ground.to_as, asked or system, component or _AUTOPILOT, station)
+            is_vehicle = asked is not None
         if not (is_vehicle and self.ground.allows(station, Cost.ANSWER)):
             return
         message = self._decoder.decode(frame)

@@ -44,6 +44,10 @@ class PassThrough:
         """Tell whether a system was heard on the autopilot's side."""
         return any(system == sysid for sysid, _ in self._aboard)
 
+    def addressed(self, system: int) -> int | None:
+        """The system on the autopilot's side that a frame for `system` is meant for (0: any); None: none."""
+        return next((sysid for sysid, _ in self._aboard if system in (0, sysid)), None)
+
     def from_station(self, peer: Peer, frame: MavlinkFrame, *, to_stations: bool = True) -> bool:
         """Send a frame that the guard has let in on to other stations; True if it is for the autopilot, too.
 

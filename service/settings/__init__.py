@@ -5,4 +5,12 @@ from service.settings.load import default_state_dir, load_settings
 from service.settings.problem import SettingsError
 from service.settings.settings import DEFAULT_GCS, PassThroughRule, Settings, TlogLimits
 
-__all__ = ["DEFAULT_GCS", "PassThroughRule", "Settings", "SettingsError", "TlogLimits", "default_state_dir", "load_settings"]
+__all__ = [
+    "DEFAULT_GCS",
+    "PassThroughRule",
+    "Settings",
+    "SettingsError",
+    "TlogLimits",
+    "default_state_dir",
+    "load_settings",
+]

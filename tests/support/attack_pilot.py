@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pilot under attack, whose heartbeats are counted, and strangers that speak without listening."""
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from plain_station import PlainStation
+from plan import PlanRow, judge, records_of
+from programs import Board
+from soak import Stalls, Witness
+
+from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.signing import key_from_passphrase, ticks
+from protocols.mission_item import MissionResult
+
+m = messages
+#: The heartbeat of a ground station.
+HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+#: A vehicle's heartbeat comes every second.
+LONGEST_GAP_S = 1.1
+
+
+class Stranger:
+    """One socket of an attacker. It reads nothing unless asked to."""
+
+    def __init__(self, address: tuple[str, int], host: str = "127.0.0.1", sysid: int = 99, key: bytes | None = None):
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind((host, 0))
+        self._socket.connect(address)
+        self._codec: Any = m.MAVLink(None, srcSystem=sysid, srcComponent=190)
+        if key is not None:
+            self._codec.signing.secret_key, self._codec.signing.sign_outgoing = key, True
+
+    def send(self, *spoken: Message) -> None:
+        for message in spoken:
+            try:
+                self._socket.send(bytes(message.pack(self._codec)))
+            except ConnectionRefusedError:
+                continue
+
+    def heard(self) -> list[Any]:
+        """What has come so far."""
+        found: list[Any] = []
+        self._socket.setblocking(False)
+        while True:
+            try:
+                found += self._codec.parse_buffer(self._socket.recv(2048)) or []
+            except BlockingIOError:
+                return found
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class Attack(threading.Thread):
+    """Does something over and over, `per_s` times a second, until it is over."""
+
+    def __init__(self, deed: Callable[[], None], per_s: float) -> None:
+        super().__init__(daemon=True)
+        self._deed = deed
+        self._pause_s = 1 / per_s
+        self._over = threading.Event()
+        self.count = 0
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        self.join()
+
+    def run(self) -> None:
+        due = time.monotonic()
+        while not self._over.is_set():
+            self._deed()
+            self.count += 1
+            due = max(due + self._pause_s, time.monotonic() - 0.1)
+            self._over.wait(max(0.0, due - time.monotonic()))
+
+
+class Watch:
+    """Watches the pilot's heartbeats while it is entered; at the end none may have been missing."""
+
+    def __init__(self, address: tuple[str, int]) -> None:
+        self._stalls = Stalls()
+        self._witness = Witness(address, self._stalls)
+
+    def __enter__(self) -> Witness:
+        self._stalls.start()
+        self._witness.start()
+        return self._witness
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._witness.end()
+        self._stalls.end()
+        if kind is None:
+            assert len(self._witness.gaps_s) >= 2
+            assert max(self._witness.gaps_s) <= LONGEST_GAP_S, self._witness.gaps_s
+            assert self._witness.damaged == []
+
+
+def assert_uploads(pilot: PlainStation, board: Board, plan: Sequence[PlanRow]) -> None:
+    """The pilot's list is accepted, and it is what the board holds."""
+    assert pilot.upload(plan) is MissionResult.ACCEPTED
+    assert board.records() == records_of(judge(plan))
+
+
+def sign(codec: Any, passphrase: str) -> None:
+    """Sign what a pymavlink codec packs from now on."""
+    codec.signing.secret_key, codec.signing.sign_outgoing = key_from_passphrase(passphrase), True
+    codec.signing.timestamp = ticks(time.time())
