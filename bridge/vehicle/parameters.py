@@ -44,7 +44,7 @@ class Parameters:
         dialect = self._missions.dialect
         if name != WP_RADIUS or dialect is None or dialect.wp_radius_cm is None:
             if name == WP_RADIUS:
-                self._post.say(Severity.ERROR, f"{WP_RADIUS} cannot be set on this flight controller now")
+                self._post.say(Severity.ERROR, f"{WP_RADIUS} cannot be set on this flight controller now", station)
             self._send(station, name)
             return
         if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
