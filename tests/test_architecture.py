@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Imports run one way: service -> bridge -> protocols, storage below service, and downwards inside bridge/."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[1]
+#: The packages that each one may import besides itself.
+BRIDGE = {
+    "bridge.model": set[str](),
+    "bridge.line": {"bridge.model"},
+    "bridge.missions": {"bridge.line", "bridge.model"},
+    "bridge.fc": {"bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.controllers": {"bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.gcs": {"bridge.model"},
+    "bridge.vehicle": {"bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
+}
+PACKAGES = {
+    "protocols": set[str](),
+    "storage": set[str](),
+    "simulator": {"protocols"},
+    "bridge": {"protocols"},
+    "service": {"bridge", "protocols", "simulator", "storage"},
+}
+#: Owning a clock, a port or a loop is for service/ and simulator/.
+IMPURE = {"asyncio", "selectors", "serial", "socket", "subprocess", "threading", "time"}
+
+
+def imports(folder: Path) -> Iterator[tuple[str, str]]:
+    """Each file below a folder with each module that it imports."""
+    for file in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                # `from bridge.vehicle import vehicle_messages` imports a module, too.
+                yield from ((str(file), f"{node.module}.{alias.name}") for alias in node.names)
+            elif isinstance(node, ast.Import):
+                yield from ((str(file), alias.name) for alias in node.names)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_between_packages(package: str) -> None:
+    ours = PACKAGES.keys() - PACKAGES[package] - {package}
+    assert [(file, name) for file, name in imports(REPOSITORY / package) if name.split(".")[0] in ours] == []
+
+
+@pytest.mark.parametrize("package", BRIDGE)
+def test_inside_the_bridge(package: str) -> None:
+    allowed = BRIDGE[package] | {package}
+    found = [
+        (file, name)
+        for file, name in imports(REPOSITORY / package.replace(".", "/"))
+        if name.startswith("bridge.") and ".".join(name.split(".")[:2]) not in allowed
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("package", ["protocols", "bridge"])
+def test_no_clock_and_no_ports(package: str) -> None:
+    assert [(file, name) for file, name in imports(REPOSITORY / package) if name.split(".")[0] in IMPURE] == []
