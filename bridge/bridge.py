@@ -40,6 +40,7 @@ from bridge.vehicle.local_missions import LocalMissions
 from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.mission_download import MissionDownloads
 from bridge.vehicle.mission_upload import MissionUploads
+from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.vehicle_report import VehicleReporter
@@ -111,6 +112,7 @@ class Bridge:
             self.missions, self.runner, self.ground, log_event, self._incidents, home, self.ground.moved_to
         )
         self.local = LocalMissions(self.missions, self.runner, self.ground, log_event, self._incidents, home)
+        self._watch = MissionWatch(self.missions, self.runner, self.ground, log_event)
         self._downloads = MissionDownloads(self.missions, self.runner, self.ground, self._is_armed, home)
         self._parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
@@ -251,6 +253,7 @@ class Bridge:
         self._pass_on_news(now)
         self.runner.tick(now)
         self._uploads.tick(now)
+        self._watch.tick(now)
         for peer in self.ground.expire(now):
             self._left(peer)
         self._say(self._announcer.tick(now))
@@ -265,6 +268,7 @@ class Bridge:
             self._uploads.next_deadline(),
             self.ground.next_deadline(),
             self._announcer.next_deadline(),
+            self._watch.next_deadline(),
             self._vehicle.next_deadline() if self._pass_through is None else None,
         )
         return min((deadline for deadline in deadlines if deadline is not None), default=inf)
@@ -326,7 +330,7 @@ class Bridge:
         self._say(self._announcer.found(controller))
         if not isinstance(store, Refusal):
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
-            self.runner.start(self.missions.read_back(), lambda _held, _at: None, now)
+            self._watch.look(now)
 
     def _open_store(self, controller: FlightController | None) -> AnyFcMissionStore | Refusal:
         """How missions are written to this flight controller, or why not."""

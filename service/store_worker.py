@@ -83,7 +83,7 @@ class StoreWorker:
                     return True
                 case Recall(identity):
                     found = self._store.latest_verified(identity.count, identity.checksum)
-                    sent_as: Mapping[int, int] = {} if found is None else found.received.roi_commands
+                    sent_as: Mapping[int, int] | None = None if found is None else found.received.roi_commands
                     return sent_as
         except StoreError as error:
             _log.error("store.failed", why=str(error))

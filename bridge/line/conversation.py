@@ -152,7 +152,7 @@ def conclude(number: int, conclusion: Conclusion) -> Conversation[bool]:
     return bool(done)
 
 
-def recall(identity: ListIdentity) -> Conversation[Mapping[int, int]]:
-    """The commands that ambiguous records were sent with, by record number; empty if unknown."""
+def recall(identity: ListIdentity) -> Conversation[Mapping[int, int] | None]:
+    """The commands that ambiguous records were sent with, by record number; None: no such list was ever verified."""
     commands: Mapping[int, int] | None = yield Recall(identity)
-    return commands or {}
+    return commands

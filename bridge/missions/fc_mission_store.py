@@ -102,6 +102,48 @@ class FcMissionStore(Protocol[RecordT]):
     def seq_of(self, records: Sequence[RecordT], number: int) -> int:
         """Return the number of the item that record `number` (as NAV_STATUS counts, from 1) is shown as; 0: none."""
 
+    @property
+    def reads_armed(self) -> bool:
+        """Whether its list can be read while the craft is armed."""
+
+    @property
+    def others(self) -> tuple[tuple[RecordT, ...], ...]:
+        """Further missions in its store, as last read. Only one mission at a time is loaded and flown."""
+
+    def erased_by(self, records: Sequence[RecordT]) -> tuple[tuple[RecordT, ...], ...]:
+        """Those of `others` that do not fit beside a new list, and are erased when it is written."""
+
+    def is_current(self) -> Conversation[bool]:
+        """Ask whether it still holds the list that was last read or written; True if it does not answer."""
+
+    def reload(self) -> Conversation[bool | None]:
+        """Make it load its saved mission if it holds none. True: done, False: no need, None: not while armed."""
+
+
+class OneMission:
+    """The part of the seam for a board that keeps one mission, which only the bridge changes."""
+
+    reads_armed = False
+
+    @property
+    def others(self) -> tuple[tuple[Any, ...], ...]:
+        """None."""
+        return ()
+
+    def erased_by(self, records: Sequence[Any]) -> tuple[tuple[Any, ...], ...]:
+        """None."""
+        return ()
+
+    def is_current(self) -> Conversation[bool]:
+        """Always."""
+        yield from ()
+        return True
+
+    def reload(self) -> Conversation[bool | None]:
+        """It never forgets its mission."""
+        yield from ()
+        return False
+
 
 #: Whatever the present flight controller is.
 AnyFcMissionStore = FcMissionStore[Any]

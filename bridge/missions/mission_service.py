@@ -4,7 +4,7 @@
 Mission Planner over UDP (bridge.mission_upload, bridge.mission_download) and the command line go through this one desk.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from bridge.missions.list_check import MissionRules
 from bridge.missions.mission_texts import summary
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
 from bridge.model.refusal import ARMED, Refusal
-from bridge.model.verdict import Result
+from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
 
@@ -47,6 +47,18 @@ class HeldMission:
     items: tuple[MissionItem, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class MissionChange:
+    """A change of the flight controller's list that no ground station asked for, as a pilot reads it."""
+
+    text: str
+    is_warning: bool = False
+
+
+_NOT_LOADED = MissionChange("No mission is loaded: disarm to load the saved one", is_warning=True)
+_ERASED_SOURCE = "copy from the flight controller"
+_ERASED = "erased there to make room; `naze-bridge missions restore` writes it again"
+_NO_COPY = "Nothing written: a mission that does not fit beside it could not be copied to the Pi"
 NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
 _STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
@@ -68,12 +80,26 @@ class MissionService:
         self._refusal = NO_LINK
         self._owner: object | None = None
         self._closed = False
+        #: False until the present flight controller's list was read, and after a push that broke off.
+        self._is_settled = False
+        self._told_unloaded = False
         self.held: HeldMission | None = None
 
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
         """Work with another flight controller from now on; with a Refusal, every attempt gets it as the reply."""
         self._dialect, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
         self.held = None
+        self._is_settled = self._told_unloaded = False
+
+    @property
+    def others(self) -> tuple[HeldMission, ...]:
+        """Further missions in the flight controller's store, as last read."""
+        if self._dialect is None:
+            return ()
+        return tuple(
+            HeldMission(identify(records), records, self._dialect.items(records, {}))
+            for records in self._dialect.others
+        )
 
     @property
     def dialect(self) -> AnyFcMissionStore | None:
@@ -117,6 +143,7 @@ class MissionService:
             while True:
                 if self._dialect is None:
                     return self._refusal
+                yield from self._dialect.reload()
                 report = yield from self._dialect.report()
                 if report is None:
                     return NO_LINK
@@ -167,10 +194,13 @@ class MissionService:
         dialect = self._dialect
         if dialect is None:
             return (yield from self._conclude(number, Outcome.FAILED, self._refusal.ack, self._refusal.text))
+        if not (yield from self._copy_erased(dialect, verdict.records)):
+            return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
         result = yield from dialect.push(verdict.records, progress)
         if result.failure is not None:
             if result.failure in LIST_IS_GONE:
                 self.held = None
+                self._is_settled = False
             return (
                 yield from self._conclude(
                     number,
@@ -218,7 +248,7 @@ class MissionService:
                 return NO_LINK
             if self.held is not None and self.held.identity == report.stored:
                 return self._refreshed(dialect, self.held)
-            if report.state is StoreState.ARMED and report.stored is None:
+            if report.state is StoreState.ARMED and report.stored is None and not dialect.reads_armed:
                 return ARMED
             records = yield from dialect.pull()
             if records is None:
@@ -230,12 +260,49 @@ class MissionService:
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:
             return self._refreshed(dialect, self.held)
-        sent_as: Mapping[int, int] = yield from recall(identity)
-        held = HeldMission(identity, records, dialect.items(records, sent_as))
+        sent_as = yield from recall(identity)
+        held = HeldMission(identity, records, dialect.items(records, sent_as or {}))
         if dialect is self._dialect:
             # The store may take its time, and another flight controller be there by then.
             self.held = held
         return held
+
+    def watch(self) -> Conversation[MissionChange | None]:
+        """Look whether the flight controller still holds the list that was last read or written; what the pilot hears.
+
+        A new flight controller, or one on which a push broke off, is made to load its saved mission if it holds none.
+        """
+        dialect, is_first, before = self._dialect, not self._is_settled, self.held
+        if dialect is None or (not is_first and (yield from dialect.is_current())):
+            return None
+        is_reloaded = (yield from dialect.reload()) if is_first else False
+        held = yield from self.read_back()
+        if held is NO_LINK:
+            return None
+        self._is_settled = is_reloaded is not None
+        if is_reloaded is None:
+            is_news, self._told_unloaded = not self._told_unloaded, True
+            return _NOT_LOADED if is_news else None
+        if isinstance(held, Refusal) or (is_first and not (is_reloaded and held.records)):
+            return None
+        if is_reloaded:
+            is_ours = (yield from recall(held.identity)) is not None
+            again = "loaded again" if is_ours else "loaded, not written by naze-bridge"
+            return MissionChange(f"Saved mission {again}: {held.identity.count} records")
+        if before is not None and before.identity == held.identity:
+            return None
+        text = f"Mission on the flight controller changed: {held.identity.count} records"
+        return MissionChange(text, is_warning=True)
+
+    def _copy_erased(self, dialect: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
+        """Store what the new list leaves no room for; False if that fails."""
+        for mission in dialect.erased_by(records):
+            items = dialect.items(mission, {})
+            verdict = Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, mission, items)
+            number = yield from save(ArrivedMission(_ERASED_SOURCE, items, verdict))
+            if number is None or not (yield from conclude(number, Conclusion(Outcome.CANCELLED, _ERASED))):
+                return False
+        return True
 
     def _refreshed(self, dialect: AnyFcMissionStore, held: HeldMission) -> HeldMission:
         return replace(held, items=dialect.refreshed(held.items))

@@ -22,7 +22,9 @@ def summary(sent: int, verdict: Verdict[Any]) -> str | None:
     dropped = sum(finding.becomes == DROPPED for finding in warnings)
     relative = sum(finding.field == "frame" and finding.seq != 0 for finding in warnings)
     raised = sum(finding.field == "alt_m" and finding.becomes != DROPPED for finding in warnings)
-    counts = {"dropped": dropped, "heights relative": relative, "raised from 0": raised}
+    home = sum(finding.seq == 0 for finding in warnings)
+    differing = len(warnings) - dropped - relative - raised - home
+    counts = {"dropped": dropped, "heights relative": relative, "raised from 0": raised, "flown differently": differing}
     news = [f"{count} {what}" for what, count in counts.items() if count]
     return f"{len(verdict.items)} of {sent} stored: {', '.join(news) or 'look at home'}"
 

@@ -140,6 +140,9 @@ def encode_read_wp(number: int) -> bytes:
     return request(Nav.WP, bytes((number,)))
 
 
+#: Asks which of several missions in INAV's store is flown, counted from 1: a setting, read over MSP v2.
+SETTING = 0x1003
+SELECTED_REQUEST = request(SETTING, b"nav_wp_multi_mission_index\0")
 #: SAVE and LOAD have one byte, which means nothing yet; with any other length INAV refuses them.
 SAVE_REQUEST = request(Nav.SAVE, b"\0")
 LOAD_REQUEST = request(Nav.LOAD, b"\0")

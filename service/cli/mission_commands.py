@@ -38,35 +38,50 @@ def push(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) -> N
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.option("--all", "with_others", is_flag=True, help="Also read the missions in INAV's store that are not loaded.")
 @bridge_options
-def pull(file: Path | None, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def pull(file: Path | None, with_others: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Read the mission that the flight controller holds: into FILE, or as a table.
 
     FILE is written as QGC WPL 110, as a QGroundControl plan if it ends with .plan; - is standard output.
 
-    Exit code 0: read, 1: there is no link, or FILE cannot be written.
+    With --all, further missions go to FILE-2, FILE-3 and so on. Exit code 0: read, 1: there is no link, or FILE cannot
+    be written.
     """
     if as_json and file == _STANDARD_OUTPUT:
         raise click.UsageError("the file and --json cannot both go to standard output: leave one of them away")
+    if with_others and file == _STANDARD_OUTPUT:
+        raise click.UsageError("--all cannot write several missions to standard output: name a file")
     held = ask(state_dir, fc, {"do": "pull"})
+    others = held["others"] if with_others else []
+    summaries = [_show_held(held, file, is_quiet=as_json)]
+    for number, other in enumerate(others, 2):
+        summaries.append(_show_held(other, file and file.with_stem(f"{file.stem}-{number}"), is_quiet=as_json))
+    if as_json:
+        print_json(held)
+    elif file == _STANDARD_OUTPUT:
+        click.echo(summaries[0], err=True)
+    elif held["others"] and not with_others:
+        click.echo(f"{summaries[0]}; {len(held['others'])} more in its store: see --all")
+    else:
+        click.echo("\n".join(summaries))
+
+
+def _show_held(held: Json, file: Path | None, *, is_quiet: bool) -> str:
+    """Write a mission to its file, or print its table; a summary."""
     items = mission_items(held["items"])
     summary = f"{held['count']} records, checksum {held['checksum']}"
     if file == _STANDARD_OUTPUT:
         click.echo(write_qgc_wpl(items), nl=False)
-        click.echo(summary, err=True)
-        return
-    if file is not None:
+    elif file is not None:
         try:
             save_mission(file, write_mission_file(items, file.name))
         except MissionFileError as error:
             fail(str(error))
         summary += f", written to {click.format_filename(file)}"
-    if as_json:
-        print_json(held)
-        return
-    if file is None and items:
+    elif items and not is_quiet:
         print_table(mission_table(items, items, ()))
-    click.echo(summary)
+    return summary
 
 
 @click.command()

@@ -19,7 +19,6 @@ from bridge.controllers.inav import profile as inav
 from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.profile import Profile
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import Delivery, HeldMission
@@ -93,16 +92,16 @@ def board(kind: str) -> Craft:
     return Craft(world, GroundStation(world), faults, 0.0)
 
 
-MAKERS: dict[Profile, Callable[[], Craft]] = {
-    harakiri.PATCHED: patched_harakiri,
-    harakiri.MAVLINK: harakiri_mavlink,
-    inav.PROFILE: lambda: board("inav"),
-    multiwii.PROFILE: lambda: board("multiwii"),
+MAKERS: dict[str, Callable[[], Craft]] = {
+    harakiri.PATCHED.name: patched_harakiri,
+    harakiri.MAVLINK.name: harakiri_mavlink,
+    inav.PROFILE.name: lambda: board("inav"),
+    multiwii.PROFILE.name: lambda: board("multiwii"),
 }
 
 
 def test_every_dialect_is_here() -> None:
-    assert MAKERS.keys() == {profile for profile in PROFILES if profile.open_store is not None}
+    assert MAKERS.keys() == {profile.name for profile in PROFILES if profile.open_store is not None}
 
 
 def assert_is_true(craft: Craft, delivery: Delivery, old: Sequence[MissionItem], new: Sequence[MissionItem]) -> None:
@@ -112,13 +111,14 @@ def assert_is_true(craft: Craft, delivery: Delivery, old: Sequence[MissionItem],
     elif delivery.text not in {failure.value for failure in LIST_IS_GONE}:
         assert craft.holds(old)
     elif delivery.text != PushFailure.UNCERTAIN.value:
-        assert craft.download() == []
+        # An INAV is made to load its saved mission again, which the pilot is told.
+        assert craft.download() == [] or craft.holds(old)
 
 
-@pytest.fixture(params=MAKERS, ids=lambda kind: kind.name)
+@pytest.fixture(params=MAKERS)
 def craft(request: pytest.FixtureRequest) -> Craft:
     made = MAKERS[request.param]()
-    made.world.wait_until(lambda w: w.kind is request.param, 20)
+    made.world.wait_until(lambda w: w.kind is not None and w.kind.name == request.param, 20)
     made.world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 20)
     made.world.run(1)
     return made

@@ -362,12 +362,13 @@ def test_a_multiwii_is_not_made_to_store_what_it_holds() -> None:
     assert multiwii.writes == written + 2
 
 
-def test_as_long_as_the_first_record_may_not_have_come_nothing_is_said_of_the_old_list() -> None:
+def test_if_the_first_record_never_came_the_old_list_is_read_and_said_to_be_kept() -> None:
     inav = FakeInav()
     world, station = found(inav)
     assert Upload(station, plan(12)).run() is ACCEPTED
     inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP else ""
     assert Upload(station, plan(10, 1)).run() is DENIED
-    assert "read the mission back" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert "old mission is kept" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
+    assert inav.records == packed(plan(12))
     inav.drop = lambda _frame: ""
     assert Download(station).run()[1:] == plan(12)[1:]

@@ -7,7 +7,7 @@ import pytest
 from conversations import Download, Upload, clear_message
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_inav import packed, plan
+from test_inav import plan
 from world import GroundStation, World
 
 from bridge.controllers.inav import profile as inav
@@ -98,18 +98,6 @@ def test_a_multiwii_holds_what_it_can() -> None:
     station.send(clear_message())
     world.run(2)
     assert Download(station).run() == []
-
-
-def test_after_a_restart_inav_holds_nothing_until_somebody_loads_it() -> None:
-    board, world, station = board_with()
-    assert Upload(station, plan(30)).run() is ACCEPTED
-    board.power_off(world.now)
-    world.run(3)
-    board.power_on(world.now)
-    world.wait_until(lambda w: w.is_found, 15)
-    world.run(1)
-    assert Download(station).run() == []
-    assert [record[1:] for record in board.stored_records[:29]] == packed(plan(30))
 
 
 @pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])

@@ -81,7 +81,7 @@ class MemoryStore:
                     verified = ended is not None and ended.outcome is Outcome.VERIFIED
                     if verified and identify(mission.verdict.records) == identity:
                         return mission.verdict.sent_as
-        return {}
+        return None
 
     def outcomes(self) -> list[Outcome | None]:
         return [conclusion.outcome if conclusion else None for _, conclusion in self.missions]

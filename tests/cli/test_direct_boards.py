@@ -14,6 +14,8 @@ from programs import Board, run_naze_bridge
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import Command
 from simulator.fc_kinds import KINDS
+from simulator.inav_mission import CAPACITY
+from simulator.nav_waypoint import FLAG_LAST, NavWaypoint
 
 STORES_MISSIONS = ("naze", "inav", "multiwii")
 STORES_NONE = ("betaflight", "baseflight")
@@ -84,3 +86,18 @@ def test_a_board_without_missions_says_so_and_its_status_works(other_board: Boar
     pulled = run_naze_bridge("pull", "--fc", other_board.link)
     assert (pulled.returncode, pulled.stderr) == (1, f"naze-bridge: {sentence}\n")
     assert_status(other_board)
+
+
+def test_pull_all_reads_the_missions_that_are_not_loaded(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        eeprom = tmp_path / "eeprom"
+        ends = {3: FLAG_LAST, 8: FLAG_LAST}
+        saved = [NavWaypoint(1, 453838000, 84733000, 2000, flag=ends.get(n, 0)) for n in range(1, 9)]
+        saved += [NavWaypoint()] * (CAPACITY - len(saved))
+        eeprom.write_bytes(b"".join(waypoint.pack(number) for number, waypoint in enumerate(saved, 1)))
+        board = Starter(tmp_path, stack).board("--kind", "inav", "--state", str(eeprom))
+        assert run_naze_bridge("pull", "--fc", board.link).stdout.endswith("1 more in its store: see --all\n")
+        pulled = run_naze_bridge("pull", tmp_path / "held.waypoints", "--all", "--fc", board.link)
+    assert (pulled.returncode, pulled.stderr) == (0, "")
+    files = (tmp_path / "held.waypoints", tmp_path / "held-2.waypoints")
+    assert [len(read_mission_file(file.read_bytes(), file.name)) for file in files] == [4, 6]

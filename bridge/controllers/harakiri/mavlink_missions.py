@@ -17,7 +17,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.records import items_from_records
 from bridge.controllers.harakiri.rules import MAV_COMMANDS
 from bridge.line.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
-from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.float32 import neighbours, single
 from protocols.mavlink.codec import MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
@@ -56,7 +56,7 @@ class _Failed(Exception):
         self.is_final = is_final
 
 
-class HarakiriMavlinkMissions:
+class HarakiriMavlinkMissions(OneMission):
     """The mission store of one Harakiri in MAVLink mode. `is_armed`: None while no heartbeat told."""
 
     def __init__(self, is_armed: Callable[[], bool | None], rules: HarakiriRules) -> None:

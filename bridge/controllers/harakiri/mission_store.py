@@ -7,7 +7,7 @@ from contextlib import suppress
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.records import items_from_records
 from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, ask_surely, pause, receive, send
-from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
@@ -56,7 +56,7 @@ class _GiveUp(Exception):
         self.failure = failure
 
 
-class HarakiriMissions:
+class HarakiriMissions(OneMission):
     """The mission store of one Harakiri. `takeoff_max_m` is the upper limit of the rules' take-off height."""
 
     def __init__(self, info: Info, takeoff_max_m: int) -> None:

@@ -1,36 +1,136 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV: the list is in its memory until SAVE; what is not whole cannot be flown (docs/inav.md)."""
+"""INAV: the list is in its memory until SAVE; what is not whole cannot be flown (docs/inav.md).
 
+Its store holds up to nine missions, one behind the other, each ended by the flag LAST. Disarmed, all of them are
+counted and read; armed, only the loaded one. Record 1 wipes them all, so they are written again behind a new list.
+"""
+
+from collections.abc import Sequence
 from contextlib import suppress
+from itertools import chain
 
+from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, Failed, NavMissions
+from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
 from bridge.line.conversation import Conversation, LinkLost, ask
-from bridge.missions.fc_mission_store import PushFailure
+from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult
 from protocols.msp.frame import Direction, request
-from protocols.msp.nav import INFO_SIZE, LOAD_REQUEST, SAVE_REQUEST, Nav, NavInfo, NavRecord, decode_info
+from protocols.msp.nav import (
+    INFO_SIZE,
+    LOAD_REQUEST,
+    SAVE_REQUEST,
+    SELECTED_REQUEST,
+    SETTING,
+    Nav,
+    NavInfo,
+    NavRecord,
+    decode_info,
+)
 
 _MAX_SAVES = 2
-_SAVE_PATIENCE = 4
+#: Questions after SAVE: together they wait longer than its flash takes.
+_ASKS_AFTER_SAVE = 4
+_MAX_READS = 2
+_SETTING_SIZE = 1
 
 
 class InavMissions(NavMissions):
     """The mission store of one INAV. Record 1 wipes what is there, and no list is valid before its last record."""
 
-    def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
-        """Read the list that is there. One that is not whole is none; so is the single RTH of a cleared one."""
-        info = yield from self._info()
-        if info is None:
-            return None
-        records: list[NavRecord] = []
-        for number in range(1, info.count + 1 if info.is_valid else 1):
-            record = yield from self.read(number)
-            if record is None:
-                return None
-            records.append(record)
-        self._known = () if tuple(records) == NOTHING else tuple(records)
-        return self._known
+    reads_armed = True
+    _others: tuple[Mission, ...] = ()
+    #: Those of them that are written again behind a new list.
+    _kept: tuple[Mission, ...] = ()
+    #: Records in the store before the loaded mission's first.
+    _before_loaded = 0
+    #: The number of the record that was compared last.
+    _compared = 0
+    #: GETINFO's answer and the selected mission, as of the last reading or writing.
+    _seen: tuple[NavInfo, int] | None = None
 
-    def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
+    @property
+    def others(self) -> tuple[Mission, ...]:
+        """The missions in its store that are not loaded."""
+        return self._others
+
+    def erased_by(self, records: Sequence[NavRecord]) -> tuple[Mission, ...]:
+        """The last of the others, as many as do not fit."""
+        return erased(self._others, self._profile.capacity - len(records or NOTHING))
+
+    def push(self, records: Mission, progress: PushProgress) -> Conversation[PushResult[NavRecord]]:
+        """Put the list there, with the other missions behind it, and prove it."""
+        result = yield from super().push(records, progress)
+        if result.failure is None:
+            self._others, self._before_loaded = self._kept, 0
+        return result
+
+    def pull(self) -> Conversation[Mission | None]:
+        """Read the loaded mission. One that is not whole is none; so is the single RTH of a cleared one."""
+        for _ in range(_MAX_READS):
+            seen = yield from self._look()
+            if seen is None:
+                return None
+            info, _ = seen
+            records: list[NavRecord] = []
+            for number in range(1, info.count + 1 if info.is_valid else 1):
+                record = yield from self.read(number)
+                if record is None:
+                    return None
+                records.append(record)
+            # It may have armed meanwhile, and numbers then count from the loaded mission's first record.
+            if (yield from self._look()) == seen:
+                self._take_over(split_missions(records), seen)
+                return self._known
+        return None
+
+    def is_current(self) -> Conversation[bool]:
+        """Ask GETINFO, and which mission is selected: the sticks or another client may have changed either."""
+        seen = yield from self._look()
+        if seen is None or seen != self._seen:
+            return seen is None
+        return (yield from self._has_same_records())
+
+    def _has_same_records(self) -> Conversation[bool]:
+        """Compare the first record and one more, the next one each time: another list may have as many."""
+        if not self._known:
+            return True
+        self._compared = self._compared % len(self._known) + 1
+        before = 0 if self._craft.is_armed() else self._before_loaded
+        for number in {1, self._compared}:
+            held = yield from self.read(before + number)
+            if held is not None and held != self._known[number - 1]:
+                return False
+        return True
+
+    def reload(self) -> Conversation[bool | None]:
+        """INAV forgets its list at every restart, and keeps what it saved."""
+        info = yield from self._info()
+        if info is None or info.is_valid:
+            return False
+        if (yield from self._ask_armed()) is not False:
+            return None
+        yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
+        info = yield from self._info()
+        return info is not None and info.is_valid
+
+    def _take_over(self, missions: list[Mission], seen: tuple[NavInfo, int]) -> None:
+        self._seen = seen
+        is_armed = bool(self._craft.is_armed())
+        loaded = flown(missions, 1 if is_armed else seen[1])
+        if not is_armed:
+            self._others = tuple(mission for mission in missions if mission is not loaded)
+            self._before_loaded = sum(map(len, missions[: missions.index(loaded)])) if loaded else 0
+        self._known = () if loaded == NOTHING else loaded
+
+    def _rules(self) -> NavRules:
+        return NavRules(self._profile, self._others)
+
+    def _store_content(self, records: Mission) -> Mission:
+        """SAVE selects the first mission, so the new one goes there."""
+        self._kept = self._others[: len(self._others) - len(self.erased_by(records))]
+        return (*records, *chain.from_iterable(self._kept))
+
+    def _order(self, wanted: Mission) -> list[tuple[int, NavRecord]]:
         return list(enumerate(wanted, 1))
 
     def _prove(self, count: int) -> Conversation[None]:
@@ -55,31 +155,58 @@ class InavMissions(NavMissions):
         last = yield from self.read(before.count)
         if reply is None or reply.direction is Direction.ERROR or last is None:
             raise Failed(PushFailure.NOT_SAVED)
+        yield from self._load_first(before)
 
-    def _still_holds(self, records: tuple[NavRecord, ...]) -> Conversation[bool]:
-        info = yield from self._info()
-        return _has(info, records)
+    def _load_first(self, saved: NavInfo) -> Conversation[None]:
+        """Until LOAD, INAV takes what was written for one long mission, whose last record decides about landing."""
+        if self._kept:
+            reply = yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
+            if reply is None or reply.direction is Direction.ERROR or (yield from self._info()) != saved:
+                raise Failed(PushFailure.UNCERTAIN)
+        self._seen = yield from self._look()
 
-    def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
-        """Have it LOAD what was saved last: the old list, unless somebody else wrote one and did not save it."""
+    def _confirm(self, before: Mission | None) -> Conversation[Mission | None]:
+        if (yield from self.is_current()):
+            return before
+        # Another client wrote or loaded a list since: its other missions are to be kept, too.
+        yield from self.pull()
+        return None
+
+    def _restore(self, before: Mission | None) -> Conversation[bool]:
+        """Have it LOAD what it saved; if that is not the old list, write that one again."""
+        if self._craft.is_armed():
+            return False
+        with suppress(LinkLost):
+            yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
+            loaded = yield from self.pull()
+            if loaded == before and (loaded or self._others):
+                return True
+        return (yield from super()._restore(before))
+
+    def _restore_at_once(self, before: Mission | None) -> Conversation[bool]:
+        """Have it LOAD what was saved last: the old list, unless another client wrote one and did not save it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
-            info = yield from self._info()
-            return bool(before) and _has(info, before or ())
+            return bool(before) and (yield from self.is_current())
         return False
 
     def _info_after_save(self) -> Conversation[NavInfo | None]:
-        """Ask for longer than its flash takes to be written."""
-        for _ in range(_SAVE_PATIENCE):
+        for _ in range(_ASKS_AFTER_SAVE):
             info = yield from self._info()
             if info is not None:
                 return info
         return None
 
+    def _look(self) -> Conversation[tuple[NavInfo, int] | None]:
+        """GETINFO, and which mission is selected, from 1: of a list that is not whole, none is."""
+        info = yield from self._info()
+        if info is None:
+            return None
+        if not info.is_valid:
+            return info, 1
+        reply = yield from ask(SELECTED_REQUEST, SETTING, _SETTING_SIZE)
+        return info, reply.payload[0] if reply is not None and reply.payload else 1
+
     def _info(self) -> Conversation[NavInfo | None]:
         reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE)
         return None if reply is None else decode_info(reply.payload)
-
-
-def _has(info: NavInfo | None, records: tuple[NavRecord, ...]) -> bool:
-    return info is not None and info.is_valid and info.count == len(records)

@@ -5,8 +5,10 @@ from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.line.conversation import Conversation
 from protocols.msp.nav import LAST, NavRecord
 
-#: Flags of what is no record: damaged in EEPROM, or not told because it navigates.
+#: Flags of what is no record: a wrong checksum in EEPROM, and erased EEPROM.
 _NO_RECORD = (0xFE, 0xFF)
+#: Action and flag of the answer while it flies a mission, whatever is asked.
+_NAVIGATING = (0, 0xFF)
 
 
 class MultiwiiMissions(NavMissions):
@@ -21,6 +23,8 @@ class MultiwiiMissions(NavMissions):
         for number in range(1, self._profile.capacity + 1):
             record = yield from self.read(number)
             if record is None:
+                return None
+            if (record.action, record.flag) == _NAVIGATING:
                 return None
             if record.flag in _NO_RECORD:
                 break

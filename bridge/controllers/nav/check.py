@@ -19,6 +19,7 @@ from bridge.controllers.nav.rules import (
     NavProfile,
     NavRule,
 )
+from bridge.controllers.nav.stored_missions import Mission, erased
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -29,7 +30,7 @@ from bridge.missions.list_check import (
     refuse_position,
 )
 from bridge.missions.value_range import UNUSED
-from bridge.model.finding import DROPPED, Rejection, reject, reject_list
+from bridge.model.finding import DROPPED, Finding, News, Rejection, reject, reject_list
 from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single
 from protocols.mission_item import Command, MissionItem, MissionResult
@@ -43,9 +44,10 @@ _NO_THROTTLE = (0, -1, -2)
 
 @dataclass(frozen=True, slots=True)
 class NavRules:
-    """The rules of one flight controller."""
+    """The rules of one flight controller. others: the further missions in its store."""
 
     profile: NavProfile
+    others: tuple[Mission, ...] = ()
 
     @property
     def max_items(self) -> int:
@@ -54,7 +56,7 @@ class NavRules:
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "NavCheck":
         """Begin a list."""
-        return NavCheck(self.profile, count, fallback_home)
+        return NavCheck(self.profile, count, fallback_home, self.others)
 
 
 class NavCheck(ListCheck):
@@ -64,9 +66,16 @@ class NavCheck(ListCheck):
     every list; without coordinates it is shown at `fallback_home`.
     """
 
-    def __init__(self, profile: NavProfile, count: int, fallback_home: tuple[int, int] | None = None) -> None:
+    def __init__(
+        self,
+        profile: NavProfile,
+        count: int,
+        fallback_home: tuple[int, int] | None = None,
+        others: tuple[Mission, ...] = (),
+    ) -> None:
         super().__init__(count)
         self._profile = profile
+        self._others = others
         self._home = home_item(fallback_home)
         self._records: list[NavRecord] = []
         self._jumps = Jumps(back_only=profile.jumps_back_only)
@@ -205,6 +214,9 @@ class NavCheck(ListCheck):
     def _conclude(self) -> Verdict[NavRecord]:
         records = (*self._records[:-1], replace(self._records[-1], flag=LAST))
         items = items_from_records(records, self._home, self._sent_as)
+        for mission in erased(self._others, self._profile.capacity - len(records)):
+            why = f"Mission of {len(mission)} records does not fit beside it: erased, a copy is kept on the Pi"
+            self._findings.append(Finding(None, "count", len(mission), 0, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as)
 

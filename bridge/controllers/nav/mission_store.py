@@ -14,7 +14,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
 from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, pause, receive, send
-from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_item import MissionItem
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
@@ -62,7 +62,7 @@ class Failed(Exception):
         self.is_final = is_final
 
 
-class NavMissions(ABC):
+class NavMissions(OneMission, ABC):
     """The mission store of one flight controller."""
 
     #: Whether it stands still while it stores a record.
@@ -89,7 +89,10 @@ class NavMissions(ABC):
         armed = yield from self._ask_armed()
         if armed is None:
             return None
-        return StoreReport(StoreState.ARMED if armed else StoreState.READY, NavRules(self._profile), None)
+        return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules(), None)
+
+    def _rules(self) -> NavRules:
+        return NavRules(self._profile)
 
     def items(self, records: Sequence[NavRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         """Return what a ground station reads of a list; of none, nothing."""
@@ -121,11 +124,10 @@ class NavMissions(ABC):
 
         try:
             yield from self._make_sure_disarmed()
-            if before and not (yield from self._still_holds(before)):
-                before = None
+            before = yield from self._confirm(before)
             # Until the first record is read back it may have come, and wiped the old list, or not.
             failure, writing = PushFailure.UNCERTAIN, True
-            yield from self._write_surely(records or NOTHING, proven)
+            yield from self._write_surely(self._store_content(records or NOTHING), proven)
             failure, writing = PushFailure.UNCERTAIN, False
             yield from self._keep()
             self._known = records
@@ -156,10 +158,14 @@ class NavMissions(ABC):
     def _keep(self) -> Conversation[None]:
         """Do what has to be done after the last record; raises Failed."""
 
-    def _still_holds(self, records: tuple[NavRecord, ...]) -> Conversation[bool]:
-        """Tell, as far as that takes no time, whether nobody else has written another list since this one was read."""
+    def _store_content(self, records: tuple[NavRecord, ...]) -> tuple[NavRecord, ...]:
+        """All that must be written so that `records` are flown, and nothing else is lost."""
+        return records
+
+    def _confirm(self, before: tuple[NavRecord, ...] | None) -> Conversation[tuple[NavRecord, ...] | None]:
+        """The old list; None if another client has changed it since it was read, as far as that can be asked."""
         yield from ()
-        return True
+        return before
 
     def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Put the old list back if that takes no time; tell whether it is there."""

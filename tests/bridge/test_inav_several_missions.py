@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An INAV that keeps several missions, and a list that changes on the board without the bridge."""
+
+from dataclasses import replace
+
+import pytest
+from conversations import Download, Upload, clear_message
+from test_inav import RULES, packed, plan
+from test_inav_boards import ACCEPTED, without_home
+from world import GroundStation, World
+
+from bridge.controllers.nav.stored_missions import erased, flown, split_missions
+from bridge.missions.list_check import check_list
+from bridge.missions.mission_service import HeldMission
+from bridge.model.mission_log import Outcome
+from protocols.mavlink.dialect import messages
+from protocols.msp.nav import LAST
+from simulator.fc_kinds import make_board
+from simulator.inav_boxes import BOXES
+from simulator.inav_mission import CAPACITY
+from simulator.msp_board import MspBoard
+from simulator.msp_options import MspOptions
+from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint
+from simulator.options import Faults
+
+NAV_WP = 1 << BOXES["9.1.0"].index(28)
+NOTHING_MORE = NavWaypoint().pack(0)[1:]
+
+
+class Bench:
+    """A board in whose EEPROM another planner has put missions of so many records."""
+
+    def __init__(self, *sizes: int, faults: Faults | None = None, is_loaded: bool = True) -> None:
+        records = [record for mission in sets(*sizes) for record in mission]
+        filled = records + [NOTHING_MORE] * (CAPACITY - len(records))
+        self.eeprom = bytearray(b"".join(bytes((number,)) + record for number, record in enumerate(filled, 1)))
+        self.faults = faults or Faults(boxes=0)
+        self.board: MspBoard = make_board("inav", MspOptions(), self.faults, memoryview(self.eeprom))
+        self.world = World(speeds=(115200,), peer=self.board, plugged=False)
+        self.station = GroundStation(self.world)
+        self.station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        self.world.run(0.5)
+        self.world.plug()
+        self.world.wait_ready(10)
+        self.world.run(5)
+
+    def stored(self) -> list[list[bytes]]:
+        """The missions in the EEPROM, without the numbers of their records."""
+        records = [bytes(self.eeprom[at + 1 : at + WAYPOINT_SIZE]) for at in range(0, len(self.eeprom), WAYPOINT_SIZE)]
+        missions: list[list[bytes]] = [[]]
+        for record in records:
+            missions[-1].append(record)
+            if record[-1] == LAST:
+                missions.append([])
+        return [mission for mission in missions if mission and mission != [NOTHING_MORE]]
+
+    def flown(self) -> list[bytes]:
+        """What the board flies when it is armed now."""
+        self.faults.armed = True
+        self.world.run(3)
+        assert self.board.armed
+        held = self.world.bridge.missions.held
+        self.faults.armed = False
+        self.world.run(3)
+        return [] if held is None else [record.pack() for record in held.records]
+
+    def told(self) -> str:
+        """All texts so far; long ones come in pieces."""
+        self.world.run(0.1)
+        return " ".join(self.station.texts())
+
+
+def sets(*sizes: int) -> list[list[bytes]]:
+    return [packed(plan(size + 1, shift)) for shift, size in enumerate(sizes, 1)]
+
+
+def others_of(bench: Bench) -> list[list[bytes]]:
+    def packed_records(held: HeldMission) -> list[bytes]:
+        return [record.pack() for record in held.records]
+
+    return [packed_records(held) for held in bench.world.bridge.missions.others]
+
+
+# -- several missions ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("selected", [1, 2, 3])
+def test_read_shows_the_one_that_is_loaded(selected: int) -> None:
+    bench = Bench(4, 6, 9, faults=Faults(boxes=0, selected_mission=selected))
+    shown = Download(bench.station).run()
+    assert without_home(shown) == without_home(plan((5, 7, 10)[selected - 1], selected))
+    assert others_of(bench) == [mission for number, mission in enumerate(sets(4, 6, 9), 1) if number != selected]
+
+
+@pytest.mark.parametrize("selected", [1, 2])
+def test_write_replaces_the_loaded_one_and_keeps_the_others(selected: int) -> None:
+    bench = Bench(4, 6, 9, faults=Faults(boxes=0, selected_mission=selected))
+    bench.faults.selected_mission = 0
+    assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
+    kept = [mission for number, mission in enumerate(sets(4, 6, 9), 1) if number != selected]
+    assert bench.stored() == [packed(plan(21, 7)), *kept]
+    assert without_home(Download(bench.station).run()) == without_home(plan(21, 7))
+    assert bench.flown() == packed(plan(21, 7))
+    bench.world.run(3)
+    assert others_of(bench) == kept
+
+
+def test_what_does_not_fit_is_told_before_and_copied_to_the_pi() -> None:
+    bench = Bench(4, 30, 60)
+    assert Upload(bench.station, plan(81, 7)).run() is ACCEPTED
+    assert bench.stored() == [packed(plan(81, 7)), sets(4, 30)[1]]
+    copies = [mission for mission, _ in bench.world.store.missions if mission.source.startswith("copy")]
+    assert [[record.pack() for record in copy.verdict.records] for copy in copies] == [sets(4, 30, 60)[2]]
+    assert "Mission of 60 records does not fit" in bench.told()
+
+
+def test_clear_clears_the_loaded_one() -> None:
+    bench = Bench(4, 6)
+    bench.station.send(clear_message())
+    bench.world.run(3)
+    assert bench.stored()[-1] == sets(4, 6)[1]
+    assert Download(bench.station).run() == []
+    assert bench.flown() == []
+
+
+def test_a_push_that_breaks_off_brings_all_of_them_back() -> None:
+    bench = Bench(4, 6)
+    upload = Upload(bench.station, plan(100, 7))
+    bench.world.run(0.4)
+    bench.world.bridge.abort_missions(bench.world.now)
+    upload.run(2)
+    bench.world.run(3)
+    assert bench.stored() == sets(4, 6)
+    assert bench.flown() == sets(4, 6)[0]
+
+
+def test_missions_are_split_at_their_ends_and_the_last_give_way() -> None:
+    records = check_list(plan(10), RULES).records
+    one, two = records[:3], records[3:9]
+    ended = (*one[:2], replace(one[2], flag=LAST)), (*two[:5], replace(two[5], flag=LAST))
+    assert split_missions([*ended[0], *ended[1], one[0]]) == list(ended)
+    assert (flown(ended, 2), flown(ended, 3), flown((), 1)) == (ended[1], ended[0], ())
+    assert [erased(ended, room) for room in (9, 8, 2)] == [(), ended[1:], ended]
+
+
+# -- a list that changes on the board ------------------------------------------------------------------------
+
+
+def restart(bench: Bench) -> None:
+    bench.board.power_off(bench.world.now)
+    bench.world.run(3)
+    bench.board.power_on(bench.world.now)
+    bench.world.wait_until(lambda w: w.is_found, 15)
+    bench.world.run(3)
+
+
+def test_after_a_restart_the_saved_mission_is_loaded_again_and_told() -> None:
+    bench = Bench()
+    assert Upload(bench.station, plan(13)).run() is ACCEPTED
+    restart(bench)
+    assert without_home(Download(bench.station).run()) == without_home(plan(13))
+    assert "Saved mission loaded again: 12 records" in bench.told()
+    assert bench.flown() == packed(plan(13))
+
+
+def test_a_saved_mission_that_is_not_ours_is_called_that() -> None:
+    bench = Bench(4)
+    assert "not written by naze-bridge" in bench.told()
+    assert bench.flown() == sets(4)[0]
+
+
+def test_armed_it_is_not_loaded_and_that_is_told_until_it_is_disarmed() -> None:
+    bench = Bench(4, faults=Faults(boxes=0, armed=True))
+    assert bench.told().count("No mission is loaded: disarm to load the saved one") == 1
+    assert Download(bench.station).run() in ([], None)
+    bench.faults.armed = False
+    bench.world.run(3)
+    assert without_home(Download(bench.station).run()) == without_home(plan(5, 1))
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_mission_chosen_by_the_sticks_is_noticed_within_two_seconds(armed: bool) -> None:
+    bench = Bench(4, 6)
+    bench.faults.armed = armed
+    bench.world.run(3)
+    bench.faults.selected_mission = 2
+    bench.world.run(2.0)
+    held = bench.world.bridge.missions.held
+    assert held is not None
+    assert [record.pack() for record in held.records] == sets(4, 6)[1]
+    assert "changed: 6 records" in bench.told()
+
+
+def test_another_clients_list_is_noticed_and_its_flight_is_shown_right() -> None:
+    bench = Bench(9)
+    assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
+    bench.eeprom[: 4 * WAYPOINT_SIZE] = b"".join(
+        bytes((number,)) + record for number, record in enumerate(sets(4)[0], 1)
+    )
+    bench.faults.stick_loads += 1
+    bench.world.run(2.0)
+    assert "changed: 4 records" in bench.told()
+    held = bench.world.bridge.missions.held
+    assert held is not None
+    assert [record.pack() for record in held.records] == sets(4)[0]
+    bench.faults.armed, bench.faults.boxes = True, NAV_WP
+    bench.world.run(5)
+    assert {message.total for message in bench.station.said("MISSION_CURRENT")[-3:]} == {4}
+
+
+def test_a_push_that_breaks_off_for_good_is_mended_by_the_saved_mission() -> None:
+    bench = Bench()
+    assert Upload(bench.station, plan(13)).run() is ACCEPTED
+    upload = Upload(bench.station, plan(100, 1))
+    bench.world.after(0.5, lambda: setattr(bench.faults, "armed", True))
+    assert upload.run() is not ACCEPTED
+    bench.world.run(1)
+    bench.faults.armed = False
+    bench.world.run(4)
+    assert without_home(Download(bench.station).run()) == without_home(plan(13))
+    assert "Saved mission loaded again" in bench.told()
+    assert bench.world.store.outcomes().count(Outcome.VERIFIED) == 1
