@@ -19,6 +19,7 @@ from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
+from service.documentation import page
 from service.host import Host
 from service.links.connection import AutoFc, FcAddress, GcsAddress, SerialFc
 from service.links.fc_device import device_opener
@@ -41,7 +42,7 @@ _STORE_PATIENCE_S = 0.2
 _REST_INTERVAL_S = 0.02
 #: Frames come in over zenoh only if its transport is authenticated, or if the owner said that it need not be.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
-_WHO_MAY_WRITE = "whoever reaches it may write missions and parameters; docs/signing.md tells how to limit that"
+_WHO_MAY_WRITE = f"anyone who reaches it may write missions and parameters; to restrict it: {page('docs/signing.md')}"
 
 _log = structlog.get_logger()
 

@@ -5,6 +5,7 @@ import re
 from collections.abc import Sequence
 
 from service.doctor.checked import Checked, note, ok, problem
+from service.documentation import page
 from service.host import Host
 from service.links.connection import GcsAddress
 
@@ -32,7 +33,11 @@ def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
 def _card(host: Host, card: str, gcs: Sequence[GcsAddress]) -> Checked:
     address = host.address(card)
     if address is None:
-        return note("Wi-Fi", f"{card} has no address", "join a network or open an access point: docs/howto")
+        return note(
+            "Wi-Fi",
+            f"{card} has no address",
+            f"join a network, or open a hotspot: {page('docs/howto/wifi-access-point.md')}",
+        )
     ports = [str(link.port) for link in gcs if link.kind in ("udpin", "tcpin")]
     return ok(
         "Wi-Fi", f"{card} is {address}" + (f"; ground stations connect to port {', '.join(ports)}" if ports else "")

@@ -7,6 +7,7 @@ import stat
 from pathlib import Path
 
 from service.doctor.checked import Checked, note, ok, problem
+from service.documentation import page
 from service.host import Host, Process
 from service.links.connection import FcAddress, SerialFc
 from service.links.serial_ports import serial_ports
@@ -67,7 +68,7 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
     if found.st_mode & stat.S_IRGRP and found.st_mode & stat.S_IWGRP and group == _GROUP:
         return ok("permission", f"{device} is open to the group {_GROUP}")
     mode = stat.filemode(found.st_mode)
-    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; a rule of udev that lasts: docs/install.md"
+    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; a rule of udev that lasts: {page('docs/install.md')}"
     return problem("permission", f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}", remedy)
 
 
@@ -134,7 +135,9 @@ def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
         return ok("ModemManager", "runs, and looks at USB only")
     if any(host.path(f"{folder}/{_RULE}").exists() for folder in _RULES):
         return ok("ModemManager", f"runs, and is kept off by {_RULE}")
-    remedy = "install the package's udev rule (docs/install.md), or: sudo systemctl disable --now ModemManager"
+    remedy = (
+        f"install the package's udev rule ({page('docs/install.md')}), or: sudo systemctl disable --now ModemManager"
+    )
     return note("ModemManager", f"runs, and sends modem commands to {device} when it is plugged in", remedy)
 
 
