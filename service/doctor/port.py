@@ -68,7 +68,8 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
     if found.st_mode & stat.S_IRGRP and found.st_mode & stat.S_IWGRP and group == _GROUP:
         return ok("permission", f"{device} is open to the group {_GROUP}")
     mode = stat.filemode(found.st_mode)
-    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; a rule of udev that lasts: {page('docs/install.md')}"
+    lasting = f"a rule of udev that lasts: {page('docs/install.md')}"
+    remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; {lasting}"
     return problem("permission", f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}", remedy)
 
 
