@@ -62,7 +62,7 @@ _NO_COPY = "Nothing written: a mission that does not fit beside it could not be 
 NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
 _STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
-_OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
+OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
 class MissionService:
@@ -117,13 +117,18 @@ class MissionService:
         if self._closed:
             return _STOPPING
         if self._owner is not None and self._owner != owner:
-            return _OCCUPIED
+            return OCCUPIED
         self._owner = owner
         return None
 
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed: the board need not be asked, and has other things to do."""
         return ARMED if self._dialect is not None and self._is_armed() else None
+
+    @property
+    def is_free(self) -> bool:
+        """Whether a transfer can begin."""
+        return self._owner is None
 
     def close(self) -> None:
         """Begin no more transfers, because the bridge is about to end."""

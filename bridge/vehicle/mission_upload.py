@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station writes a mission: the vehicle's side of MAVLink's upload (mission-rules.md, clients.md).
+"""A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-One transfer at a time. Mission Planner eats its own packets and takes any ack to MISSION_COUNT as "go on"; what is odd
-below is so because of that, and clients.md says which of its habits it answers.
+Uploads are carried out one at a time, in the order of their MISSION_COUNT. Mission Planner eats its own packets and
+takes any ack to MISSION_COUNT as "go on"; most oddities below answer one of the habits in docs/ground-stations.md.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
@@ -15,45 +15,48 @@ from bridge.gcs.station import Peer, Post, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import StoreReport
-from bridge.missions.list_check import ListCheck, begin_check, check_count
-from bridge.missions.mission_service import NO_LINK, Delivery, MissionService
+from bridge.missions.list_check import begin_check, check_count
+from bridge.missions.mission_service import NO_LINK, OCCUPIED, Delivery, MissionService
 from bridge.missions.mission_texts import finding_lines
-from bridge.model.events import EventLog, Incidents
+from bridge.model.events import EventLog, Incidents, Level
 from bridge.model.finding import Finding, News
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
-from bridge.vehicle.item_request import ItemRequest
 from bridge.vehicle.recent_answers import RecentAnswers
+from bridge.vehicle.upload_states import (
+    TRANSITIONS,
+    Asking,
+    Delivered,
+    Delivering,
+    Ended,
+    Event,
+    Judged,
+    Ready,
+    Receiving,
+    State,
+    Turn,
+    Waiting,
+)
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
 MISSION_TYPE_MISSION = 0
 MISSION_TYPE_ALL = 255
-_GIVE_UP_S = 5.0
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
+_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "This upload is not known here: write it again")
+#: Mission Planner has told its user that "Write Fast" succeeded: that it did not is said three times, 2 s apart.
+_REMINDERS_S = (2.0, 4.0)
+#: More uploads than this do not wait for their turn.
+_MOST_UPLOADS = 8
 
 
-class Phase(Enum):
-    """A transfer's life. It begins with MISSION_COUNT and ends with the final MISSION_ACK."""
-
-    ASKING = "asking the flight controller whether it would take a list"
-    RECEIVING = "items come in"
-    DELIVERING = "stored, pushed and verified"
-
-
-@dataclass(slots=True)
-class _Transfer:
-    incident: str
+@dataclass(slots=True, eq=False)
+class _Upload:
     station: Station
     count: int
-    phase: Phase = Phase.ASKING
-    check: ListCheck | None = None
-    items: dict[int, MissionItem] = field(default_factory=dict)
-    checked: int = 0  # items 0..checked-1 are there and have been checked
-    progress_at: float = 0.0
-    request: ItemRequest = field(default_factory=ItemRequest)
-    announced_again: bool = False  # begun anew, or a COUNT that the network repeated: the next item tells
+    incident: str
+    state: State
 
 
 class MissionUploads:
@@ -76,57 +79,31 @@ class MissionUploads:
         self._incidents = incidents
         self._fallback_home = fallback_home
         self._moved_to = moved_to
-        self._transfer: _Transfer | None = None
+        self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
         self._answers = RecentAnswers(moved_to)
-        self._queued: tuple[Station, int] | None = None
+        self._reminders: list[tuple[float, Station, str]] = []
         self._is_asking = False
 
     @property
-    def phase(self) -> Phase | None:
-        """Where the present transfer stands; None if there is none."""
-        return None if self._transfer is None else self._transfer.phase
+    def state(self) -> type[State] | None:
+        """The state of the first upload; None if there is none."""
+        return type(self._uploads[0].state) if self._uploads else None
 
     def is_writing(self, station: Station) -> bool:
-        """Tell whether the present transfer is this ground station's."""
-        return self._transfer is not None and self._transfer.station == station
+        """True if an upload of this ground station runs or waits."""
+        return self._of(station) is not None
+
+    # From ground stations.
 
     def count(self, station: Station, count: int, mission_type: int, now: float) -> None:
-        """MISSION_COUNT: a transfer is announced."""
+        """MISSION_COUNT: an upload is announced."""
         if mission_type != MISSION_TYPE_MISSION:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
         self._follow(station, now)
-        present = self._transfer
-        if present is not None and present.station == station:
-            if present.phase is Phase.DELIVERING:
-                # The list before is being written: what is proven first, then the new one. A cancel comes too late.
-                if count:
-                    self._queued = (station, count)
-                return
-            if count == 0:
-                # Mission Planner's Cancel button. The pilot did not ask to lose the mission that is in the craft.
-                self._cancel(now, "cancelled")
-                return
-            if count == present.count:
-                if present.phase is Phase.RECEIVING:
-                    present.announced_again = bool(present.items)
-                    self._request(present, now)
-                return
-            self._end(now)
-        self._answers.forget(station)
-        transfer = _Transfer(self._incidents.begin("upload"), station, count)
-        refusal = self._missions.armed_refusal() or self._limit(station) or self._missions.acquire(station)
-        if refusal is not None:
-            self._refuse(transfer, refusal, now)
-            return
-        if count == 0:
-            self._deliver(transfer, CLEARED_LIST, (), now)
-            return
-        self._transfer = transfer
-        if not self._is_asking:
-            # One question serves all transfers that are begun before it is answered.
-            self._is_asking = True
-            self._runner.start(self._missions.preflight(), self._asked, now)
+        present = self._of(station)
+        if present is None or not self._is_for(present, count, now):
+            self._begin(station, count, now)
 
     def clear_all(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_CLEAR_ALL."""
@@ -134,14 +111,12 @@ class MissionUploads:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
         self._follow(station, now)
-        present = self._transfer
-        if present is not None and present.station == station:
-            if present.phase is Phase.DELIVERING:
-                if present.count:
-                    self._queued = (station, 0)
-                return
-            self._end(now)
-        self.count(station, 0, MISSION_TYPE_MISSION, now)
+        present = self._of(station)
+        if present is not None and not isinstance(present.state, Delivering):
+            self._forget(present)
+        elif present is not None and present.count == 0:
+            return
+        self._begin(station, 0, now)
 
     def item(self, station: Station, item: MissionItem, mission_type: int, now: float) -> None:
         """MISSION_ITEM or MISSION_ITEM_INT."""
@@ -149,45 +124,31 @@ class MissionUploads:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
             return
         self._follow(station, now)
-        transfer = self._transfer
-        if transfer is None or transfer.station != station:
+        upload = self._of(station)
+        if upload is None:
             self._late_item(station, item.seq, now)
             return
-        if transfer.phase is not Phase.RECEIVING:
-            # Its answer is on the way: the final ack, or nothing.
+        state = upload.state
+        if not isinstance(state, Receiving):
+            # Its answer is on the way: a request, the final ack, or nothing.
             return
-        if item.seq >= transfer.count:
-            self._post.say(
-                Severity.ERROR, f"WP {item.seq} is beyond the {transfer.count} items that were announced", station
-            )
+        if item.seq >= upload.count:
+            text = f"WP {item.seq} is beyond the {upload.count} items announced"
+            self._post.say(Severity.ERROR, text, station)
             self._ack(station, MissionResult.INVALID_SEQUENCE)
             return
-        if transfer.announced_again:
-            transfer.announced_again = False
+        if state.announced_again:
+            state.announced_again = False
             if item.seq == 0:
                 # Two lists must never be mixed: nothing of the former one is kept.
-                self._end(now)
-                self.count(station, transfer.count, mission_type, now)
+                self._forget(upload)
+                self._begin(station, upload.count, now)
                 return
-        assert transfer.check is not None
-        is_repeat = item.seq in transfer.items
-        if not is_repeat:
-            if item.seq == transfer.checked:
-                transfer.request.answered(now)
-            transfer.items[item.seq] = item
-            transfer.progress_at = now
-            while transfer.checked in transfer.items:
-                rejection = transfer.check.take(transfer.items[transfer.checked])
-                if rejection is not None:
-                    self._reject(transfer, now)
-                    return
-                transfer.checked += 1
-        if transfer.checked < transfer.count:
-            if not is_repeat or not transfer.request.is_copy(now):
-                self._request(transfer, now)
-            return
-        items = tuple(transfer.items[seq] for seq in range(transfer.count))
-        self._deliver(transfer, transfer.check.finish(), items, now)
+        taken = state.take(item, now)
+        if isinstance(taken, Judged):
+            self._handle(upload, taken, now)
+        elif taken:
+            self._request(upload, state, now)
 
     def partial_list(self, station: Station, now: float) -> None:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
@@ -199,167 +160,199 @@ class MissionUploads:
         self._ack(station, MissionResult.UNSUPPORTED)
 
     def ack(self, station: Station, result: int, now: float) -> None:
-        """MISSION_ACK from a ground station: an error cancels its transfer."""
+        """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
         self._follow(station, now)
-        transfer = self._transfer
-        if transfer is None or transfer.station != station or result == MissionResult.ACCEPTED:
+        upload = self._of(station)
+        if upload is None or isinstance(upload.state, Delivering):
             return
-        if transfer.phase is not Phase.DELIVERING:
-            self._cancel(now, f"cancelled (result {result})")
+        if result != MissionResult.ACCEPTED:
+            self._end([upload], _cancelled(f"cancelled (result {result})"), now)
+        elif isinstance(upload.state, Receiving):
+            upload.state.close(now)
+
+    # From the rest of the bridge.
 
     def armed(self, now: float) -> None:
-        """The craft was armed: a transfer that is not yet with the flight controller ends."""
-        transfer = self._transfer
-        if transfer is not None and transfer.phase is not Phase.DELIVERING:
-            self._abandon(transfer, ARMED, now)
+        """The craft was armed: an upload that is not yet with the flight controller ends."""
+        self._end(self._undelivered(), ARMED, now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: others need not wait for its upload to time out."""
-        transfer = self._transfer
-        if transfer is not None and transfer.station.peer == peer and transfer.phase is not Phase.DELIVERING:
-            self._cancel(now, "ended by hanging up")
+        gone = [upload for upload in self._undelivered() if upload.station.peer == peer]
+        self._end(gone, _cancelled("ended by hanging up"), now)
 
     def stop(self, now: float) -> None:
-        """The bridge is about to end: what is not yet with the flight controller does not get there any more."""
-        transfer = self._transfer
-        if transfer is not None and transfer.phase is not Phase.DELIVERING:
-            self._cancel(now, "ended: naze-bridge stops")
+        """The bridge is about to end: a list that is not yet with the flight controller does not get there any more."""
+        self._end(self._undelivered(), _cancelled("ended: naze-bridge stops"), now)
 
     def link_lost(self, now: float) -> None:
         """The flight controller is gone: so is the reason to go on receiving."""
-        transfer = self._transfer
-        if transfer is not None and transfer.phase is Phase.RECEIVING:
-            refusal = Refusal(MissionResult.DENIED, "Flight controller lost during the upload")
-            self._abandon(transfer, refusal, now)
+        receiving = [upload for upload in self._uploads if isinstance(upload.state, Receiving)]
+        self._end(receiving, Refusal(MissionResult.DENIED, "Flight controller lost during the upload"), now)
 
     def tick(self, now: float) -> None:
-        """Repeat a request, or give a silent ground station up."""
-        transfer = self._transfer
-        if transfer is None or transfer.phase is not Phase.RECEIVING:
-            return
-        if now >= transfer.progress_at + _GIVE_UP_S:
-            self._cancel(now, f"silent for {_GIVE_UP_S:.0f} s")
-        elif now >= transfer.request.due:
-            transfer.request.lost()
-            self._request(transfer, now)
+        """Repeat a request, end a state whose time is up, begin the next upload."""
+        for upload in self._uploads[:]:
+            state = upload.state
+            if now >= state.deadline:
+                self._end([upload], state.timeout, now)
+            elif isinstance(state, Receiving) and now >= state.request.due:
+                state.request.lost()
+                self._request(upload, state, now)
+        for reminder in [reminder for reminder in self._reminders if now >= reminder[0]]:
+            self._reminders.remove(reminder)
+            _, station, text = reminder
+            self._post.say(Severity.ERROR, text, station)
+        self._begin_next(now)
 
-    def next_deadline(self) -> float | None:
-        """Return when `tick` has something to do."""
-        transfer = self._transfer
-        if transfer is None or transfer.phase is not Phase.RECEIVING:
-            return None
-        return min(transfer.request.due, transfer.progress_at + _GIVE_UP_S)
+    def next_deadline(self) -> float:
+        """The time of the next `tick`."""
+        if self._missions.is_free and any(isinstance(upload.state, Waiting) for upload in self._uploads):
+            return 0.0
+        times = [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
+        return min(times, default=inf)
+
+    # What happens to an upload.
+
+    def _begin(self, station: Station, count: int, now: float) -> None:
+        self._answers.forget(station)
+        self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
+        upload = _Upload(station, count, self._incidents.begin("upload"), Waiting(now))
+        self._uploads.append(upload)
+        refusal = self._missions.armed_refusal() or self._limit(station)
+        if refusal is not None:
+            self._handle(upload, Ended(refusal), now)
+        self._begin_next(now)
+
+    def _begin_next(self, now: float) -> None:
+        """Give the turn to the first upload that waits for it."""
+        for upload in self._uploads[:]:
+            if isinstance(upload.state, Waiting):
+                refusal = self._missions.acquire(upload)
+                if refusal is OCCUPIED:
+                    return
+                if refusal is not None:
+                    self._handle(upload, Ended(refusal), now)
+                else:
+                    self._handle(upload, Turn() if upload.count else Judged((), CLEARED_LIST), now)
+
+    def _handle(self, upload: _Upload, event: Event, now: float) -> None:
+        """Go where the table says."""
+        before = upload.state
+        if TRANSITIONS[type(before)][type(event)] is None:
+            self._forget(upload)
+        match event:
+            case Turn():
+                upload.state = Asking(now)
+                self._ask(now)
+            case Ready(check):
+                upload.state = state = Receiving(now, upload.count, check)
+                self._note("mission.upload_started", upload, count=upload.count)
+                self._request(upload, state, now)
+            case Judged(items, verdict):
+                if verdict.result is not Result.REJECTED and not self._post.allows(upload.station, Cost.FLASH):
+                    self._handle(upload, Ended(Refusal(MissionResult.DENIED, TOO_MANY_WRITES)), now)
+                else:
+                    upload.state = Delivering(now)
+                    self._deliver(upload, items, verdict, now)
+            case Ended(refusal):
+                self._refuse(upload, before, refusal, now)
+
+    def _end(self, uploads: list[_Upload], refusal: Refusal, now: float) -> None:
+        for upload in uploads:
+            if upload in self._uploads:
+                self._handle(upload, Ended(refusal), now)
+
+    def _forget(self, upload: _Upload) -> None:
+        self._uploads.remove(upload)
+        self._missions.release(upload)
+
+    def _is_for(self, upload: _Upload, count: int, now: float) -> bool:
+        """Take a MISSION_COUNT of a station whose upload runs; False if it announces another one."""
+        state = upload.state
+        if isinstance(state, Delivering):
+            # The list before is being written. A cancel comes too late, a new list waits for its turn.
+            return count == 0
+        if count == 0:
+            # Mission Planner's Cancel button. The pilot did not ask to lose the mission that is in the craft.
+            self._end([upload], _cancelled("cancelled"), now)
+            return True
+        if isinstance(state, Waiting):
+            upload.count = count
+            return True
+        if count != upload.count:
+            self._forget(upload)
+            return False
+        if isinstance(state, Receiving):
+            state.announced_again = bool(state.items)
+            self._request(upload, state, now)
+        return True
+
+    def _ask(self, now: float) -> None:
+        """Ask the flight controller; one question serves all uploads that begin before it is answered."""
+        if not self._is_asking:
+            self._is_asking = True
+            self._runner.start(self._missions.preflight(), self._asked, now)
 
     def _limit(self, station: Station) -> Refusal | None:
+        if len(self._uploads) > _MOST_UPLOADS:
+            return OCCUPIED
         return None if self._post.allows(station, Cost.BOARD) else _TOO_MANY_UPLOADS
 
     def _asked(self, answer: StoreReport | Refusal | LinkLost, now: float) -> None:
         self._is_asking = False
+        upload = next((upload for upload in self._uploads if isinstance(upload.state, Asking)), None)
+        if upload is None:
+            return
         if isinstance(answer, LinkLost):
             answer = NO_LINK
-        transfer = self._transfer
-        if transfer is None or transfer.phase is not Phase.ASKING:
-            return
+        elif isinstance(answer, StoreReport) and (rejection := check_count(upload.count, answer.rules)):
+            answer = Refusal(rejection.ack, rejection.finding.text())
         if isinstance(answer, Refusal):
-            self._abandon(transfer, answer, now)
-            return
-        rejection = check_count(transfer.count, answer.rules)
-        if rejection is not None:
-            self._abandon(transfer, Refusal(rejection.ack, rejection.finding.text()), now)
-            return
-        transfer.check = begin_check(transfer.count, answer.rules, self._fallback_home())
-        transfer.phase = Phase.RECEIVING
-        transfer.progress_at = now
-        self._log_event(
-            "info",
-            "mission.upload_started",
-            station=str(transfer.station),
-            count=transfer.count,
-            incident=transfer.incident,
-        )
-        self._request(transfer, now)
+            self._handle(upload, Ended(answer), now)
+        else:
+            check = begin_check(upload.count, answer.rules, self._fallback_home())
+            self._handle(upload, Ready(check), now)
 
-    def _request(self, transfer: _Transfer, now: float) -> None:
+    def _request(self, upload: _Upload, state: Receiving, now: float) -> None:
         """Ask for the lowest missing item; id 40, the only one that Mission Planner understands in both modes."""
-        seq = 0 if transfer.announced_again else transfer.checked
-        transfer.request.asked(seq, now)
-        station = transfer.station
-        request = messages.MAVLink_mission_request_message(station.sysid, station.compid, seq, MISSION_TYPE_MISSION)
+        state.request.asked(state.wanted, now)
+        station = upload.station
+        request = messages.MAVLink_mission_request_message(
+            station.sysid, station.compid, state.wanted, MISSION_TYPE_MISSION
+        )
         self._post.to(station, request)
-        if transfer.request.is_repeated:
+        if state.request.is_repeated:
             for elsewhere in self._moved_to(station, now):
                 self._post.to(elsewhere, request)
 
-    def _follow(self, station: Station, now: float) -> None:
-        """Go on with the transfer of a ground station whose address has changed (Wi-Fi roaming), if this is it.
-
-        One that was answered here has announced a list of its own: two lists must never be mixed.
-        """
-        transfer = self._transfer
-        if transfer is None or transfer.station == station:
-            return
-        if self._answers.was_said_to(station, now) or station not in self._moved_to(transfer.station, now):
-            return
-        self._log_event(
-            "info",
-            "mission.station_moved",
-            before=str(transfer.station),
-            after=str(station),
-            incident=transfer.incident,
-        )
-        self._missions.release(transfer.station)
-        self._missions.acquire(station)
-        transfer.station = station
-
-    def _late_item(self, station: Station, seq: int, now: float) -> None:
-        answer = self._answers.to(station, now)
-        if answer is not None and (answer.is_refusal or seq == answer.count - 1):
-            self._ack(station, answer.ack)
-
-    def _reject(self, transfer: _Transfer, now: float) -> None:
-        assert transfer.check is not None
-        items = tuple(transfer.items[seq] for seq in sorted(transfer.items))
-        self._deliver(transfer, transfer.check.finish(), items, now)
-
-    def _deliver(self, transfer: _Transfer, verdict: Verdict[Any], items: tuple[MissionItem, ...], now: float) -> None:
-        self._transfer = transfer
-        is_rejected = verdict.result is Result.REJECTED
-        if not is_rejected and not self._post.allows(transfer.station, Cost.FLASH):
-            self._abandon(transfer, Refusal(MissionResult.DENIED, TOO_MANY_WRITES), now)
-            return
-        transfer.phase = Phase.DELIVERING
-        arrived = ArrivedMission(str(transfer.station), items, verdict)
+    def _deliver(self, upload: _Upload, items: tuple[MissionItem, ...], verdict: Verdict[Any], now: float) -> None:
+        arrived = ArrivedMission(str(upload.station), items, verdict)
+        is_kept = verdict.result is not Result.REJECTED or self._is_kept(upload)
         self._runner.start(
-            self._missions.deliver(arrived, _ignore, is_kept=not is_rejected or self._is_kept(transfer)),
-            lambda delivery, at: self._delivered(transfer, arrived, delivery, at),
+            self._missions.deliver(arrived, _ignore, is_kept=is_kept),
+            lambda delivery, at: self._delivered(upload, verdict, delivery, at),
             now,
         )
 
-    def _is_kept(self, transfer: _Transfer) -> bool:
+    def _is_kept(self, upload: _Upload) -> bool:
         """False if so many lists came from there that were not flown that this one is not stored."""
-        return self._post.allows(transfer.station, Cost.STORED)
+        return self._post.allows(upload.station, Cost.STORED)
 
-    def _delivered(
-        self, transfer: _Transfer, arrived: ArrivedMission, delivery: Delivery | LinkLost, now: float
-    ) -> None:
+    def _delivered(self, upload: _Upload, verdict: Verdict[Any], delivery: Delivery | LinkLost, now: float) -> None:
         if isinstance(delivery, LinkLost):
             delivery = Delivery(NO_LINK.ack, NO_LINK.text, None)
-        self._tell_writer(transfer.station, arrived.verdict, delivery)
-        if delivery.ack is MissionResult.ACCEPTED:
-            self._tell_others(transfer.station, delivery)
-        self._answer(transfer.station, transfer.count, delivery.ack, now)
-        self._log_event(
-            "info" if delivery.ack is MissionResult.ACCEPTED else "warning",
-            "mission.upload_ended",
-            station=str(transfer.station),
-            mission=delivery.number,
-            ack=delivery.ack.name,
-            detail=delivery.text,
-            incident=transfer.incident,
-        )
-        self._end(now)
+        self._tell(upload.station, verdict, delivery)
+        if upload in self._uploads:
+            self._answer(upload, delivery.ack, now)
+            self._handle(upload, Delivered(), now)
+        accepted = delivery.ack is MissionResult.ACCEPTED
+        facts = {"mission": delivery.number, "ack": delivery.ack.name, "detail": delivery.text}
+        self._note("mission.upload_ended", upload, "info" if accepted else "warning", **facts)
+        self._begin_next(now)
 
-    def _tell_writer(self, station: Station, verdict: Verdict[Any], delivery: Delivery) -> None:
+    def _tell(self, station: Station, verdict: Verdict[Any], delivery: Delivery) -> None:
+        """Tell the writer all of it, other ground stations what has changed on the aircraft."""
         if delivery.ack is not MissionResult.ACCEPTED:
             self._post.say(Severity.ERROR, delivery.text, station)
         else:
@@ -369,45 +362,64 @@ class MissionUploads:
                     self._post.say(Severity.WARNING if news is News.WARNING else Severity.NOTICE, line, station)
         if delivery.number is None:
             self._post.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
-
-    def _tell_others(self, writer: Station, delivery: Delivery) -> None:
-        """Other ground stations hear only what changed on the aircraft."""
         if delivery.change:
-            severity = Severity.WARNING if delivery.change == "Mission erased" else Severity.INFO
-            self._post.say_to_others(severity, f"{delivery.change}, by {writer.peer}", writer)
+            severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
+            self._post.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
 
-    def _cancel(self, now: float, why: str) -> None:
-        assert self._transfer is not None
-        refusal = Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}, old mission kept")
-        self._abandon(self._transfer, refusal, now)
-
-    def _abandon(self, transfer: _Transfer, refusal: Refusal, now: float) -> None:
-        """End a transfer before it was delivered; what came of it is stored all the same."""
-        if transfer.items:
-            items = tuple(transfer.items[seq] for seq in sorted(transfer.items))
+    def _refuse(self, upload: _Upload, state: State, refusal: Refusal, now: float) -> None:
+        """Tell why an upload has ended; the items that came are stored all the same."""
+        if isinstance(state, Receiving) and state.items:
+            items = tuple(state.items[seq] for seq in sorted(state.items))
             finding = Finding(None, "list", len(items), None, refusal.text)
             verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
-            arrived = ArrivedMission(str(transfer.station), items, verdict)
-            delivery = self._missions.deliver(arrived, _ignore, is_kept=self._is_kept(transfer))
+            arrived = ArrivedMission(str(upload.station), items, verdict)
+            delivery = self._missions.deliver(arrived, _ignore, is_kept=self._is_kept(upload))
             self._runner.start(delivery, lambda _delivery, _at: None, now)
-        self._end(now)
-        self._refuse(transfer, refusal, now)
+            if state.is_closed:
+                self._reminders += [(now + later_s, upload.station, refusal.text) for later_s in _REMINDERS_S]
+        self._post.say(Severity.ERROR, refusal.text, upload.station)
+        self._answer(upload, refusal.ack, now)
+        self._note("mission.refused", upload, "warning", ack=refusal.ack.name, why=refusal.text)
+        self._begin_next(now)
 
-    def _refuse(self, transfer: _Transfer, refusal: Refusal, now: float) -> None:
-        self._post.say(Severity.ERROR, refusal.text, transfer.station)
-        self._answer(transfer.station, transfer.count, refusal.ack, now)
-        self._log_event(
-            "warning",
-            "mission.refused",
-            station=str(transfer.station),
-            ack=refusal.ack.name,
-            why=refusal.text,
-            incident=transfer.incident,
-        )
+    # Ground stations.
 
-    def _answer(self, station: Station, count: int, ack: MissionResult, now: float) -> None:
-        for where in (station, *self._moved_to(station, now)):
-            self._answers.note(where, ack, count, now)
+    def _of(self, station: Station) -> _Upload | None:
+        """The newest upload of a ground station: one may wait behind another that is being written."""
+        return next((upload for upload in reversed(self._uploads) if upload.station == station), None)
+
+    def _undelivered(self) -> list[_Upload]:
+        return [upload for upload in self._uploads if not isinstance(upload.state, Delivering)]
+
+    def _follow(self, station: Station, now: float) -> None:
+        """Go on with the upload of a ground station whose address has changed (Wi-Fi roaming), if this is it.
+
+        One that was answered here has announced a list of its own: two lists must never be mixed.
+        """
+        if self._of(station) is not None or self._answers.was_said_to(station, now):
+            return
+        for upload in self._uploads:
+            if station in self._moved_to(upload.station, now):
+                self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
+                upload.station = station
+
+    def _late_item(self, station: Station, seq: int, now: float) -> None:
+        """Answer an item of an upload that has ended, or of one that a killed daemon knew of.
+
+        A ground station whose address has just changed is neither.
+        """
+        answer = self._answers.to(station, now)
+        if answer is not None:
+            if answer.is_refusal or seq == answer.count - 1:
+                self._ack(station, answer.ack)
+        elif not self._uploads and not self._answers.is_known(station, now):
+            self._post.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
+            self._answers.note(station, _UNKNOWN_UPLOAD.ack, 0, now)
+            self._ack(station, _UNKNOWN_UPLOAD.ack)
+
+    def _answer(self, upload: _Upload, ack: MissionResult, now: float) -> None:
+        for where in (upload.station, *self._moved_to(upload.station, now)):
+            self._answers.note(where, ack, upload.count, now)
             self._ack(where, ack)
 
     def _ack(self, station: Station, ack: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
@@ -416,15 +428,13 @@ class MissionUploads:
             messages.MAVLink_mission_ack_message(station.sysid, station.compid, ack, mission_type),
         )
 
-    def _end(self, now: float) -> None:
-        """Forget the transfer and free the desk."""
-        if self._transfer is not None:
-            self._missions.release(self._transfer.station)
-            self._transfer = None
-        if self._queued is not None:
-            (station, count), self._queued = self._queued, None
-            self.count(station, count, MISSION_TYPE_MISSION, now)
+    def _note(self, event: str, upload: _Upload, level: Level = "info", **facts: object) -> None:
+        self._log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)
+
+
+def _cancelled(why: str) -> Refusal:
+    return Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}, old mission kept")
 
 
 def _ignore(_records: int) -> None:
-    """Progress matters to nobody here: MAVLink has no message for it."""
+    """MAVLink has no message for progress."""

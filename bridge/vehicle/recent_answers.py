@@ -58,5 +58,10 @@ class RecentAnswers:
             return self._answers[station]
         return next((answer for who, answer in self._answers.items() if station in self._moved_to(who, now)), None)
 
+    def is_known(self, station: Station, now: float) -> bool:
+        """True if a station of these ids was answered, here or at an address that it may have left."""
+        self._forget_old(now)
+        return any((who.sysid, who.compid) == (station.sysid, station.compid) for who in self._answers)
+
     def _forget_old(self, now: float) -> None:
         self._answers = {who: answer for who, answer in self._answers.items() if now <= answer.until}

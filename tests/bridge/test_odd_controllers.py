@@ -91,7 +91,7 @@ def test_every_procedure_ends_whatever_is_answered(seed: int) -> None:
     Download(station).run(60)
     station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0, 9))
     world.wait_until(lambda w: not w.bridge.runner.is_busy, 60)
-    assert world.bridge._uploads.phase is None
+    assert world.bridge._uploads.state is None
 
 
 PROOF = Stored(Status.OK, identify(records_of(waypoints(30)))).encode()

@@ -20,7 +20,7 @@ from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from world import Air, GroundStation, World, flash_holding
 
 from bridge.model.mission_log import Outcome
-from bridge.vehicle.mission_upload import Phase
+from bridge.vehicle.upload_states import Asking, Delivering, Receiving, State
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from simulator.options import Faults, SimOptions, TelemetryProtocol
@@ -39,14 +39,14 @@ def holding(options: SimOptions | None = None, faults: Faults | None = None) -> 
     return world, GroundStation(world)
 
 
-def phase(world: World) -> Phase | None:
-    return world.bridge._uploads.phase
+def state(world: World) -> type[State] | None:
+    return world.bridge._uploads.state
 
 
 def receiving(world: World, station: GroundStation, items: list[MissionItem], sent: int) -> None:
     """Begin an upload and send its first items."""
     station.send(count_message(len(items)))
-    world.wait_until(lambda w: phase(w) is Phase.RECEIVING, 1)
+    world.wait_until(lambda w: state(w) is Receiving, 1)
     for seq in range(sent):
         station.send(item_message(seq, items[seq]))
     world.run(0.001)
@@ -79,7 +79,7 @@ def assert_refusal_stands(world: World, station: GroundStation, result: MissionR
     world.run(0.05)
     assert acks(station) == [result]
     assert A.INVALID_SEQUENCE not in acks(station)
-    assert phase(world) is None
+    assert state(world) is None
 
 
 def refused(world: World, station: GroundStation, count: int, result: MissionResult, words: str) -> None:
@@ -231,31 +231,48 @@ def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> Non
     assert Upload(station, waypoints(capacity)).run() is A.ACCEPTED
 
 
-def test_a_second_ground_station_is_denied_while_a_transfer_runs() -> None:
+def test_two_that_press_write_together_both_succeed() -> None:
+    """The second one's MISSION_COUNT is repeated for 2.8 s, and answered when its turn has come."""
+    world, station = holding()
+    second = GroundStation(world, "second", sysid=254, air=Air(delay_s=0.002))
+    station.air = Air(delay_s=0.002)
+    uploads = [Upload(station, waypoints(100)), Upload(second, waypoints(30, 1), repeat_s=0.7, tries=4)]
+    assert [upload.run() for upload in uploads] == [A.ACCEPTED, A.ACCEPTED]
+    assert world.stored == records_of(waypoints(30, 1))
+    assert [upload.requested for upload in uploads] == [list(range(100)), list(range(30))]
+
+
+def test_a_ground_station_whose_turn_does_not_come_is_denied() -> None:
     world, station = holding()
     second = GroundStation(world, "second", sysid=254)
-    other_program = GroundStation(world, "gcs", compid=7)
-    world.stations[station.peer] = station
-    station.air = Air(delay_s=0.002)
-    upload = Upload(station, waypoints(100))
+    receiving(world, station, waypoints(50), 10)
+    for seq in range(10, 40):
+        world.after((seq - 9) * 0.1, lambda seq=seq: station.send(item_message(seq, waypoints(50)[seq])))  # type: ignore[misc]
+    for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
+        second.send(message)
+    world.run(2.4)
+    assert second.said("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
+    world.run(0.2)
+    assert acks(second) == [A.DENIED]
+    assert second.texts() == ["Another mission transfer is running"]
+    assert "Another mission transfer is running" not in station.texts()
+    assert state(world) is Receiving
+
+
+@pytest.mark.parametrize("message", [count_message(0), ack_message(A.OPERATION_CANCELLED)])
+def test_a_ground_station_that_waits_may_cancel(message: Message) -> None:
+    world, station = holding()
+    second = GroundStation(world, "second", sysid=254)
+    receiving(world, station, waypoints(8), 3)
+    second.send(count_message(5))
+    second.send(message)
     world.run(0.1)
-    assert phase(world) is Phase.RECEIVING
-    for intruder in (second, other_program):
-        for message in (count_message(5), count_message(0), clear_message()):
-            second.take()
-            intruder.send(message)
-        intruder.send(item_message(0, OLD[1]))
-        intruder.send(ack_message(A.ERROR))
-        intruder.send(partial_list_message())
-    world.run(0.02)
-    assert set(acks(second)) == {A.DENIED}
-    assert any("Another mission transfer" in text for text in second.texts())
-    assert requested(second) == []
-    world.run(2)
-    assert upload.requested[-1] == 99
-    assert world.stored == records_of(waypoints(100))
-    # The first is done: now the second may.
-    assert Upload(second, waypoints(3, 1)).run() is A.ACCEPTED
+    assert acks(second) == [A.OPERATION_CANCELLED]
+    for seq in range(3, 8):
+        station.send(item_message(seq, waypoints(8)[seq]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(waypoints(8))
 
 
 def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
@@ -263,8 +280,10 @@ def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
     outcome = world.push(waypoints(146))
     station.send(count_message(5))
     world.run(0.05)
-    assert acks(station) == [A.DENIED]
+    assert requested(station) == []
     world.wait_until(lambda _: bool(outcome), 2)
+    world.run(0.1)
+    assert requested(station) == [0]
     upload = Upload(station, waypoints(30))
     world.run(0.02)
     denied = world.push(waypoints(3))
@@ -286,7 +305,7 @@ def test_the_same_ground_station_starts_again_while_the_flight_controller_is_ask
     world, station = holding()
     station.send(count_message(9))
     world.run(0.0005)
-    assert phase(world) is Phase.ASKING
+    assert state(world) is Asking
     again = waypoints(12, 2)
     assert Upload(station, again).run() is A.ACCEPTED
     assert world.stored == records_of(again)
@@ -298,7 +317,7 @@ def test_the_same_ground_station_starts_again_while_the_list_is_written(after_s:
     first, again = waypoints(146, 1), waypoints(12, 2)
     receiving(world, station, first, 146)
     world.run(after_s)
-    assert phase(world) is Phase.DELIVERING
+    assert state(world) is Delivering
     upload = Upload(station, again)
     # The answer to the list before comes first, and is no answer to this one: the requests go on.
     assert upload.run() is A.ACCEPTED
@@ -307,7 +326,7 @@ def test_the_same_ground_station_starts_again_while_the_list_is_written(after_s:
     world.run(6)
     assert world.stored in (records_of(first), records_of(again))
     assert world.store.outcomes()[0] is Outcome.VERIFIED
-    assert phase(world) is None
+    assert state(world) is None
     assert Upload(station, again).run() is A.ACCEPTED
 
 
@@ -384,13 +403,65 @@ def test_a_refusal_is_remembered_for_ten_seconds() -> None:
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     world.run(10.5)
     station.take()
-    station.send(item_message(0, OLD[0]))
-    world.run(1)
-    assert acks(station) == []
     station.send(partial_list_message())
     world.run(1)
     assert acks(station) == [A.UNSUPPORTED]
     assert "A mission can only be written as a whole" in station.texts()
+
+
+def test_items_of_an_upload_that_a_killed_daemon_knew_of_are_answered_at_once() -> None:
+    world, station = holding()
+    for _ in range(3):
+        for seq in (11, 12, 13):
+            station.send(item_message(seq, OLD[seq]))
+        world.run(0.45)
+    assert set(acks(station)) == {A.OPERATION_CANCELLED}
+    assert len(acks(station)) == 9
+    assert station.texts() == ["This upload is not known here: write it again"]
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+
+
+def test_write_fast_that_lost_items_is_told_as_an_error_and_more_than_once() -> None:
+    """It closes with success: its own MISSION_ACK says that it has ended."""
+    world, station = holding()
+    other = GroundStation(world, "other", sysid=254)
+    items = waypoints(35)
+    receiving(world, station, items, 0)
+    for seq in set(range(35)) - {7, 20, 34}:
+        station.send(item_message(seq, items[seq]))
+    station.send(ack_message(A.ACCEPTED))
+    world.run(0.4)
+    text = "Mission NOT written: 3 of 35 missing, use Write"
+    assert station.texts() == [text]
+    assert acks(station) == [A.OPERATION_CANCELLED]
+    assert world.stored == OLD_RECORDS
+    world.run(10)
+    assert station.texts() == [text] * 3
+    assert {message.severity for message in station.said("STATUSTEXT")} == {3}
+    assert other.texts() == []
+
+
+def test_a_new_upload_ends_the_reminders() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(35), 12)
+    station.send(ack_message(A.ACCEPTED))
+    world.run(0.5)
+    assert Upload(station, waypoints(35)).run() is A.ACCEPTED
+    station.take()
+    world.run(10)
+    assert station.texts() == []
+
+
+def test_an_item_that_the_network_delayed_still_counts() -> None:
+    world, station = holding()
+    items = waypoints(35)
+    receiving(world, station, items, 34)
+    station.send(ack_message(A.ACCEPTED))
+    world.run(0.2)
+    station.send(item_message(34, items[34]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
 
 
 def test_a_new_count_makes_the_refusal_before_forgotten() -> None:
@@ -575,16 +646,18 @@ def test_an_error_from_the_ground_station_cancels(result: MissionResult, sent: i
     station.send(ack_message(result))
     world.run(0.1)
     assert acks(station) == [A.OPERATION_CANCELLED]
-    assert phase(world) is None
+    assert state(world) is None
     assert world.stored == OLD_RECORDS
 
 
-def test_accepted_from_the_ground_station_cancels_nothing() -> None:
+def test_an_ack_from_before_the_first_item_ends_nothing() -> None:
+    """Mission Planner ends a Read with it, and the network may bring it late."""
     world, station = holding()
     items = waypoints(8)
-    receiving(world, station, items, 4)
+    receiving(world, station, items, 0)
     station.send(ack_message(A.ACCEPTED))
-    for seq in range(4, 8):
+    world.run(1)
+    for seq in range(8):
         station.send(item_message(seq, items[seq]))
     world.run(1)
     assert acks(station) == [A.ACCEPTED]
@@ -605,7 +678,7 @@ def test_a_cancel_that_comes_too_late_erases_nothing() -> None:
     world, station = holding()
     items = waypoints(30)
     receiving(world, station, items, 30)
-    assert phase(world) is Phase.DELIVERING
+    assert state(world) is Delivering
     station.send(count_message(0))
     world.run(3)
     assert acks(station) == [A.ACCEPTED]
@@ -629,7 +702,7 @@ def test_a_repeated_last_item_is_met_with_silence_and_then_with_the_same_ack() -
     for _ in range(3):
         station.send(item_message(145, items[145]))
         world.run(0.3)
-        assert phase(world) is Phase.DELIVERING
+        assert state(world) is Delivering
         assert acks(station) == []
         assert requested(station) == []
     world.wait_until(lambda _: bool(acks(station)), 3)
@@ -638,7 +711,7 @@ def test_a_repeated_last_item_is_met_with_silence_and_then_with_the_same_ack() -
         station.send(item_message(145, items[145]))
         world.run(0.45)
         assert acks(station) == [A.ACCEPTED]
-        assert phase(world) is None
+        assert state(world) is None
     # An item in the middle is not the last one.
     station.take()
     station.send(item_message(20, items[20]))
@@ -748,7 +821,7 @@ def test_the_flight_controller_is_lost_in_the_middle(lose: Callable[[World], Non
     lose(world)
     world.run(4)
     assert acks(station) == [A.DENIED]
-    assert phase(world) is None
+    assert state(world) is None
     assert world.stored == OLD_RECORDS
     world.plug() if lose is World.unplug else world.power_on()
     world.run(5)
@@ -759,7 +832,7 @@ def test_the_flight_controller_is_lost_while_it_is_asked() -> None:
     world, station = holding()
     station.send(count_message(5))
     world.run(0.0005)
-    assert phase(world) is Phase.ASKING
+    assert state(world) is Asking
     world.unplug()
     world.run(0.1)
     assert acks(station) == [A.DENIED]
