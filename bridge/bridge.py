@@ -105,7 +105,7 @@ class Bridge:
         self.missions = MissionService(
             lambda mission, delivery: self._mission_endings.append((mission, delivery)), self._is_armed
         )
-        self._vehicle = OwnVehicle(self.session, self.missions, self.ground, now)
+        self._vehicle = OwnVehicle(self.session, self.missions, self.ground, lambda: self._announcer.is_lost, now)
         self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
         home = self._vehicle.home
         self._uploads = MissionUploads(
@@ -323,11 +323,11 @@ class Bridge:
         self._downloads.forget_all()
         if controller is None:
             self._uploads.link_lost(now)
-            self._announcer.lost(now)
+            self._announcer.lost(now if self.session.vehicle.heard_at is None else self.session.vehicle.heard_at)
             return
         is_passed_through = controller.profile.is_passed_through
         self._pass_through = PassThrough(self.ground) if is_passed_through else None
-        self._say(self._announcer.found(controller))
+        self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
             self._watch.look(now)

@@ -240,7 +240,7 @@ class Firmware:
             return
         for message in self._schedule.take_due(self._clock, self.protocol is Protocol.AUTOSENSE):
             uptime = self._clock - self._booted_at
-            frame = self._sender.telemetry(message, self._flight(), self.armed, uptime)
+            frame = self._sender.telemetry(message, self.craft_at(self._clock), uptime)
             self._uart.write(frame, self._clock)
 
     def _send_message(self, packed: Packed) -> None:

@@ -10,14 +10,17 @@ import struct
 from enum import Enum
 
 from protocols.mavlink.codec import FrameWriter, Packed
-from simulator.flight import FlightState
+from simulator.flight import Craft
+from simulator.transmitter import channels_us
 
 _SYSID = 1
 _COMPID = 200
 _QUADROTOR = 2
 _ARDUPILOTMEGA = 3
 _MAVLINK_VERSION = 3
-_MODE_STABILIZE_DISARMED = 80
+_MODE_MANUAL_DISARMED, _MODE_STABILIZE_DISARMED = 64, 80
+#: The boxes ANGLE and HORIZON.
+_LEVEL_BOXES = 0b11
 _MODE_ARMED = 128
 _STATE_STANDBY, _STATE_ACTIVE = 3, 4
 _FIX_3D = 3
@@ -84,10 +87,10 @@ class MavlinkSender:
     def __init__(self) -> None:
         self._writer = FrameWriter(_SYSID, _COMPID)
 
-    def telemetry(self, message: Stream, flight: FlightState, armed: bool, uptime: float) -> bytes:
+    def telemetry(self, message: Stream, craft: Craft, uptime: float) -> bytes:
         """Encode a message of this moment; `uptime` in seconds."""
         _, msgid, layout = message.value
-        payload = struct.pack(layout, *_fields(message, flight, armed, round(uptime * 1000)))
+        payload = struct.pack(layout, *_fields(message, craft, round(uptime * 1000)))
         return self.frame(Packed(msgid, payload, payload))
 
     def frame(self, packed: Packed) -> bytes:
@@ -95,15 +98,17 @@ class MavlinkSender:
         return self._writer.frame(packed, 1)
 
 
-def _fields(message: Stream, flight: FlightState, armed: bool, uptime_ms: int) -> tuple[float, ...]:
+def _fields(message: Stream, craft: Craft, uptime_ms: int) -> tuple[float, ...]:
     """Return a message's fields in the order of the wire."""
+    flight, armed = craft.flight, craft.armed
     heading = round(flight.heading) % 360
     throttle = 45 if armed else 0
     match message:
         case Stream.SCALED_PRESSURE:
             return uptime_ms, 1013.25 - flight.altitude_m * 0.12, 0.0, 3200
         case Stream.HEARTBEAT:
-            mode = _MODE_STABILIZE_DISARMED | (_MODE_ARMED if armed else 0)
+            mode = _MODE_STABILIZE_DISARMED if craft.boxes & _LEVEL_BOXES else _MODE_MANUAL_DISARMED
+            mode |= _MODE_ARMED if armed else 0
             state = _STATE_ACTIVE if armed else _STATE_STANDBY
             return 0, _QUADROTOR, _ARDUPILOTMEGA, mode, state, _MAVLINK_VERSION
         case Stream.SYS_STATUS:
@@ -116,8 +121,8 @@ def _fields(message: Stream, flight: FlightState, armed: bool, uptime_ms: int) -
             motion = (round(flight.speed_ms * 100), course)
             return uptime_ms * 1000, *position, _UNKNOWN, _UNKNOWN, *motion, _FIX_3D, flight.satellites
         case Stream.RC_CHANNELS_RAW:
-            sticks = (1500, 1500, 1450 if armed else 1000, 1500, 2000 if armed else 1000, 1500, 1500, 1500)
-            return uptime_ms, *sticks, 0, _RSSI
+            roll, pitch, yaw, throttle_us, *aux = channels_us(armed, craft.boxes)
+            return uptime_ms, roll, pitch, throttle_us, yaw, *aux, 0, _RSSI
         case Stream.VFR_HUD:
             return 0.0, flight.speed_ms, flight.height_m, flight.climb_ms, heading, throttle
         case Stream.ATTITUDE:

@@ -7,6 +7,7 @@ from enum import IntEnum
 
 from protocols.msp.frame import Direction, MspFrame
 from simulator.flight import Craft
+from simulator.transmitter import box_activation, channels_us
 
 _STOCK_BUFFER = 64
 _VERSION = 211
@@ -21,8 +22,6 @@ _BOXES = (
     "HEADFREE", "BEEPER", "HEADADJ", "OSD SW", "GTUNE",
 )  # fmt: skip
 _PIDS = ("ROLL", "PITCH", "YAW", "ALT", "Pos", "PosR", "NavR", "LEVEL", "MAG", "VEL")
-_STICKS_DISARMED = (1500, 1500, 1500, 1000, 1000, 1500, 1500, 1500)
-_STICKS_ARMED = (1500, 1500, 1500, 1450, 2000, 1500, 1500, 1500)
 _RSSI = 230
 _HOME, _HOLD = 0, 16
 _MALFORMED_WP_SIZE = 12
@@ -137,7 +136,7 @@ class MspAnswers:
         self._settings = {
             HarakiriCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
             HarakiriCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
-            HarakiriCommand.BOX: bytes(2 * len(_BOXES)),
+            HarakiriCommand.BOX: box_activation(len(_BOXES)),
         }
 
     def answer(self, command: int, payload: bytes) -> bytes:
@@ -170,7 +169,7 @@ class MspAnswers:
             case HarakiriCommand.MOTOR:
                 return struct.pack("<8h", *(1450 if armed else 1000,) * 4, *(0,) * 4)
             case HarakiriCommand.RC:
-                return struct.pack("<8H", *(_STICKS_ARMED if armed else _STICKS_DISARMED))
+                return struct.pack("<8H", *channels_us(armed, craft.boxes))
             case HarakiriCommand.RAW_GPS:
                 position = (
                     flight.lat_e7,

@@ -7,8 +7,10 @@ kept as bytes until `settle`.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from bridge.fc.msp_telemetry import velocity
+from bridge.model.flight_mode import FlightMode, active_boxes, flight_mode
 from bridge.model.vehicle import (
     Fix,
     FlightState,
@@ -21,6 +23,7 @@ from bridge.model.vehicle import (
     Signal,
     Source,
     Sticks,
+    Switches,
     Vehicle,
 )
 from protocols.mavlink.codec import MavlinkDecoder
@@ -34,7 +37,7 @@ _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
 _AUTOPILOT_AT = 5
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
 _MAX_RSSI, _HARAKIRI_MAX_RSSI = 254, 255
-_CHANNELS = 18
+_STICKS, _CHANNELS = 4, 18
 _SENSORS = {
     m.MAV_SYS_STATUS_SENSOR_3D_ACCEL: Sensor.ACCELEROMETER,
     m.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: Sensor.BAROMETER,
@@ -54,6 +57,7 @@ class MavlinkTelemetry:
     def __init__(self, vehicle: Vehicle, *, is_harakiri: bool) -> None:
         self._vehicle = vehicle
         self._is_harakiri = is_harakiri
+        self._is_level = False
         self._decoder = MavlinkDecoder()
         self._unread: dict[int, tuple[MavlinkFrame, float]] = {}
         self._readers: Mapping[int, Callable[[Message, float], None]] = {
@@ -108,13 +112,22 @@ class MavlinkTelemetry:
 
     def _heartbeat(self, message: Message, now: float) -> None:
         armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
-        mode = None
+        mode: FlightMode | str | None = None
         if self._is_harakiri:
-            known = self._vehicle.last(FlightState)
-            mode = None if known is None else known.mode
+            self._is_level = bool(message.base_mode & m.MAV_MODE_FLAG_STABILIZE_ENABLED)
+            mode = self._harakiri_mode()
         elif message.base_mode & m.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             mode = str(message.custom_mode)
         self._vehicle.hear(FlightState(now, Source.MAVLINK, armed, mode))
+
+    def _harakiri_mode(self) -> FlightMode:
+        """Its heartbeat says only whether it levels itself; the rest follows from the pilot's switches."""
+        switches, sticks = self._vehicle.last(Switches), self._vehicle.last(Sticks)
+        if switches is not None and sticks is not None:
+            mode = flight_mode(active_boxes(switches.activation, sticks.channels_us[_STICKS:]), switches.boxes)
+            if mode not in (FlightMode.STABILIZE, FlightMode.ACRO):
+                return mode
+        return FlightMode.STABILIZE if self._is_level else FlightMode.ACRO
 
     def _attitude(self, message: Message, now: float) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))
@@ -190,6 +203,9 @@ class MavlinkTelemetry:
         if channels:
             self._vehicle.hear(Sticks(now, Source.MAVLINK, channels))
         if self._is_harakiri:
+            state = self._vehicle.last(FlightState)
+            if state is not None and state.mode != self._harakiri_mode():
+                self._vehicle.hear(replace(state, mode=self._harakiri_mode()))
             if message.rssi or self._vehicle.last(Signal) is not None:
                 self._vehicle.hear(Signal(now, Source.MAVLINK, message.rssi / _HARAKIRI_MAX_RSSI))
         elif message.rssi != _UNKNOWN_U8:

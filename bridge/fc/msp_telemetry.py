@@ -21,6 +21,7 @@ from bridge.model.vehicle import (
     Signal,
     Source,
     Sticks,
+    Switches,
     Vehicle,
 )
 from protocols.msp.commands import Msp
@@ -32,6 +33,7 @@ from protocols.msp.telemetry import (
     decode_altitude,
     decode_analog,
     decode_attitude,
+    decode_box_activation,
     decode_channels,
     decode_home,
     decode_raw_gps,
@@ -149,6 +151,12 @@ def _raw_imu(vehicle: Vehicle, payload: bytes, _controller: FlightController, no
         vehicle.hear(ImuSample(now, Source.MSP, imu.acc, imu.gyro, imu.mag))
 
 
+def _box(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+    activation = decode_box_activation(payload, len(controller.boxes))
+    if activation is not None:
+        vehicle.hear(Switches(now, Source.MSP, controller.boxes, activation))
+
+
 def _wp(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
     home = decode_home(payload)
     if home is not None:
@@ -169,6 +177,7 @@ _DECODERS: Mapping[int, Decoder] = {
     Msp.ANALOG: _analog,
     Msp.RC: _rc,
     Msp.RAW_IMU: _raw_imu,
+    Msp.BOX: _box,
     Msp.WP: _wp,
     Msp.NAV_STATUS: _nav_status,
 }

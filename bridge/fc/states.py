@@ -482,14 +482,18 @@ class Frsky(State):
         self.controller = FlightController(profile, profile.name)
         self._line = FrskyLine(now)
         port.meet(self.controller)
-        # Only an armed Harakiri sends it.
-        known = port.vehicle.last(FlightState)
-        port.vehicle.hear(FlightState(now, Source.FRSKY, True, None if known is None else known.mode))
+        self._note_armed(now)
 
     def receive(self, data: bytes, now: float) -> Event | None:
         """Watch the line."""
-        self._line.receive(data, now)
+        if self._line.receive(data, now):
+            self._note_armed(now)
         return None
+
+    def _note_armed(self, now: float) -> None:
+        """Only an armed Harakiri sends FrSky telemetry."""
+        known = self.port.vehicle.last(FlightState)
+        self.port.vehicle.hear(FlightState(now, Source.FRSKY, True, None if known is None else known.mode))
 
     def tick(self, now: float) -> Event | None:
         """Notice silence."""

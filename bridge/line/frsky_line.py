@@ -15,11 +15,13 @@ class FrskyLine:
         self._heard_at = now
         self.ended: str | None = None
 
-    def receive(self, data: bytes, now: float) -> None:
-        """Take bytes from the port."""
+    def receive(self, data: bytes, now: float) -> bool:
+        """Take bytes from the port; True if they belong to FrSky telemetry."""
         self._watch.feed(data)
-        if self._watch.values_in_a_row:
-            self._heard_at = now
+        if not self._watch.values_in_a_row:
+            return False
+        self._heard_at = now
+        return True
 
     def tick(self, now: float) -> None:
         """Notice silence."""

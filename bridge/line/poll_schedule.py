@@ -66,6 +66,8 @@ POLLS = (
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
 )
 #: For boards that report their progress in a mission.
+#: Asked where the switches must be known in flight; the longest reply is that of 15 boxes with six aux channels.
+BOX_POLL = Poll(Msp.BOX, request(Msp.BOX), 60, 5.0)
 NAV_POLL = Poll(Msp.NAV_STATUS, request(Msp.NAV_STATUS), 7, 0.5)
 
 

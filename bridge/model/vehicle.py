@@ -15,8 +15,8 @@ from bridge.model.ground_track import GroundTrack, distance_m
 from protocols.msp.nav import NavStatus
 from protocols.msp.telemetry import Sensor
 
-#: A reading older than this is stale: it is shown as such, or not at all.
-STALE_S = 1.5
+#: A reading older than this is stale: it is shown as such, or not at all. With the time on the line that makes 1.5 s.
+STALE_S = 1.4
 #: Before the first arming, home is where the craft stands. Smaller moves than this are the receiver's noise.
 _STANDING_M = 10.0
 
@@ -106,6 +106,14 @@ class Sticks(Reading):
 
 
 @dataclass(frozen=True, slots=True)
+class Switches(Reading):
+    """Which positions of the aux channels turn on which box, by MSP_BOX; `boxes` names them."""
+
+    boxes: tuple[str, ...]
+    activation: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Signal(Reading):
     """The RC receiver's signal strength, 0..1."""
 
@@ -182,7 +190,7 @@ class Vehicle:
         was_armed, kind = self.armed, type(reading)
         self._readings[kind] = reading
         self._news.add(kind)
-        self.heard_at = reading.heard_at
+        self.heard_at = max(reading.heard_at, self.heard_at or reading.heard_at)
         if kind in _PLACES_HOME:
             self._place_home(has_armed=was_armed is False and self.armed is True)
 

@@ -1,50 +1,59 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the pilot is told about the flight controller coming and going. Sans-IO.
+"""Tells the pilot when the flight controller is lost and when it is back. Sans-IO.
 
-A craft that arms may change protocol and speed, and is searched for a second or two. That is no news: Mission Planner
-reads warnings out loud.
+A craft that arms may change protocol and speed, and is searched for a second or two. That is not a loss: Mission
+Planner reads warnings out loud.
 """
 
 from bridge.fc.autosense import Spoken
 from bridge.fc.profile import FlightController
 from bridge.gcs.station import Severity
 
-#: Switching takes less.
-_GRACE_S = 3.0
+#: Silence that counts as a loss; a switch of protocol takes less.
+_LOST_S = 3.0
+_REPEAT_S = 10.0
 
 
 class LinkAnnouncer:
-    """Decides what is news. Each method returns a text to show, or None."""
+    """Decides what to say. Each method returns a text to show, or None."""
 
     def __init__(self) -> None:
         self._known: str | None = None
-        self._lost_at: float | None = None
+        self._silent_since: float | None = None
+        self._say_at = 0.0
+        #: True from the first text about a loss until the flight controller is back.
+        self.is_lost = False
 
-    def lost(self, now: float) -> None:
-        """It does not answer any more."""
-        if self._lost_at is None:
-            self._lost_at = now
+    def lost(self, silent_since: float) -> None:
+        """The flight controller is no longer on the line."""
+        if self._silent_since is None:
+            self._silent_since = silent_since
+            self._say_at = silent_since + _LOST_S
 
-    def found(self, controller: FlightController) -> tuple[Severity, str] | None:
-        """It is there."""
-        self._lost_at = None
-        profile = controller.profile
-        if profile.spoken is Spoken.MAVLINK and not profile.is_passed_through and self._known is not None:
-            return None
-        before, self._known = self._known, controller.name
-        if controller.name == before:
-            return None
-        if profile.notice is not None:
+    def found(self, controller: FlightController, now: float) -> tuple[Severity, str] | None:
+        """A flight controller is on the line."""
+        silent_since, self._silent_since = self._silent_since, None
+        was_lost, self.is_lost = self.is_lost, False
+        profile, before = controller.profile, self._known
+        is_switch = profile.spoken is Spoken.MAVLINK and not profile.is_passed_through and before is not None
+        if not is_switch:
+            self._known = controller.name
+        if profile.notice is not None and controller.name != before:
             return Severity.WARNING, profile.notice
+        if was_lost and silent_since is not None:
+            return Severity.NOTICE, f"Flight controller back after {now - silent_since:.0f} s"
+        if controller.name == before or is_switch:
+            return None
         return Severity.INFO, f"Found {controller.name}"
 
     def tick(self, now: float) -> tuple[Severity, str] | None:
-        """Notice that it stays away."""
-        if self._lost_at is None or now < self._lost_at + _GRACE_S:
+        """Report a loss, and again every 10 s."""
+        if self._silent_since is None or now < self._say_at:
             return None
-        self._lost_at = self._known = None
-        return Severity.WARNING, "Flight controller lost"
+        self.is_lost = True
+        self._say_at = now + _REPEAT_S
+        return Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s"
 
     def next_deadline(self) -> float | None:
-        """Return when `tick` has something to do."""
-        return None if self._lost_at is None else self._lost_at + _GRACE_S
+        """When `tick` has something to do."""
+        return None if self._silent_since is None else self._say_at

@@ -19,7 +19,7 @@ from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import MissionProgress
 from bridge.model.vehicle import FlightState, Home, MissionLeg, Reading
 from bridge.vehicle import vehicle_messages
-from bridge.vehicle.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY
+from bridge.vehicle.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
@@ -27,38 +27,51 @@ from protocols.msp.commands import Msp
 
 #: HEARTBEAT and MISSION_CURRENT come from no poll.
 _TICK_S = 1.0
-#: No wish is faster than this.
+#: Mission Planner needs two heartbeats to connect.
+_NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
+#: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
 _MISSION_CURRENT = messages.MAVLINK_MSG_ID_MISSION_CURRENT
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _STREAMS = {row.msgid: row.stream for row in TELEMETRY} | {_MISSION_CURRENT: EXTENDED_STATUS}
 _READINGS = {row.msgid: row.reading for row in TELEMETRY}
+(_SYS_STATUS,) = (row for row in TELEMETRY if row.msgid == messages.MAVLINK_MSG_ID_SYS_STATUS)
 _DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | {_MISSION_CURRENT: _TICK_S}
 
 
 class OwnVehicle:
     """Sends what is known of the vehicle, each ground station what and as often as it wishes."""
 
-    def __init__(self, session: FcSession, missions: MissionService, ground: Ground, now: float) -> None:
+    def __init__(
+        self, session: FcSession, missions: MissionService, ground: Ground, is_lost: Callable[[], bool], now: float
+    ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
+        self._is_lost = is_lost
         self._started_at = self._now = now
         self._tick_due = now
         self._rates = MessageRates(_DEFAULTS)
         self._progress = MissionProgress()
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
+        #: New ground stations, and until when they get more heartbeats.
+        self._newcomers: dict[Peer, float] = {}
+        self._newcomers_due = inf
         self._announced: tuple[bool | None, FlightMode | str | None] | None = None
 
     def newcomer(self, peer: Peer) -> None:
-        """Greet a ground station that was just heard for the first time; it must hear of home, too."""
+        """Greet a new ground station: it gets heartbeats faster so that it connects sooner, and must hear of home."""
         self._announced_home = None
+        self._newcomers[peer] = self._now + _NEWCOMER_S
+        self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
         self._ground.greet(peer, self._make_heartbeat())
 
     def tick(self, now: float) -> None:
-        """Send what comes every second."""
+        """Send what is due by time."""
         self._now = now
+        if now >= self._newcomers_due:
+            self._greet(now)
         if now < self._tick_due:
             return
         self._tick_due = max(self._tick_due + _TICK_S, now)
@@ -67,11 +80,21 @@ class OwnVehicle:
         self._set_polls(everyone)
         self._ground.introduce(self._heartbeat())
         self._ground.multicast(pack(self._mission_current()), self._rates.take_due(_MISSION_CURRENT, everyone, now))
+        if self._is_lost():
+            # No reading triggers it now.
+            self._send(_SYS_STATUS, self._moment(), everyone)
         self._announce_home()
 
     def next_deadline(self) -> float:
-        """Return when `tick` has something to do."""
-        return self._tick_due
+        """When `tick` has something to do."""
+        return min(self._tick_due, self._newcomers_due)
+
+    def _greet(self, now: float) -> None:
+        self._newcomers = {peer: until for peer, until in self._newcomers.items() if now < until}
+        self._newcomers_due = now + _NEWCOMER_INTERVAL_S if self._newcomers else inf
+        for peer in self._ground.everyone():
+            if peer in self._newcomers:
+                self._ground.greet(peer, self._make_heartbeat())
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """The vehicle has new readings: send the messages that they are for, where due."""
@@ -79,19 +102,20 @@ class OwnVehicle:
         everyone = self._ground.everyone()
         at = self._moment()
         for row in TELEMETRY:
-            if row.reading not in news:
-                continue
-            peers = self._rates.take_due(row.msgid, everyone, now)
-            if not peers:
-                continue
-            for make in row.makers:
-                message = make(at)
-                if message is not None:
-                    self._ground.multicast(pack(message), peers)
+            if row.reading in news:
+                self._send(row, at, everyone)
         if MissionLeg in news:
             self._follow_mission()
         if FlightState in news and self._announced != self._shown_state():
             self._heartbeat()
+
+    def _send(self, row: Row, at: Moment, everyone: Sequence[Peer]) -> None:
+        peers = self._rates.take_due(row.msgid, everyone, at.now)
+        if peers:
+            for make in row.makers:
+                message = make(at)
+                if message is not None:
+                    self._ground.multicast(pack(message), peers)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
         """Poll for others than ground stations, too: seconds by reading."""
@@ -172,7 +196,7 @@ class OwnVehicle:
         return heartbeat
 
     def _make_heartbeat(self) -> Message:
-        return vehicle_messages.heartbeat(self._session.vehicle, linked=self._session.controller is not None)
+        return vehicle_messages.heartbeat(self._session.vehicle, is_lost=self._is_lost())
 
     def _mission_current(self) -> Message:
         held = self._missions.held

@@ -49,7 +49,7 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_SYS_STATUS, Health, 0.5, EXTENDED_STATUS, (make.sys_status,)),
     Row(m.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, FlightState, 1.0, EXTENDED_STATUS, (make.extended_sys_state,)),
     Row(m.MAVLINK_MSG_ID_NAMED_VALUE_INT, Health, 1.0, EXTRA3, (make.cycle_time, make.i2c_errors)),
-    Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, Power, 1.0, EXTRA3, (make.battery_status,)),
+    Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, Power, 0.5, EXTRA3, (make.battery_status,)),
     Row(m.MAVLINK_MSG_ID_RC_CHANNELS, Sticks, 0.5, RC_CHANNELS, (make.rc_channels,)),
     Row(m.MAVLINK_MSG_ID_RC_CHANNELS_RAW, Sticks, 0.5, RC_CHANNELS, (make.rc_channels_raw,)),
     Row(m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT, GlobalPosition, 1.0, EXTRA3, (make.home_distance, make.home_direction)),

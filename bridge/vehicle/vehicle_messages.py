@@ -117,8 +117,8 @@ def vehicle_type(vehicle: Vehicle) -> int:
     return kind
 
 
-def heartbeat(vehicle: Vehicle, *, linked: bool) -> Message:
-    """HEARTBEAT: an ArduPilot copter (or plane); the state says whether a flight controller is there."""
+def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
+    """HEARTBEAT: an ArduPilot copter (or plane). A lost craft stays armed and in its mode, as last heard."""
     kind = vehicle_type(vehicle)
     modes = _PLANE_MODES if kind == messages.MAV_TYPE_FIXED_WING else _COPTER_MODES
     state = vehicle.last(FlightState)
@@ -130,8 +130,10 @@ def heartbeat(vehicle: Vehicle, *, linked: bool) -> Message:
         base_mode |= messages.MAV_MODE_FLAG_GUIDED_ENABLED
     if vehicle.armed:
         base_mode |= messages.MAV_MODE_FLAG_SAFETY_ARMED
-    if not linked:
-        status = messages.MAV_STATE_UNINIT if state is None else messages.MAV_STATE_CRITICAL
+    if is_lost:
+        status = messages.MAV_STATE_CRITICAL
+    elif state is None:
+        status = messages.MAV_STATE_UNINIT
     else:
         status = messages.MAV_STATE_ACTIVE if vehicle.armed else messages.MAV_STATE_STANDBY
     return messages.MAVLink_heartbeat_message(

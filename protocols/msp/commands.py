@@ -17,6 +17,7 @@ class Msp(IntEnum):
     ATTITUDE = 108
     ALTITUDE = 109
     ANALOG = 110
+    BOX = 113
     BOXNAMES = 116
     WP = 118
     BOXIDS = 119

@@ -191,3 +191,10 @@ def decode_home(payload: bytes) -> HomePoint | None:
 def decode_box_names(payload: bytes) -> tuple[str, ...]:
     """Read MSP_BOXNAMES: names in the order of the status bits."""
     return tuple(payload.decode("ascii", "replace").rstrip(";").split(";")) if payload else ()
+
+
+def decode_box_activation(payload: bytes, boxes: int) -> tuple[int, ...] | None:
+    """Read MSP_BOX: for each box a word with three bits an aux channel; 32 bits wide with more than four of them."""
+    if not boxes or len(payload) not in (2 * boxes, 4 * boxes):
+        return None
+    return struct.unpack(f"<{boxes}{'H' if len(payload) == 2 * boxes else 'I'}", payload)

@@ -68,11 +68,26 @@ def test_who_changes_over_to_mavlink_2_is_answered_in_it() -> None:
     assert versions(station) == {2}
 
 
+def test_a_newcomer_gets_heartbeats_faster_for_three_seconds() -> None:
+    """Mission Planner needs two of them before it goes on connecting."""
+    world = start()
+    old, new = GroundStation(world, "old"), GroundStation(world, "new", sysid=254)
+    old.send(gcs_heartbeat())
+    world.run(5)
+    old.take()
+    new.send(gcs_heartbeat())
+    world.run(3)
+    assert 14 <= len(new.take("HEARTBEAT")) <= 19
+    assert len(old.take("HEARTBEAT")) <= 4
+    world.run(10)
+    assert len(new.said("HEARTBEAT")) == 10
+
+
 def test_the_vehicle_is_there_once_a_second() -> None:
     world = start()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
-    world.run(0.01)
+    world.run(4)
     station.take()
     world.run(10)
     beats = [at for at, message in station.heard if message.get_type() == "HEARTBEAT"]

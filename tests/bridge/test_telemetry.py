@@ -128,7 +128,9 @@ def test_the_sticks_are_in_arducopters_order() -> None:
         1450,
         1500,
         2000,
-        *[1500] * 3,
+        1500,
+        1000,
+        1000,
     ]
     assert {getattr(channels, f"chan{number}_raw") for number in range(9, 19)} == {65535}
     assert channels.rssi == 920 * 254 // 1020
@@ -302,6 +304,8 @@ def test_noise_on_the_line_is_no_telemetry_and_no_flight_controller() -> None:
         world.hear(noise.randbytes(1000))
         world.run(0.087)
     assert len(world.events("fc.found")) == found
-    assert {message.get_type() for message in station.said()} <= {"HEARTBEAT", "MISSION_CURRENT", "STATUSTEXT"}
+    assert {message.get_type() for message in station.said()} <= {
+        "HEARTBEAT", "MISSION_CURRENT", "STATUSTEXT", "SYS_STATUS"
+    }
     world.power_on()
     world.wait_ready()

@@ -228,7 +228,7 @@ def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
     ],
 )
 def test_the_mixer_makes_the_type(mixer: int | None, mav_type: int) -> None:
-    assert make.heartbeat(Vehicle(mixer=mixer), linked=True).type == mav_type
+    assert make.heartbeat(Vehicle(mixer=mixer), is_lost=False).type == mav_type
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,7 @@ def test_modes_by_their_boxes(
     flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
     for mixer, mode in ((3, copter_mode), (8, plane_mode)):
         state = told(Vehicle(mixer=mixer), who, STATUS=status(flags=flags))
-        beat = make.heartbeat(state, linked=True)
+        beat = make.heartbeat(state, is_lost=False)
         assert (beat.custom_mode, beat.system_status) == (mode, m.MAV_STATE_ACTIVE)
         assert state.armed
 

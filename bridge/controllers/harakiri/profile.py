@@ -12,6 +12,7 @@ from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
 from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
 from bridge.line.conversation import Conversation
+from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.model.refusal import ARMED, Refusal
 from protocols.mission_item import MissionResult
@@ -61,6 +62,7 @@ PATCHED = Profile(
     _FAMILY,
     recognise=_recognise_patched,
     open_store=_msp_store,
+    polls=(*POLLS, BOX_POLL),
     check_kind="harakiri",
     rules=rules,
     restarts_after_calibration=True,
@@ -69,6 +71,7 @@ UNPATCHED = Profile(
     "Harakiri without the mission extension",
     _FAMILY,
     recognise=_recognise_unpatched,
+    polls=(*POLLS, BOX_POLL),
     no_missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
     restarts_after_calibration=True,
 )

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The simulated pilot's transmitter: which switch position turns on which box of a Harakiri (mw.c, GetRCandAuxfromBuf).
+
+MSP_BOX has one word a box: three bits an aux channel, for low (below 1300 us), middle, and high (above 1700 us).
+"""
+
+import struct
+
+_LOW, _MIDDLE, _HIGH = 1000, 1500, 2000
+#: The bits of aux 1..4 begin here.
+_AUX1, _AUX2, _AUX3, _AUX4 = 0, 3, 6, 9
+_AT_MIDDLE, _AT_HIGH = 0b010, 0b100
+
+#: Box number -> switch positions.
+_ACTIVATION = {
+    0: _AT_MIDDLE << _AUX2,  # ANGLE
+    1: _AT_HIGH << _AUX2,  # HORIZON
+    2: (_AT_MIDDLE | _AT_HIGH) << _AUX3,  # BARO
+    5: _AT_HIGH << _AUX1,  # ARM
+    6: _AT_MIDDLE << _AUX4,  # GPS HOME
+    7: _AT_HIGH << _AUX3,  # GPS HOLD
+    8: _AT_HIGH << _AUX4,  # GPS AUTO
+}
+
+
+def box_activation(boxes: int) -> bytes:
+    """The payload of MSP_BOX for so many boxes."""
+    return struct.pack(f"<{boxes}H", *(_ACTIVATION.get(box, 0) for box in range(boxes)))
+
+
+def channels_us(armed: bool, boxes: int) -> tuple[int, ...]:
+    """Roll, pitch, yaw, throttle, aux 1..4 of a pilot who wants these boxes, one bit each."""
+    aux = [_HIGH if armed else _LOW]
+    for middle, high in ((0, 1), (2, 7), (6, 8)):
+        aux.append(_HIGH if boxes >> high & 1 else _MIDDLE if boxes >> middle & 1 else _LOW)
+    return (_MIDDLE, _MIDDLE, _MIDDLE, 1450 if armed else _LOW, *aux)

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole flight in each protocol: every value on a ground station's screen is the craft's, and none is old."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import pytest
+from world import GroundStation, World
+
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from simulator.flight import Craft
+from simulator.options import SimOptions, TelemetryProtocol
+
+STEP_S, STALE_S = 0.1, 1.5
+FIELD = 453838000, 84733000
+METRES_PER_UNIT = 0.01113
+ANGLE, BARO, GPS_HOLD = 1 << 0, 1 << 2, 1 << 7
+COPTER_STABILIZE, COPTER_ALT_HOLD, COPTER_LOITER = 0, 2, 5
+
+
+def of_home(craft: Craft) -> float:
+    """Metres from the place of arming."""
+    north = (craft.flight.lat_e7 - FIELD[0]) * METRES_PER_UNIT
+    east = (craft.flight.lon_e7 - FIELD[1]) * METRES_PER_UNIT * math.cos(math.radians(45.38))
+    return math.hypot(north, east)
+
+
+def named(name: str) -> Callable[[Message], float | None]:
+    return lambda message: message.value if message.name == name else None
+
+
+def known_volts(message: Message) -> float | None:
+    return None if message.voltage_battery == 65535 else message.voltage_battery
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One value on the screen: the message it is taken from, its truth, and the resolution it is sent with."""
+
+    kind: str
+    value: Callable[[Message], float | None]
+    truth: Callable[[Craft], float]
+    resolution: float
+    circle: bool = False
+
+
+#: As Mission Planner reads them: position, height and course from GLOBAL_POSITION_INT, volts from BATTERY_STATUS.
+SCREEN = {
+    "roll": Shown("ATTITUDE", lambda msg: math.degrees(msg.roll), lambda c: c.flight.roll, 0.1),
+    "pitch": Shown("ATTITUDE", lambda msg: math.degrees(msg.pitch), lambda c: -c.flight.pitch, 0.1),
+    "yaw": Shown("ATTITUDE", lambda msg: math.degrees(msg.yaw), lambda c: c.flight.heading, 0.6, circle=True),
+    "lat": Shown("GLOBAL_POSITION_INT", lambda msg: msg.lat, lambda c: c.flight.lat_e7, 1),
+    "lon": Shown("GLOBAL_POSITION_INT", lambda msg: msg.lon, lambda c: c.flight.lon_e7, 1),
+    "height": Shown("GLOBAL_POSITION_INT", lambda msg: msg.relative_alt, lambda c: c.flight.height_m * 1e3, 11),
+    "altitude": Shown("GLOBAL_POSITION_INT", lambda msg: msg.alt, lambda c: c.flight.altitude_m * 1e3, 11),
+    "climb": Shown("GLOBAL_POSITION_INT", lambda msg: -msg.vz, lambda c: c.flight.climb_ms * 100, 1.1),
+    "heading": Shown("GLOBAL_POSITION_INT", lambda msg: msg.hdg / 100, lambda c: c.flight.heading, 0.6, circle=True),
+    "raw lat": Shown("GPS_RAW_INT", lambda msg: msg.lat, lambda c: c.flight.lat_e7, 1),
+    "satellites": Shown("GPS_RAW_INT", lambda msg: msg.satellites_visible, lambda c: c.flight.satellites, 0),
+    "speed": Shown("GPS_RAW_INT", lambda msg: msg.vel, lambda c: c.flight.speed_ms * 100, 1),
+    "ground speed": Shown("VFR_HUD", lambda msg: msg.groundspeed, lambda c: c.flight.speed_ms, 0.01),
+    "HUD altitude": Shown("VFR_HUD", lambda msg: msg.alt, lambda c: c.flight.altitude_m, 0.011),
+    "volts": Shown("BATTERY_STATUS", lambda msg: msg.voltages[0], lambda c: c.flight.volts * 1e3, 51),
+    "volts too": Shown("SYS_STATUS", known_volts, lambda c: c.flight.volts * 1e3, 51),
+    "home distance": Shown("NAMED_VALUE_FLOAT", named("home_m"), of_home, 0.2),
+    "throttle": Shown("RC_CHANNELS", lambda msg: msg.chan3_raw, lambda c: 1450 if c.armed else 1000, 0),
+    "arm switch": Shown("RC_CHANNELS", lambda msg: msg.chan5_raw, lambda c: 2000 if c.armed else 1000, 0),
+}
+
+
+@dataclass
+class Screen:
+    """Compares what is shown with the craft every 100 ms."""
+
+    world: World
+    station: GroundStation
+    past: list[tuple[float, Craft]] = field(default_factory=list)
+    shown: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.station.on_message.append(self.take)
+
+    def take(self, message: Message) -> None:
+        """Show a message; whatever it says was true a moment ago."""
+        self.look()
+        for name, what in SCREEN.items():
+            value = what.value(message) if message.get_type() == what.kind else None
+            if value is not None:
+                self.shown[name] = self.world.now, value
+                assert self.is_true(what, value), (self.world.now, name, value, what.truth(self.past[-1][1]))
+
+    def look(self) -> None:
+        """Note the truth of this moment."""
+        craft = self.world.naze.truth(self.world.now)
+        if craft is not None:
+            self.past.append((self.world.now, craft))
+
+    def is_true(self, what: Shown, value: float) -> bool:
+        """True if the craft had this value at some time within the last 1.5 s."""
+        truths = [what.truth(craft) for craft in self.recent()]
+        if what.circle:
+            return min(abs((value - truth + 180) % 360 - 180) for truth in truths) <= what.resolution + 1
+        return min(truths) - what.resolution <= value <= max(truths) + what.resolution
+
+    def recent(self) -> Iterator[Craft]:
+        for at, craft in reversed(self.past):
+            if at < self.world.now - STALE_S - 0.05:
+                return
+            yield craft
+
+    def fly(self, seconds: float, *, linked: bool = True) -> None:
+        """Let time pass; while the link is up, nothing on the screen is older than 1.5 s."""
+        for _ in range(round(seconds / STEP_S)):
+            self.world.run(STEP_S)
+            self.look()
+            for name, (at, _) in self.shown.items():
+                assert not linked or self.world.now - at <= STALE_S, (self.world.now, name, at)
+
+    @property
+    def heartbeat(self) -> Message:
+        return self.station.said("HEARTBEAT")[-1]
+
+
+def beat(station: GroundStation) -> None:
+    station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+    station.world.after(1.0, lambda: beat(station))
+
+
+def on_the_ground(protocol: TelemetryProtocol) -> Screen:
+    """A ground station that watches a craft, ready to arm."""
+    world = World(SimOptions(tele_prot=protocol))
+    world.wait_ready(30)
+    station = GroundStation(world)
+    beat(station)
+    world.run(6)  # long enough for the switches' ranges to be read
+    return Screen(world, station)
+
+
+def arm(screen: Screen) -> None:
+    screen.world.faults.armed = True
+    while not (screen.world.bridge.session.vehicle.armed and screen.world.is_found):
+        screen.fly(STEP_S, linked=False)
+
+
+ALL = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600]
+
+
+@pytest.mark.parametrize("protocol", ALL)
+def test_two_minutes_of_flight(protocol: TelemetryProtocol) -> None:
+    screen = on_the_ground(protocol)
+    screen.fly(3)
+    assert set(screen.shown) == set(SCREEN)
+    arm(screen)
+    screen.fly(2.5, linked=False)
+    for boxes, mode in (
+        (ANGLE, COPTER_STABILIZE),
+        (ANGLE | BARO, COPTER_ALT_HOLD),
+        (ANGLE | BARO | GPS_HOLD, COPTER_LOITER),
+    ):
+        screen.world.faults.boxes = boxes
+        screen.fly(40)
+        assert screen.heartbeat.custom_mode == mode
+        assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
+        home = screen.station.said("HOME_POSITION")[-1]
+        assert (home.latitude, home.longitude) == FIELD
+        assert screen.world.bridge.report.whole().position.home_lat_deg == home.latitude / 1e7
+
+
+@pytest.mark.parametrize("protocol", ALL)
+def test_what_was_heard_before_the_link_was_lost_is_not_shown_as_new(protocol: TelemetryProtocol) -> None:
+    screen = on_the_ground(protocol)
+    screen.world.faults.boxes = ANGLE | BARO
+    screen.fly(2)
+    arm(screen)
+    screen.fly(10, linked=False)
+    screen.world.faults.hang = True
+    screen.fly(20, linked=False)
+    assert screen.heartbeat.system_status == m.MAV_STATE_CRITICAL
+    assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
+    assert screen.heartbeat.custom_mode == COPTER_ALT_HOLD
+    status = screen.station.said("SYS_STATUS")[-1]
+    assert status.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
+    assert not status.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS
+    assert status.voltage_battery == 65535
+    lost = [text for text in screen.station.texts() if "lost" in text]
+    assert lost == ["Flight controller lost: silent for 3 s", "Flight controller lost: silent for 13 s"]
+    screen.world.faults.hang = False
+    screen.world.wait_until(lambda world: world.is_found, 8)
+    screen.fly(3, linked=False)
+    assert screen.heartbeat.system_status == m.MAV_STATE_ACTIVE
+    assert any(text.startswith("Flight controller back after 2") for text in screen.station.texts())
+    screen.fly(5)
+    home = screen.station.said("HOME_POSITION")[-1]
+    assert (home.latitude, home.longitude) == FIELD
