@@ -305,7 +305,10 @@ def test_noise_on_the_line_is_no_telemetry_and_no_flight_controller() -> None:
         world.run(0.087)
     assert len(world.events("fc.found")) == found
     assert {message.get_type() for message in station.said()} <= {
-        "HEARTBEAT", "MISSION_CURRENT", "STATUSTEXT", "SYS_STATUS"
+        "HEARTBEAT",
+        "MISSION_CURRENT",
+        "STATUSTEXT",
+        "SYS_STATUS",
     }
     world.power_on()
     world.wait_ready()
