@@ -9,7 +9,8 @@
 #   make bench          measure speed and memory
 #   make pictures       take the docs' pictures of the status page
 #   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
-#   make deb            build the Debian packages for amd64 and arm64 in dist/ (ARCH=arm64: only that one)
+#   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
+#   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
@@ -26,7 +27,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench pictures soak deb deb-trial lock message-table config-sample cli-page zenoh-schemas clean
+.PHONY: demo test lint bench pictures soak deb deb-trial image-check lock message-table config-sample cli-page zenoh-schemas clean
 
 # Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -70,9 +71,12 @@ soak: $(VENV)/.test-ready
 deb: $(VENV)/.demo-ready
 	$(BIN)/python -m deb.build $(ARCH)
 
-deb-trial: ARCH = $(shell dpkg --print-architecture)
+deb-trial image-check: ARCH = $(shell dpkg --print-architecture)
 deb-trial: deb
-	deb/trial dist/naze-bridge_*_$(ARCH).deb $(SUITE)
+	deb/trial dist/naze-bridge_*_$(ARCH).deb deb/trial-inside $(SUITE)
+
+image-check: deb
+	deb/trial dist/naze-bridge_*_$(ARCH).deb deb/first-hour-inside $(SUITE)
 
 # The project itself is installed editable: what is edited is what runs. Its build backend comes from the lock, too;
 # --no-deps because pip would miss what the lock leaves out on purpose (pyproject.toml, tool.uv).

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the Debian package: `make deb`, or `python -m deb.build amd64 arm64` in the project's folder.
+"""Builds the Debian package: `make deb`, or `python -m deb.build amd64 arm64 armhf` in the project's folder.
 
-The libraries are the wheels that requirements.lock pins, for Debian 12's Python and for Debian 13's side by side; pip
-fetches them for either architecture on any machine, and nothing is compiled. The target needs no network.
+The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
+side; pip fetches them for any architecture on any machine, and nothing is compiled. The target needs no network.
+
+Two libraries have no wheel for armhf. cbor2's last release in pure Python is taken instead (armhf.lock); of pymavlink
+the one for arm64: what is compiled in it, dfindexer, is left out of every package.
 
 pip judges a requirement's `python_version < ...` by the Python that runs it, not by the target's. So far none of ours
 differs between 3.11 and 3.14.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,14 +21,18 @@ from pathlib import Path
 
 from deb.tree import lay_out
 
-_PROJECT = Path(__file__).resolve().parent.parent
+_HERE = Path(__file__).resolve().parent
+_PROJECT = _HERE.parent
 _WORK = _PROJECT / "build" / "deb"
 _DIST = _PROJECT / "dist"
 _PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
-#: Debian 12 (and Raspberry Pi OS of 2023), Debian 13.
-_PYTHONS = ("3.11", "3.13")
+#: Debian 12 (and Raspberry Pi OS of 2023), Ubuntu 24.04, Debian 13.
+_PYTHONS = ("3.11", "3.12", "3.13")
 #: Debian's name of an architecture -> the wheels'.
-_MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+_MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "armv7l"}
+_NOT_FOR_ARMHF = ("cbor2", "pymavlink")
+#: The machines whose wheels are installed.
+_WHEELS_OF = {"amd64": ("x86_64",), "arm64": ("aarch64",), "armhf": ("armv7l", "aarch64")}
 #: What wheels may ask of the C library; Debian 12 has 2.36.
 _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
 
@@ -38,9 +46,12 @@ def build(architecture: str) -> Path:
     _run(*_PIP, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", wheels, _PROJECT)
     libraries = {}
     for python in _PYTHONS:
-        target = ("--only-binary=:all:", "--python-version", python, *_platforms(architecture))
-        lock = _PROJECT / "requirements.lock"
-        _run(*_PIP, "download", "--require-hashes", "--no-deps", *target, "--dest", wheels, "--requirement", lock)
+        target = ["--only-binary=:all:", "--python-version", python]
+        for lock, machine in _locks(architecture, work):
+            platforms = _platforms(machine)
+            hashed = ("--require-hashes", "--no-deps", "--requirement", lock)
+            _run(*_PIP, "download", *hashed, *target, *platforms, "--dest", wheels)
+        target += [word for machine in _WHEELS_OF[architecture] for word in _platforms(machine)]
         # From the wheels alone, whose hashes were just looked at; what only the build needs stays out.
         libraries[python] = work / python
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
@@ -53,8 +64,21 @@ def build(architecture: str) -> Path:
     return package
 
 
-def _platforms(architecture: str) -> list[str]:
-    machine = _MACHINES[architecture]
+def _locks(architecture: str, work: Path) -> list[tuple[Path, str]]:
+    """Which files of pinned wheels are fetched for which machine."""
+    lock = _PROJECT / "requirements.lock"
+    if architecture != "armhf":
+        return [(lock, _MACHINES[architecture])]
+    # A requirement goes from its name to the next line that is not indented.
+    pinned = re.findall(r"^[a-z].*\n(?:[ ].*\n)*", lock.read_text(), re.MULTILINE)
+    special = [each for each in pinned if each.startswith(tuple(f"{name}==" for name in _NOT_FOR_ARMHF))]
+    usual, of_arm64 = work / "usual.lock", work / "arm64.lock"
+    usual.write_text("".join(each for each in pinned if each not in special))
+    of_arm64.write_text("".join(each for each in special if each.startswith("pymavlink==")))
+    return [(usual, "armv7l"), (_HERE / "armhf.lock", "armv7l"), (of_arm64, "aarch64")]
+
+
+def _platforms(machine: str) -> list[str]:
     return [word for libc in _GLIBC for word in ("--platform", f"{libc}_{machine}")]
 
 

@@ -8,8 +8,18 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
+from click.shell_completion import get_completion_class
+
+from service.cli.main import main
+from service.cli.man_page import man_page
+
 _HERE = Path(__file__).resolve().parent
 _LIB = Path("usr/lib/naze-bridge")
+#: Pages outside of docs/ that the docs link to.
+_PAGES = (
+    *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE"),
+    *("firmware/README.md", "systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
+)
 _SCRIPTS = ("postinst", "prerm", "postrm")
 #: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.
 _DIALECTS = ("v20/__init__.py", "v20/ardupilotmega.py", "v20/all.py")
@@ -38,8 +48,16 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     (root / "etc/naze-bridge/conf.d").mkdir()
     documents = root / "usr/share/doc/naze-bridge"
     _copy(project / "LICENSE", documents, "copyright")
-    shutil.copytree(project / "docs", documents, dirs_exist_ok=True)
+    # As in the repository, so that the pages' links lead somewhere.
+    shutil.copytree(project / "docs", documents / "docs")
+    for page in _PAGES:
+        _copy(project / page, documents / Path(page).parent)
+    shutil.copytree(project / "examples", documents / "examples", ignore=shutil.ignore_patterns("__pycache__"))
     (documents / "changelog.gz").write_bytes(gzip.compress((project / "CHANGELOG.md").read_bytes(), mtime=0))
+    _write(root / "usr/share/man/man1/naze-bridge.1.gz", gzip.compress(man_page().encode(), mtime=0))
+    _write(root / "usr/share/bash-completion/completions/naze-bridge", _completion("bash").encode())
+    _write(root / "usr/share/zsh/vendor-completions/_naze-bridge", _completion("zsh").encode())
+    _copy(_HERE / "lintian-overrides", root / "usr/share/lintian/overrides", "naze-bridge")
     for path in root.rglob("*"):
         if not path.is_symlink():
             path.chmod(0o755 if path.is_dir() or path.parent == environment / "bin" else 0o644)
@@ -64,6 +82,17 @@ def _share(first: Path, *others: Path) -> None:
             if path.is_file() and twin.is_file() and filecmp.cmp(path, twin, shallow=False):
                 path.unlink()
                 path.hardlink_to(twin)
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+
+
+def _completion(shell: str) -> str:
+    script = get_completion_class(shell)
+    assert script is not None
+    return script(main, {}, "naze-bridge", "_NAZE_BRIDGE_COMPLETE").source()
 
 
 def _copy(source: Path, folder: Path, name: str = "") -> None:

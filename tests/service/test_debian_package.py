@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Debian package: what is in it, and its life on a machine without a network, from the first file to the purge."""
 
+import os
+import re
 import struct
 import subprocess
 import tarfile
@@ -16,7 +18,7 @@ from deb.build import build
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _MISSION = _REPOSITORY / "examples" / "naze-field.waypoints"
-_ELF_MACHINES = {"amd64": 62, "arm64": 183}
+_ELF_MACHINES = {"amd64": 62, "arm64": 183, "armhf": 40}
 #: `dpkg --print-architecture` of this machine must be one of them.
 _HOST = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
 #: Starts the daemon in the background as the unit does, with the folders that systemd would make.
@@ -25,7 +27,7 @@ mkdir -p /var/lib/naze-bridge /run/naze-bridge
 export STATE_DIRECTORY=/var/lib/naze-bridge RUNTIME_DIRECTORY=/run/naze-bridge
 sed -n 's/^ExecStart=/exec /p' /usr/lib/systemd/system/naze-bridge.service > /run/start
 (sh /run/start >/run/log 2>&1 & echo $! >/run/pid)
-for turn in $(seq 300); do naze-bridge status 2>/dev/null | grep -q ' MSP$' && exit 0; sleep 0.1; done
+for turn in $(seq 300); do naze-bridge status 2>/dev/null | grep -q ', MSP' && exit 0; sleep 0.1; done
 cat /run/log; exit 1
 """
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
@@ -68,6 +70,9 @@ def test_what_is_in_it(package: tuple[str, Path]) -> None:
         "/usr/share/doc/naze-bridge/copyright",
         "/usr/share/doc/naze-bridge/changelog.gz",
         "/usr/lib/naze-bridge/lib/python3.11/site-packages/storage/schema/0001_missions.sql",
+        "/usr/lib/naze-bridge/lib/python3.12/site-packages/storage/schema/0001_missions.sql",
+        "/usr/share/man/man1/naze-bridge.1.gz",
+        "/usr/share/bash-completion/completions/naze-bridge",
         "/usr/lib/naze-bridge/lib/python3.13/site-packages/storage/schema/0001_missions.sql",
     ):
         assert expected in files
@@ -88,8 +93,22 @@ def test_its_libraries_are_for_its_machine_and_for_both_pythons(package: tuple[s
             assert content is not None
             machines.add(struct.unpack_from("<H", content.read(20), 18)[0])
     assert machines == {_ELF_MACHINES[architecture]}
-    for python in ("cpython-311", "cpython-313"):
+    for python in ("cpython-311", "cpython-312", "cpython-313"):
         assert [each for each in libraries if python in each.name]
+
+
+def test_its_pages_link_only_to_what_is_there(package: tuple[str, Path]) -> None:
+    _, path = package
+    files = files_of(path)
+    with _archive(path) as archive:
+        for member in archive:
+            if not member.name.startswith("./usr/share/doc/naze-bridge/") or not member.name.endswith(".md"):
+                continue
+            content = archive.extractfile(member)
+            assert content is not None
+            for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", content.read().decode()):
+                target = os.path.normpath(Path(member.name.removeprefix(".")).parent / link)
+                assert target in files or f"{target}/" in files, f"{member.name}: {link}"
 
 
 def test_no_trace_of_the_machine_that_built_it(package: tuple[str, Path]) -> None:
@@ -101,13 +120,13 @@ def test_no_trace_of_the_machine_that_built_it(package: tuple[str, Path]) -> Non
 
 
 def test_in_a_bare_root_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
-    assert "enable --now naze-bridge" in root.run("dpkg --install /root/naze-bridge.deb")
+    assert "sudo naze-bridge setup" in root.run("dpkg --install /root/naze-bridge.deb")
     assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
     # Enabled on request only.
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
     # Its byte code is there: the service could not write it.
     assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
-    root.run("sed -i 's/^fc = .*/fc = \"sim:\"/' /etc/naze-bridge/config.toml")
+    root.run("sed -i 's/^#fc = .*/fc = \"sim:\"/' /etc/naze-bridge/config.toml")
     root.put(_MISSION, "/root/naze-field.waypoints")
 
     root.run(_START)
