@@ -19,6 +19,7 @@ from math import inf
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
 from bridge.fc.actions import FcActions
+from bridge.fc.msp_sharing import MspSharing
 from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
 from bridge.fc.session import FcSession
 from bridge.fc.states import Autopilot, Mavlink
@@ -116,6 +117,7 @@ class Bridge:
         self._downloads = MissionDownloads(self.missions, self.runner, self.ground, self._is_armed, home)
         self._parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
+        self.sharing = MspSharing(self.session, self.runner)
         commands = CommandService(self.ground, self._vehicle, actions, self._banner)
         self._router = MessageRouter(
             self.ground, self._uploads, self._downloads, self._parameters, commands, self._vehicle

@@ -140,7 +140,10 @@ class MissionJobs:
             "battery_v": report.battery.voltage_v,
             "satellites": report.gps.satellites,
             "ground_stations": [str(peer) for peer in bridge.ground.peers()],
-            "refused": [f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()],
+            "refused": [
+                *(f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()),
+                *(f"{count} x {why} (share)" for why, count in daemon.share_refused.items()),
+            ],
             "recording": self._daemon.recording,
             "mission_records": None if held is None else held.identity.count,
             "mission_checksum": None if held is None else _hex(held.identity.checksum),

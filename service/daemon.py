@@ -2,8 +2,8 @@
 """The running bridge: its links, its store and its clock, on one event loop."""
 
 import asyncio
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -12,6 +12,7 @@ import structlog
 
 from bridge.bridge import Bridge, BridgeConfig
 from bridge.fc.autosense import SPEEDS
+from bridge.fc.msp_sharing import refused
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.station import Peer
 from bridge.line.conversation import StoreEffect
@@ -19,12 +20,14 @@ from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
+from protocols.msp.frame import MspFrame
 from service.documentation import page
 from service.host import Host
 from service.links.connection import AutoFc, FcAddress, GcsAddress, SerialFc
 from service.links.fc_device import device_opener
 from service.links.fc_port import MOVED_ON, STOPPED
 from service.links.gcs_links import GcsLink, LinkError, open_link
+from service.links.msp_share import Share, open_share
 from service.links.port_finder import PortFinder
 from service.links.signing_state import SigningState
 from service.mission_data import Json
@@ -108,6 +111,9 @@ class Daemon:
         #: By link; the flight controller's port has the name "fc".
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
         self._fc_traffic = self.traffic["fc"]
+        self._shares: list[Share] = []
+        #: Refused requests of [[share]] ports, by reason.
+        self.share_refused: Counter[str] = Counter()
         self._followers: list[Follower] = []
         if self._finder is not None:
             self._finder.move_on = self._port.move_on
@@ -146,6 +152,8 @@ class Daemon:
             for address in self.settings.gcs:
                 if str(address) not in self.settings.access:
                     _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
+            for share in self.settings.share:
+                self._shares.append(await open_share(share, self._shared_request))
             self._signing.start()
             self.started.set()
             port = self._loop.create_task(self._port.run())
@@ -165,6 +173,8 @@ class Daemon:
                 self._finder.close()
             for link in self._links.values():
                 link.close()
+            for opened in self._shares:
+                opened.close()
             self.store.close()
             self._signing.close()
             self._recording.close()
@@ -273,6 +283,16 @@ class Daemon:
     def remove_default_peer(self, peer: Peer) -> None:
         """Stop that."""
         self.bridge.ground.remove_default_peer(peer)
+
+    def _shared_request(self, frame: MspFrame, answer: Callable[[MspFrame], None], *, may_write: bool) -> None:
+        """Carry another program's MSP request to the flight controller, or refuse it with the reason in the log."""
+        why = self.bridge.sharing.request(frame, answer, self._loop.time(), may_write=may_write)
+        if why:
+            self.share_refused[why] += 1
+            level: Level = "debug" if self.share_refused[why] > 1 else "warning"
+            self._log_event(level, "share.refused", command=frame.command, why=why)
+            answer(refused(frame))
+        self.flush()
 
     # The flight controller's port, the clock and the store.
 

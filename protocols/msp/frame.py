@@ -6,7 +6,7 @@ above 255: `$X` direction flag command size payload crc, command and size 16 bit
 """
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import reduce
 from operator import xor
@@ -35,16 +35,17 @@ _DIRECTIONS = {direction.value: direction for direction in Direction}
 
 @dataclass(frozen=True, slots=True)
 class MspFrame:
-    """One frame. `payload` has at most 255 bytes; a `command` above 255 makes it a v2 frame."""
+    """One frame. `payload` has at most 255 bytes; a `command` above 255 makes it a v2 frame, `is_v2` any other."""
 
     direction: Direction
     command: int
     payload: bytes = b""
+    is_v2: bool = field(default=False, compare=False)
 
     def encode(self) -> bytes:
         """The frame's bytes, checksum included."""
         direction = bytes((self.direction.value,))
-        if self.command > _HIGHEST_V1_COMMAND:
+        if self.is_v2 or self.command > _HIGHEST_V1_COMMAND:
             body = _V2_HEADER.pack(0, self.command, len(self.payload)) + self.payload
             return b"$X" + direction + body + bytes((_crc8(body),))
         body = bytes((len(self.payload), self.command)) + self.payload
@@ -65,10 +66,12 @@ class MspParser:
     """Finds frames in a byte stream. Never raises: bytes that belong to no frame are counted and skipped.
 
     After a bad checksum the search goes on one byte later, so a frame hidden behind a false header is still found.
+    `takes_low_v2`: also v2 frames of v1's commands, as configurators send them; no flight controller does unasked.
     A frame that stays incomplete keeps its bytes until more come: call `reset` when the line has been silent.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, takes_low_v2: bool = False) -> None:
+        self._takes_low_v2 = takes_low_v2
         self._buffer = bytearray()
         self.bad_checksums = 0
         self.skipped_bytes = 0
@@ -84,7 +87,7 @@ class MspParser:
             found = len(buffer) if found < 0 else found
             self.skipped_bytes += found - start
             start = found
-            end = _frame_end(buffer, start)
+            end = _frame_end(buffer, start, takes_low_v2=self._takes_low_v2)
             if end is None or len(buffer) < end:
                 break
             frame = _decode(buffer[start:end]) if end > start else None
@@ -109,7 +112,7 @@ class MspParser:
         return frames
 
 
-def _frame_end(buffer: bytearray, start: int) -> int | None:
+def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | None:
     """Where the frame at `start` ends: None if its header is still incomplete, `start` if it cannot be a frame."""
     size = len(buffer) - start
     if size >= 2 and buffer[start + 1] not in (_V1, _V2):
@@ -123,7 +126,7 @@ def _frame_end(buffer: bytearray, start: int) -> int | None:
     if size < _V2_OVERHEAD - 1:
         return None
     flag, command, payload_size = _V2_HEADER.unpack_from(buffer, start + 3)
-    if flag or command <= _HIGHEST_V1_COMMAND or payload_size > _MAX_PAYLOAD:
+    if flag or (command <= _HIGHEST_V1_COMMAND and not takes_low_v2) or payload_size > _MAX_PAYLOAD:
         return start
     return start + _V2_OVERHEAD + int(payload_size)
 
@@ -135,7 +138,7 @@ def _decode(frame: bytearray) -> MspFrame | None:
         return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(body[2:]))
     if _crc8(body) != frame[-1]:
         return None
-    return MspFrame(direction, int.from_bytes(body[1:3], "little"), bytes(body[_V2_HEADER.size :]))
+    return MspFrame(direction, int.from_bytes(body[1:3], "little"), bytes(body[_V2_HEADER.size :]), is_v2=True)
 
 
 def _crc8(data: bytes | bytearray) -> int:

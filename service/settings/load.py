@@ -82,7 +82,7 @@ def load_settings(
     )
 
 
-_AS_THEY_ARE = ("fc", "sysid", "takeoff_max_m", "autopilot", "pass_through", "record_uart", "log_level")
+_AS_THEY_ARE = ("fc", "sysid", "takeoff_max_m", "autopilot", "pass_through", "record_uart", "log_level", "share")
 
 
 def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -> dict[str, Given]:

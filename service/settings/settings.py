@@ -9,6 +9,7 @@ from pathlib import Path
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.fc.states import Autopilot
 from service.links.connection import AutoFc, FcAddress, GcsAddress
+from service.links.msp_share import ShareSettings
 from service.links.write_access import WriteAccess
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings
@@ -52,6 +53,7 @@ class Settings:
     autopilot: Autopilot = Autopilot.AUTO
     pass_through: PassThroughRule = PassThroughRule.MISSIONS
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
+    share: Sequence[ShareSettings] = ()
     zenoh: ZenohSettings | None = None
     web: WebSettings | None = None
     log_level: str = DEFAULT_LOG_LEVEL

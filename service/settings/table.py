@@ -6,6 +6,7 @@ from pathlib import Path
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.fc.states import Autopilot
 from service.links.connection import parse_fc
+from service.links.msp_share import parse_share
 from service.links.write_access import parse_link
 from service.settings.key import Choice, FileName, Key, Several, Table, Text, Unfit, Whole, YesNo
 from service.settings.settings import (
@@ -52,6 +53,14 @@ KEYS = (
         "write.",
         default=f'["{DEFAULT_GCS}"]',
         is_live=True,
+    ),
+    Key(
+        "share",
+        Several('as in [{address = "tcpin:127.0.0.1:5761"}]', parse_share),
+        "Ports on which INAV Configurator, MultiWiiConf or mwp may speak MSP through the bridge while the craft is "
+        "disarmed; also as [[share]] tables. write = true lets them change settings: MSP has no password, so anyone "
+        "who reaches the port can.",
+        example='[{address = "tcpin:127.0.0.1:5761", write = false}]',
     ),
     Key(
         "state_dir",

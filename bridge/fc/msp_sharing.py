@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""MSP requests of other programs (INAV Configurator, MultiWiiConf, mwp) to a disarmed flight controller. Sans-IO.
+
+Each request is a conversation of its own, so that it never mixes with a mission transfer, and telemetry polls go on
+between two of them. MSP has an error reply but no place for a reason: that is in the log and in `status`.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from bridge.fc.session import FcSession
+from bridge.line.conversation import Conversation, LinkLost, receive, send
+from bridge.line.msp_link import MAX_OUTSTANDING_BYTES
+from bridge.line.runner import Runner
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, request
+from protocols.msp.hazards import is_clean
+
+#: Never carried: SET_RAW_RC and SET_MOTOR move the craft, REBOOT and SET_PASSTHROUGH take the line away from everyone.
+_NEVER = {68: "REBOOT", 200: "SET_RAW_RC", 214: "SET_MOTOR", 245: "SET_PASSTHROUGH"}
+#: Without a payload a request is a question, except for these: calibrations, RESET_CONF, EEPROM_WRITE.
+_ACTIONS = frozenset((205, 206, 208, 250))
+#: With a payload it is a change, except for these: WP, DATAFLASH_READ, COMMON_SETTING, COMMON_SETTING_INFO,
+#: COMMON_PG_LIST.
+_QUESTIONS_WITH_PAYLOAD = frozenset((118, 71, 0x1003, 0x1007, 0x1008))
+#: The size of the reply is unknown: it gets the whole ring of a Harakiri.
+_REPLY_PAYLOAD = MAX_OUTSTANDING_BYTES - FRAME_OVERHEAD
+#: Programs wait for a reply before they ask again; more than this is a flood.
+_MAX_PENDING = 16
+
+
+class MspSharing:
+    """Carries requests one at a time. `request` returns why one is refused, or "" if it is carried."""
+
+    def __init__(self, session: FcSession, runner: Runner) -> None:
+        self._session = session
+        self._runner = runner
+        self._pending = 0
+
+    def request(self, frame: MspFrame, answer: Callable[[MspFrame], None], now: float, *, may_write: bool) -> str:
+        """Carry a request; `answer` gets the reply, or nothing if the flight controller does not answer."""
+        why = self._refusal(frame, may_write=may_write)
+        if why:
+            return why
+        self._pending += 1
+
+        def done(reply: MspFrame | LinkLost | None, _at: float) -> None:
+            self._pending -= 1
+            if isinstance(reply, MspFrame):
+                answer(reply)
+
+        self._runner.start(_carry(frame), done, now)
+        return ""
+
+    def _refusal(self, frame: MspFrame, *, may_write: bool) -> str:
+        link = self._session.link
+        if link is None or self._session.controller is None:
+            return "no flight controller speaks MSP now"
+        if self._session.vehicle.armed is not False:
+            return "armed, or not known to be disarmed"
+        if self._pending >= _MAX_PENDING:
+            return "too many requests at once"
+        if frame.command in _NEVER:
+            return f"{_NEVER[frame.command]} is never passed on"
+        if not may_write and is_change(frame):
+            return f"command {frame.command} changes something: set write = true in its [[share]] to allow that"
+        if not (link.any_byte or is_clean(request(frame.command, frame.payload))):
+            return "its bytes could open this flight controller's command line, or reset it"
+        if self._runner.is_busy and not self._pending:
+            return "a mission transfer is running"
+        return ""
+
+
+def is_change(frame: MspFrame) -> bool:
+    """Whether a request may change something on the flight controller."""
+    if frame.payload:
+        return frame.command not in _QUESTIONS_WITH_PAYLOAD
+    return frame.command in _ACTIONS
+
+
+def _carry(frame: MspFrame) -> Conversation[MspFrame | None]:
+    # Low commands as v1, which every flight controller speaks; the client gets its own version back.
+    yield from send(request(frame.command, frame.payload), frame.command, _REPLY_PAYLOAD, exclusive=is_change(frame))
+    reply = yield from receive(frame.command)
+    return None if reply is None else replace(reply, is_v2=frame.is_v2)
+
+
+def refused(frame: MspFrame) -> MspFrame:
+    """The reply to a refused request."""
+    return MspFrame(Direction.ERROR, frame.command, is_v2=frame.is_v2)

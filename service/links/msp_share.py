@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`[[share]]`: TCP and UDP ports on which other programs speak MSP through the bridge."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from protocols.msp.frame import Direction, MspFrame, MspParser
+from service.links.connection import AddressError, GcsAddress, family_of, parse_gcs
+from service.links.gcs_links import LinkError
+
+_KEYS = ("address", "write")
+_KINDS = ("tcpin", "udpin")
+#: A client that does not read its replies is disconnected.
+_MAX_UNSENT = 65536
+_MAX_CLIENTS = 8
+
+
+class Requested(Protocol):
+    """Takes a request and what its reply is given to."""
+
+    def __call__(self, frame: MspFrame, answer: Callable[[MspFrame], None], *, may_write: bool) -> None:
+        """Carry it, or answer that it is refused."""
+
+
+class Share(Protocol):
+    """An open port."""
+
+    def close(self) -> None:
+        """Close it, and its clients."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShareSettings:
+    """Where it listens, tcpin or udpin; `write`: whether requests that change something are carried."""
+
+    address: GcsAddress
+    write: bool = False
+
+
+def parse_share(entry: object, _folder: Path) -> ShareSettings:
+    """Read one entry of `share`, or one [[share]] table; AddressError says what is wrong."""
+    if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
+        raise AddressError(f'share: {entry!r} is no table with address = "tcpin:127.0.0.1:5761"')
+    address, write = parse_gcs(entry["address"]), entry.get("write", False)
+    if address.kind not in _KINDS:
+        raise AddressError(f"share {address}: programs connect to it, so write tcpin:ADDR:PORT or udpin:ADDR:PORT")
+    for key in entry:
+        if key not in _KEYS:
+            raise AddressError(f"share {address}: {key!r} is no setting of a share; known are {', '.join(_KEYS)}")
+    if type(write) is not bool:
+        raise AddressError(f"share {address}: write is {write!r}, but must be true or false")
+    return ShareSettings(address, write)
+
+
+async def open_share(settings: ShareSettings, requested: Requested) -> Share:
+    """Listen; LinkError if that is impossible."""
+    loop = asyncio.get_running_loop()
+    address = settings.address
+    where = (address.host, address.port)
+    family = family_of(address.host)
+    try:
+        if address.kind == "udpin":
+            share = _UdpShare(settings, requested)
+            await loop.create_datagram_endpoint(lambda: share, local_addr=where, family=family)
+            return share
+        clients: set[_TcpClient] = set()
+        server = await loop.create_server(lambda: _TcpClient(settings, requested, clients), *where, family=family)
+        return _TcpShare(server, clients)
+    except OSError as error:
+        raise LinkError(f"share {address} cannot be opened: {error.strerror or error}") from error
+
+
+class _TcpShare:
+    def __init__(self, server: asyncio.Server, clients: "set[_TcpClient]") -> None:
+        self._server = server
+        self._clients = clients
+
+    def close(self) -> None:
+        self._server.close()
+        for client in list(self._clients):
+            client.close()
+
+
+class _TcpClient(asyncio.Protocol):
+    def __init__(self, settings: ShareSettings, requested: Requested, clients: "set[_TcpClient]") -> None:
+        self._may_write = settings.write
+        self._requested = requested
+        self._clients = clients
+        self._parser = MspParser(takes_low_v2=True)
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        if len(self._clients) >= _MAX_CLIENTS:
+            transport.abort()
+            return
+        self._transport = transport
+        self._clients.add(self)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._transport = None
+        self._clients.discard(self)
+
+    def data_received(self, data: bytes) -> None:
+        for frame in self._parser.feed(data):
+            if frame.direction is Direction.REQUEST:
+                self._requested(frame, self._answer, may_write=self._may_write)
+
+    def close(self) -> None:
+        if self._transport is not None:
+            self._transport.abort()
+
+    def _answer(self, frame: MspFrame) -> None:
+        # The client may be gone by now.
+        if self._transport is None:
+            return
+        self._transport.write(frame.encode())
+        if self._transport.get_write_buffer_size() > _MAX_UNSENT:
+            self._transport.abort()
+
+
+class _UdpShare(asyncio.DatagramProtocol):
+    def __init__(self, settings: ShareSettings, requested: Requested) -> None:
+        self._may_write = settings.write
+        self._requested = requested
+        self._transport: asyncio.DatagramTransport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.DatagramTransport)
+        self._transport = transport
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._transport = None
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        def answer(frame: MspFrame) -> None:
+            if self._transport is not None:
+                self._transport.sendto(frame.encode(), addr)
+
+        # Whole requests only: a datagram may be lost, and the rest of a cut one never comes.
+        for frame in MspParser(takes_low_v2=True).feed(data):
+            if frame.direction is Direction.REQUEST:
+                self._requested(frame, answer, may_write=self._may_write)
+
+    def close(self) -> None:
+        if self._transport is not None:
+            self._transport.close()

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`[[share]]`: another program speaks MSP through the bridge, beside telemetry and missions."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from protocols.msp.frame import Direction, MspFrame, MspParser
+from service.api import MissionJobs
+from service.cli.mission_source import load_mission
+from service.daemon import Daemon
+from service.links.connection import SimulatedFc, parse_gcs
+from service.links.msp_share import ShareSettings, parse_share
+from service.settings import Settings
+
+PATIENCE_S = 20.0
+IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250
+
+
+class Program:
+    """A configurator at one end of a TCP connection."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader = reader
+        self._writer = writer
+        self._parser = MspParser(takes_low_v2=True)
+
+    async def ask(self, command: int, payload: bytes = b"", *, is_v2: bool = False, times: int = 1) -> list[MspFrame]:
+        """Send requests at once, and wait for as many replies."""
+        self._writer.write(MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2).encode() * times)
+        replies: list[MspFrame] = []
+        async with asyncio.timeout(PATIENCE_S):
+            while len(replies) < times:
+                replies += self._parser.feed(await self._reader.read(4096))
+        return replies
+
+
+def free_port() -> int:
+    import socket
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@asynccontextmanager
+async def shared(*, write: bool = False, state: Path | None = None) -> AsyncIterator[tuple[Daemon, Program]]:
+    port = free_port()
+    share = ShareSettings(parse_gcs(f"tcpin:127.0.0.1:{port}"), write)
+    daemon = Daemon(Settings(SimulatedFc(), share=[share], state_dir=state))
+    task = asyncio.create_task(daemon.run())
+    try:
+        async with asyncio.timeout(PATIENCE_S):
+            bridge = daemon.bridge
+            while bridge.session.vehicle.armed is None or bridge.is_conversing:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        yield daemon, Program(reader, writer)
+        writer.close()
+        with suppress(ConnectionError):
+            await writer.wait_closed()
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+
+
+@pytest.mark.parametrize("is_v2", [False, True])
+async def test_questions_are_answered_beside_telemetry(is_v2: bool) -> None:
+    async with shared() as (daemon, program):
+        polled = daemon.traffic["fc"].pieces_received
+        replies = await program.ask(IDENT, is_v2=is_v2, times=10)
+        seen = {(reply.direction, reply.payload[0], reply.is_v2) for reply in replies}
+        assert seen == {(Direction.REPLY, 211, is_v2)}
+        async with asyncio.timeout(PATIENCE_S):
+            while daemon.traffic["fc"].pieces_received < polled + 30:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        assert daemon.bridge.session.controller is not None
+
+
+@pytest.mark.parametrize(
+    ("write", "command", "payload", "why"),
+    [
+        (False, SET_PID, bytes(30), "set write = true"),
+        (False, EEPROM_WRITE, b"", "set write = true"),
+        (True, SET_MOTOR, bytes(16), "SET_MOTOR is never passed on"),
+        (True, REBOOT, b"", "REBOOT is never passed on"),
+        (True, SET_PID, b"\x0d\x0d\x0d" + bytes(27), "could open this flight controller's command line"),
+    ],
+)
+async def test_what_is_refused_is_answered_with_an_error(write: bool, command: int, payload: bytes, why: str) -> None:
+    async with shared(write=write) as (daemon, program):
+        (reply,) = await program.ask(command, payload)
+        assert reply.direction is Direction.ERROR
+        (refusal,) = MissionJobs(daemon).status()["refused"]
+        assert why in refusal
+
+
+async def test_a_change_is_carried_if_it_is_allowed() -> None:
+    async with shared(write=True) as (_, program):
+        (reply,) = await program.ask(EEPROM_WRITE)
+        assert reply.direction is Direction.REPLY
+
+
+async def test_armed_nothing_is_carried(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with shared(write=True) as (daemon, program):
+        monkeypatch.setattr(type(daemon.bridge.session.vehicle), "armed", True)
+        (reply,) = await program.ask(IDENT)
+        assert reply.direction is Direction.ERROR
+
+
+async def test_a_mission_transfer_is_not_disturbed() -> None:
+    async with shared() as (daemon, program):
+        items = load_mission(Path(__file__).parents[2] / "examples" / "long-146.waypoints")
+        pushing = asyncio.create_task(MissionJobs(daemon).push(items, "test", lambda _: None))
+        async with asyncio.timeout(PATIENCE_S):
+            while not daemon.bridge.is_conversing:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+            (reply,) = await program.ask(IDENT)
+            assert reply.direction is Direction.ERROR
+            assert list(daemon.share_refused) == ["a mission transfer is running"]
+            assert (await pushing)["ack"] == "MAV_MISSION_ACCEPTED"
+
+
+async def test_noise_is_not_carried() -> None:
+    async with shared() as (daemon, program):
+        program._writer.write(b"###\r\r\rRRR#\n" * 100)
+        (reply,) = await program.ask(IDENT)
+        assert reply.direction is Direction.REPLY
+        assert daemon.share_refused == {}
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ("tcpin:5761", "is no table with address"),
+        ({"address": "udpout:h:1"}, "write tcpin:ADDR:PORT or udpin:ADDR:PORT"),
+        ({"address": "tcpin:5761", "writes": True}, "'writes' is no setting of a share"),
+        ({"address": "tcpin:5761", "write": "yes"}, "must be true or false"),
+    ],
+)
+def test_a_share_that_cannot_be_used(entry: object, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        parse_share(entry, Path())
