@@ -22,7 +22,8 @@ from bridge.fc.actions import FcActions
 from bridge.fc.msp_sharing import MspSharing
 from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
 from bridge.fc.session import FcSession
-from bridge.fc.states import Autopilot, Mavlink
+from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.port import Autopilot
 from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground, Tap
 from bridge.gcs.guard import Guard, GuardRefusal, LinkAccess, Standing, denial

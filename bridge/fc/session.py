@@ -7,26 +7,13 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from bridge.fc.profile import FlightController, Profile
-from bridge.fc.states import (
-    Autopilot,
-    Closed,
-    Event,
-    Frsky,
-    FrskyFound,
-    Identified,
-    Identifying,
-    Lost,
-    Mavlink,
-    MavlinkFound,
-    Msp,
-    MspFound,
-    MspLine,
-    Port,
-    PortClosed,
-    PortOpened,
-    Searching,
-    State,
-)
+from bridge.fc.states.base import Closed, State
+from bridge.fc.states.events import Event, FrskyFound, Identified, Lost, MavlinkFound, MspFound, PortClosed, PortOpened
+from bridge.fc.states.frsky import Frsky
+from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.msp import Identifying, Msp, MspLine
+from bridge.fc.states.port import Autopilot, Port
+from bridge.fc.states.searching import Searching
 from bridge.line.msp_link import MspLink
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable
 
-from bridge.fc.states import Closed
+from bridge.fc.states.base import Closed
 from service.api import ControlError
 from service.doctor.checked import Checked, note, ok, problem
 from service.links.connection import FcAddress

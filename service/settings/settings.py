@@ -7,7 +7,7 @@ from enum import Enum
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
-from bridge.fc.states import Autopilot
+from bridge.fc.states.port import Autopilot
 from service.links.connection import AutoFc, FcAddress, GcsAddress
 from service.links.msp_share import ShareSettings
 from service.links.write_access import WriteAccess

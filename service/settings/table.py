@@ -4,7 +4,7 @@
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
-from bridge.fc.states import Autopilot
+from bridge.fc.states.port import Autopilot
 from service.links.connection import parse_fc
 from service.links.msp_share import parse_share
 from service.links.write_access import parse_link

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from world import GroundStation, World, flash_holding
 
-from bridge.fc.states import Msp
+from bridge.fc.states.msp import Msp
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.wp_record import WpRecord

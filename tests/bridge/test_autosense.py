@@ -19,7 +19,8 @@ from world import World
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.autosense import SPEEDS
-from bridge.fc.states import Closed, Searching
+from bridge.fc.states.base import Closed
+from bridge.fc.states.searching import Searching
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
 from simulator.options import Faults, SimOptions, TelemetryProtocol

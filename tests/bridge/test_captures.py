@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from world import GroundStation, World
 
-from bridge.fc.states import Closed
+from bridge.fc.states.base import Closed
 from bridge.model.mission_log import Outcome
 from protocols.mavlink.dialect import messages
 from protocols.mission_file import read_mission_file

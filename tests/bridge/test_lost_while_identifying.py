@@ -7,7 +7,7 @@ import pytest
 from world import World
 
 from bridge.controllers.harakiri import profile as harakiri
-from bridge.fc.states import Identifying
+from bridge.fc.states.msp import Identifying
 from simulator.options import SimOptions, TelemetryProtocol
 
 #: From the moment at which the board can be heard again.

@@ -21,7 +21,8 @@ from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.table import PROFILES
 from bridge.fc.autosense import SPEEDS
 from bridge.fc.profile import Profile
-from bridge.fc.states import Mavlink, Msp
+from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.msp import Msp
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""MSP is answered: the board is being identified, and then polled."""
+
+from math import inf
+
+from bridge.fc.autosense import Found, Spoken
+from bridge.fc.identify import identify_msp
+from bridge.fc.msp_telemetry import hear_msp
+from bridge.fc.profile import FlightController
+from bridge.fc.states.base import State
+from bridge.fc.states.events import Event, Identified, Lost, MavlinkFound, MspFound
+from bridge.fc.states.foreign import ForeignBytes
+from bridge.fc.states.port import Port
+from bridge.line.conversation import LinkLost
+from bridge.line.msp_link import MspLink
+from bridge.line.pending_replies import PendingReplies
+from protocols.frsky import FRSKY_SPEED
+from protocols.msp.frame import MspFrame
+
+#: A flight controller that answers nothing for this long is gone: unplugged, reset, or switched to another protocol.
+MSP_SILENCE_S = 2.0
+#: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now.
+_FOREIGN_SILENCE_S = 0.5
+_FOREIGN_SIZE = 16
+#: Identification must be done by then; on a line at 1200 baud it takes 8 s.
+_IDENTIFY_TIMEOUT_S = 15.0
+#: The speeds of Harakiri's telemetry while armed (tele_prot 3 and 1).
+_ARMED_SPEEDS = (57600, FRSKY_SPEED)
+#: A board that stores no missions is identified again after this time, then after twice as long, and so on: damaged
+#: replies can make a Harakiri look like another board.
+_FIRST_CHECK_S = 2.0
+_LAST_CHECK_S = 64.0
+
+
+class MspLine(State):
+    """A line on which MSP is answered: common to identifying and to the time after it."""
+
+    link: MspLink
+
+    def __init__(self, port: Port, link: MspLink, found: Found) -> None:
+        super().__init__(port, found.speed)
+        self.link = link
+        self.found = found
+        self._foreign = ForeignBytes()
+
+    @property
+    def bad_checksums(self) -> int | None:
+        """As the link counts them."""
+        return self.link.bad_checksums
+
+    def receive(self, data: bytes, now: float) -> Event | None:
+        """Take replies."""
+        frames = self.link.receive(data, now)
+        for frame in frames:
+            self.take_frame(frame, now)
+        self._foreign.note(data, self.link, is_msp=bool(frames))
+        return self.finished()
+
+    def tick(self, now: float) -> Event | None:
+        """Give up on lost requests, and on a silent board."""
+        for frame in self.link.tick(now):
+            self.take_frame(frame, now)
+        return self.finished() or self._silence(now)
+
+    def deadline(self) -> float:
+        """The link's next deadline, or the end of its silence."""
+        if self.finished() is not None:
+            return 0.0
+        link = self.link.next_deadline()
+        silent_at = self._silent_since() + self._silence_s
+        return silent_at if link is None else min(link, silent_at)
+
+    def take_output(self) -> list[bytes]:
+        """The link's requests."""
+        return super().take_output() + self.link.take_output()
+
+    def unanswered(self) -> PendingReplies:
+        """What the link still waits for."""
+        pending = PendingReplies()
+        for sent_at, size in self.link.unanswered():
+            pending.add(self.speed, size, sent_at)
+        return pending
+
+    def take_frame(self, frame: MspFrame, now: float) -> None:
+        """Take one reply."""
+        self.port.runner.received(frame, now)
+
+    def finished(self) -> Event | None:
+        """The event that ends this state, if it has come."""
+        return None
+
+    def _silent_since(self) -> float:
+        """The time of the last sign of life, or of the first question after it."""
+        return self.link.last_heard_at
+
+    @property
+    def _silence_s(self) -> float:
+        return _FOREIGN_SILENCE_S if self._is_foreign else MSP_SILENCE_S
+
+    @property
+    def _is_foreign(self) -> bool:
+        """True if more bytes arrived than damaged replies could explain."""
+        return self._foreign.size >= self.link.outstanding_bytes + _FOREIGN_SIZE
+
+    def _silence(self, now: float) -> Event | None:
+        """Leave MSP when it is not answered any more: for MAVLink if that is heard instead, else to search."""
+        if now < self._silent_since() + self._silence_s:
+            return None
+        heard = self._foreign.mavlink
+        if heard is not None:
+            return MavlinkFound(Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard))
+        if self._is_foreign:
+            first = [speed for speed in _ARMED_SPEEDS if speed in self.port.speeds and speed != self.speed]
+            return Lost("the incoming data is no longer MSP", first, self.unanswered())
+        return Lost(f"no answer for {MSP_SILENCE_S} s", pending=self.unanswered())
+
+
+class Identifying(MspLine):
+    """MSP is answered; the board is being identified."""
+
+    name = "identifying"
+    is_searching = True
+
+    def __init__(self, port: Port, event: MspFound, now: float) -> None:
+        found = event.found
+        super().__init__(port, MspLink(found.speed, now, event.pending.size(found.speed, now)), found)
+        self._end: Event | None = None
+        self._give_up_at = now + _IDENTIFY_TIMEOUT_S
+        port.runner.link_up(self.link)
+        self._task = port.runner.start(identify_msp(port.profiles), self._identified, now)
+
+    def _identified(self, who: FlightController | LinkLost | None, _now: float) -> None:
+        if isinstance(who, FlightController):
+            self._end = Identified(who, self.found, self.link)
+        else:
+            self._end = Lost("fell silent while it was being identified", pending=self.unanswered())
+
+    def finished(self) -> Event | None:
+        """Set when the identification has ended."""
+        return self._end
+
+    def tick(self, now: float) -> Event | None:
+        """As on any MSP line, and not for ever."""
+        event = super().tick(now)
+        if event is None and now >= self._give_up_at:
+            return Lost(f"not identified within {_IDENTIFY_TIMEOUT_S:.0f} s", pending=self.unanswered())
+        return event
+
+    def deadline(self) -> float:
+        """As on any MSP line, and not for ever."""
+        return min(super().deadline(), self._give_up_at)
+
+    def _silent_since(self) -> float:
+        # The identification may have to wait its turn, behind a conversation that waits for the store.
+        began = self._task.began_at
+        return self._give_up_at if began is None else max(began, self.link.last_heard_at)
+
+
+class Msp(MspLine):
+    """The flight controller is known and polled over MSP."""
+
+    name = "MSP"
+    controller: FlightController
+
+    def __init__(self, port: Port, event: Identified, now: float) -> None:
+        super().__init__(port, event.link, event.found)
+        self.controller = controller = event.controller
+        port.met_family = controller.profile.family
+        if controller.info is not None:
+            self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
+        self.link.any_byte = controller.profile.accepts_any_byte
+        port.polls.begin(event.found.speed, controller.profile.polls)
+        port.meet(controller)
+        self._check_interval_s = _FIRST_CHECK_S
+        self._check_at = now + _FIRST_CHECK_S if controller.profile.open_store is None else inf
+        self._corrected: FlightController | None = None
+
+    def take_frame(self, frame: MspFrame, now: float) -> None:
+        """Replies belong to a conversation, to a poll, or to both."""
+        super().take_frame(frame, now)
+        self.port.polls.answered(frame)
+        hear_msp(self.port.vehicle, frame, self.controller, now)
+
+    def tick(self, now: float) -> Event | None:
+        """Poll; check an identity that is in doubt."""
+        event = super().tick(now)
+        if event is None:
+            self.port.polls.ask(self.link, now, beside_missions=self.port.runner.is_busy)
+            if now >= self._check_at and not self.port.runner.is_busy:
+                self._check_at = inf
+                self.port.runner.start(identify_msp(self.port.profiles), self._checked, now)
+        return event
+
+    def deadline(self) -> float:
+        """The next poll, or the next deadline of any MSP line."""
+        poll = self.port.polls.next_deadline(self.link)
+        check_at = inf if self.port.runner.is_busy else self._check_at
+        return min(super().deadline(), check_at, inf if poll is None else poll)
+
+    def finished(self) -> Event | None:
+        """Set when the board turned out to be another one."""
+        return None if self._corrected is None else Identified(self._corrected, self.found, self.link)
+
+    def _checked(self, who: FlightController | LinkLost | None, now: float) -> None:
+        if isinstance(who, FlightController) and who.profile is not self.controller.profile:
+            self._corrected = who
+            return
+        self._check_interval_s = min(self._check_interval_s * 2, _LAST_CHECK_S)
+        self._check_at = now + self._check_interval_s

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What outlives the states of a port."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from bridge.fc.profile import FlightController, Profile
+from bridge.line.poll_schedule import PollSchedule
+from bridge.line.runner import Runner
+from bridge.model.vehicle import Vehicle
+from protocols.mavlink.frame import MavlinkFrame
+
+
+class Autopilot(Enum):
+    """Whose MAVLink is heard on the port."""
+
+    AUTO = "auto"
+    HARAKIRI = "harakiri"
+    OTHER = "other"
+
+
+@dataclass(slots=True)
+class Port:
+    """Everything that outlives a state: settings, knowledge about the port, and shared parts of the bridge."""
+
+    speeds: Sequence[int | None]
+    autopilot: Autopilot
+    profiles: Sequence[Profile]
+    runner: Runner
+    on_mavlink: Callable[[list[MavlinkFrame]], None]
+    polls: PollSchedule = field(default_factory=PollSchedule)
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    output: list[bytes] = field(default_factory=list)
+    #: A Harakiri that arms may change its speed; disarmed, it comes back to this one.
+    known_speed: int | None = None
+    #: The family of the board that was last identified over MSP on this port.
+    met_family: str | None = None
+    #: The family of the board that `vehicle` describes, which outlives a lost link and a change of protocol.
+    family: str | None = None
+
+    def meet(self, controller: FlightController) -> None:
+        """Begin a new vehicle if this is another board than before."""
+        if controller.profile.family != self.family:
+            self.family, self.vehicle = controller.profile.family, Vehicle()
+        self.vehicle.mixer = controller.mixer or self.vehicle.mixer
