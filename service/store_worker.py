@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 
 import structlog
 
-from bridge.line.conversation import Conclude, Recall, Save, StoreEffect
-from bridge.model.mission_log import ArrivedMission
-from protocols.mission_record import identify, pack_records
+from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
+from bridge.model.mission_log import ArrivedMission, PendingMission
+from protocols.mission_record import ListIdentity, identify, pack_records
 from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
 
 DATABASE_NAME = "missions.db"
@@ -85,6 +85,16 @@ class StoreWorker:
                     found = self._store.latest_verified(identity.count, identity.checksum)
                     sent_as: Mapping[int, int] | None = None if found is None else found.received.roi_commands
                     return sent_as
+                case FindPending():
+                    return [
+                        PendingMission(
+                            mission.number,
+                            None
+                            if mission.verdict == "REJECTED"
+                            else ListIdentity(mission.record_count, mission.checksum),
+                        )
+                        for mission in self._store.pending()
+                    ]
         except StoreError as error:
             _log.error("store.failed", why=str(error))
         return nothing

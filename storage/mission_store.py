@@ -185,13 +185,20 @@ class MissionStore:
             ).fetchone()
         return None if row[0] is None else self.get(row[0])
 
+    def pending(self) -> builtins.list[MissionSummary]:
+        """Return the missions that were never concluded, oldest first."""
+        return self._summaries(f"WHERE outcome = '{PENDING}' ORDER BY number")
+
     def list(self, limit: int) -> builtins.list[MissionSummary]:
         """Return the `limit` youngest missions, youngest first."""
+        return self._summaries("ORDER BY number DESC LIMIT ?", limit)
+
+    def _summaries(self, which: str, *values: int) -> builtins.list[MissionSummary]:
         with explained(f"cannot list {self._path}"):
             rows = self._connection.execute(
-                "SELECT number, received_at, source, verdict, ack, item_count, finding_count, record_count,"
-                " checksum, outcome, detail, concluded_at FROM missions ORDER BY number DESC LIMIT ?",
-                (limit,),
+                "SELECT number, received_at, source, verdict, ack, item_count, finding_count, record_count,"  # noqa: S608 - constants
+                f" checksum, outcome, detail, concluded_at FROM missions {which}",
+                values,
             ).fetchall()
         return [MissionSummary(*row) for row in rows]
 

@@ -6,11 +6,11 @@ A conversation is a generator. It yields one effect at a time and is sent the ef
 when the bridge is about to end, its subclass Stopped.
 """
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bridge.model.mission_log import ArrivedMission, Conclusion
+from bridge.model.mission_log import ArrivedMission, Conclusion, PendingMission
 from protocols.mavlink.codec import Packed
 from protocols.mission_record import ListIdentity
 from protocols.msp.frame import MspFrame, frame_size
@@ -88,8 +88,13 @@ class Recall:
     identity: ListIdentity
 
 
-Effect = Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall
-StoreEffect = Save | Conclude | Recall
+@dataclass(frozen=True, slots=True)
+class FindPending:
+    """Look up missions that were never concluded. Answer: a sequence of PendingMission."""
+
+
+Effect = Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | FindPending
+StoreEffect = Save | Conclude | Recall | FindPending
 
 _MAX_ASKS = 5
 
@@ -156,3 +161,9 @@ def recall(identity: ListIdentity) -> Conversation[Mapping[int, int] | None]:
     """The commands that ambiguous records were sent with, by record number; None: no such list was ever verified."""
     commands: Mapping[int, int] | None = yield Recall(identity)
     return commands
+
+
+def find_pending() -> Conversation[Sequence[PendingMission]]:
+    """Missions whose end an earlier run of the daemon did not see; none if the store does not answer."""
+    pending: Sequence[PendingMission] | None = yield FindPending()
+    return pending or ()

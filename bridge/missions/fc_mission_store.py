@@ -46,7 +46,7 @@ class PushFailure(Enum):
     FLASH = "the flight controller could not write its flash; its old mission is kept"
     NO_ANSWER = "the flight controller does not answer; its old mission is kept"
     STOPPED = "naze-bridge was stopped meanwhile; the old mission is kept"
-    UNCERTAIN = "the flight controller fell silent while writing: read the mission back"
+    UNCERTAIN = "Link lost while writing: checked when it is back"
     INCOMPLETE = "broken off: the flight controller holds no mission to fly now; write it again"
     ARMED_MEANWHILE = "armed meanwhile: the flight controller holds no mission to fly now; disarm, write it again"
     NOT_SAVED = "the mission is there but not saved: it is lost at power-off; write it again"
@@ -62,7 +62,7 @@ LIST_IS_GONE = frozenset(
 class PushResult(Generic[RecordT]):
     """`failure` is None when the list was proven there. `unchanged`: it was there already.
 
-    `held`: what is there, if the flight controller could not take the records exactly.
+    `held`: what is or would be there, if the flight controller cannot take the records exactly.
     """
 
     failure: PushFailure | None

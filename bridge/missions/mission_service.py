@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bridge.line.conversation import Conversation, LinkLost, Stopped, conclude, pause, recall, save
+from bridge.line.conversation import Conversation, LinkLost, Stopped, conclude, find_pending, pause, recall, save
 from bridge.missions.fc_mission_store import LIST_IS_GONE, AnyFcMissionStore, PushFailure, StoreReport, StoreState
 from bridge.missions.list_check import MissionRules
 from bridge.missions.mission_texts import summary
-from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
+from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome, PendingMission
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
@@ -83,6 +83,9 @@ class MissionService:
         #: False until the present flight controller's list was read, and after a push that broke off.
         self._is_settled = False
         self._told_unloaded = False
+        #: Missions to be looked for when the list is next read.
+        self._pending: list[PendingMission] = []
+        self._has_asked_store = False
         self.held: HeldMission | None = None
 
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
@@ -201,7 +204,13 @@ class MissionService:
             return (yield from self._conclude(number, Outcome.FAILED, self._refusal.ack, self._refusal.text))
         if not (yield from self._copy_erased(dialect, verdict.records)):
             return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
+        before = None if self.held is None else self.held.identity
         result = yield from dialect.push(verdict.records, progress)
+        if result.failure is PushFailure.UNCERTAIN:
+            wanted = identify(verdict.records if result.held is None else result.held)
+            self._pending.append(PendingMission(number, wanted, before))
+            self._is_settled, self.held = False, None
+            return Delivery(MissionResult.DENIED, result.failure.value, number)
         if result.failure is not None:
             if result.failure in LIST_IS_GONE:
                 self.held = None
@@ -278,13 +287,18 @@ class MissionService:
         A new flight controller, or one on which a push broke off, is made to load its saved mission if it holds none.
         """
         dialect, is_first, before = self._dialect, not self._is_settled, self.held
-        if dialect is None or (not is_first and (yield from dialect.is_current())):
+        if not self._has_asked_store:
+            self._has_asked_store = True
+            self._pending += yield from find_pending()
+        if dialect is None or (not is_first and not self._pending and (yield from dialect.is_current())):
             return None
         is_reloaded = (yield from dialect.reload()) if is_first else False
         held = yield from self.read_back()
         if held is NO_LINK:
             return None
         self._is_settled = is_reloaded is not None
+        if isinstance(held, HeldMission) and (news := (yield from self._settle(held))) is not None:
+            return news
         if is_reloaded is None:
             is_news, self._told_unloaded = not self._told_unloaded, True
             return _NOT_LOADED if is_news else None
@@ -298,6 +312,26 @@ class MissionService:
             return None
         text = f"Mission on the flight controller changed: {held.identity.count} records"
         return MissionChange(text, is_warning=True)
+
+    def _settle(self, held: HeldMission) -> Conversation[MissionChange | None]:
+        """Look which of the pending missions the flight controller has; what the pilot hears of the newest."""
+        news = None
+        pending, self._pending = self._pending, []
+        for mission in pending:
+            has_arrived = mission.identity == held.identity
+            if mission.identity is None:
+                conclusion = Conclusion(Outcome.CANCELLED, "interrupted, old mission kept")
+            elif has_arrived:
+                conclusion = Conclusion(Outcome.VERIFIED, f"The mission did arrive: {held.identity.count} records")
+            elif mission.before == held.identity or (mission.before is None and held.records):
+                conclusion = Conclusion(Outcome.FAILED, "The mission did not arrive: old mission kept")
+            else:
+                conclusion = Conclusion(Outcome.FAILED, "The mission did not arrive whole: write it again")
+            if mission.number is not None:
+                yield from conclude(mission.number, conclusion)
+            if mission.identity is not None:
+                news = MissionChange(conclusion.detail, is_warning=not has_arrived)
+        return news
 
     def _copy_erased(self, dialect: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
         """Store what the new list leaves no room for; False if that fails."""

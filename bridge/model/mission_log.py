@@ -7,6 +7,7 @@ from typing import Any
 
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
+from protocols.mission_record import ListIdentity
 
 
 class Outcome(Enum):
@@ -26,6 +27,19 @@ class ArrivedMission:
     source: str
     items: tuple[MissionItem, ...]
     verdict: Verdict[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class PendingMission:
+    """A mission of which it is not known whether the flight controller has it.
+
+    `number`: in the store, None if it is not stored. `identity`: of the list to look for, None if it was rejected.
+    `before`: of the list that was there before, None if that is not known.
+    """
+
+    number: int | None
+    identity: ListIdentity | None
+    before: ListIdentity | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,9 +26,9 @@ from bridge.fc.states.msp import Msp
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
-from bridge.line.conversation import Conclude, Recall, Save, StoreEffect
+from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.events import Level
-from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome
+from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome, PendingMission
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
@@ -82,6 +82,12 @@ class MemoryStore:
                     verified = ended is not None and ended.outcome is Outcome.VERIFIED
                     if verified and identify(mission.verdict.records) == identity:
                         return mission.verdict.sent_as
+            case FindPending():
+                return [
+                    PendingMission(number, identify(mission.verdict.records))
+                    for number, (mission, ended) in enumerate(self.missions, 1)
+                    if ended is None
+                ]
         return None
 
     def outcomes(self) -> list[Outcome | None]:

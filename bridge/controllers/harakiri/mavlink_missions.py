@@ -95,21 +95,21 @@ class HarakiriMavlinkMissions(OneMission):
                     yield from pause(_WRITTEN_AFTER_S)
                     held = yield from self._read(wanted)
                     if held != wanted:
-                        return PushResult(PushFailure.UNCERTAIN)
+                        return PushResult(PushFailure.UNCERTAIN, held=wanted)
                     self._known = wanted
                     return PushResult(None, held=wanted)
                 except _Failed as failed:
                     failure = failed.failure
                     restored = yield from self._restore()
                     if not restored:
-                        return PushResult(PushFailure.UNCERTAIN)
+                        return PushResult(PushFailure.UNCERTAIN, held=wanted)
                     if failed.is_final:
                         break
                     if failure is PushFailure.BUSY:
                         yield from pause(_WRITTEN_AFTER_S)
         except LinkLost:
             failure = PushFailure.UNCERTAIN
-        return PushResult(failure)
+        return PushResult(failure, held=wanted)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
         """Read the list that is there."""

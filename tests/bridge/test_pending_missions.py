@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mission of which it is not known whether it arrived: the board is asked when it is back, and the pilot hears it."""
+
+import pytest
+from conversations import Upload, records_of, waypoints
+from world import GroundStation, World, flash_holding
+
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.fc_mission_store import PushFailure
+from bridge.missions.list_check import check_list
+from bridge.model.mission_log import ArrivedMission, Outcome
+from protocols.mission_item import MissionResult
+from protocols.msp.frame import MspParser
+from protocols.msp.mission import MissionCommand
+from simulator.options import SimOptions
+
+OLD, NEW = waypoints(20, seed=77), waypoints(30)
+OLD_FLASH = flash_holding(records_of(OLD))
+ARRIVED = "The mission did arrive: 30 records"
+KEPT = "The mission did not arrive: old mission kept"
+
+
+def is_committing(world: World) -> bool:
+    return any(
+        frame.command == MissionCommand.COMMIT for _, _, data in world.written for frame in MspParser().feed(data)
+    )
+
+
+@pytest.mark.parametrize("boot_ms", [7100, 25200])
+@pytest.mark.parametrize(("cut_after_s", "outcome"), [(0.0, Outcome.FAILED), (0.05, Outcome.VERIFIED)])
+def test_a_board_that_resets_while_it_stores_is_asked_when_it_is_back(
+    boot_ms: int, cut_after_s: float, outcome: Outcome
+) -> None:
+    """7.1 s from reset to the first answer, 25.2 s without its GPS module."""
+    world = World(SimOptions(boot_ms=boot_ms), speeds=(115200,), flash=OLD_FLASH)
+    world.wait_ready()
+    station = GroundStation(world)
+    upload = Upload(station, NEW)
+    world.wait_until(is_committing, 5)
+    world.run(cut_after_s)
+    upload.stop()
+    station.air.loss = 0.0
+    if outcome is Outcome.VERIFIED:
+        # Stored, but the reply is lost.
+        world.unplug()
+    world.power_off()
+    world.wait_until(lambda _: bool(station.said("MISSION_ACK")), 20)
+    assert [message.type for message in station.said("MISSION_ACK")] == [MissionResult.DENIED]
+    assert PushFailure.UNCERTAIN.value in station.texts()
+    assert world.store.outcomes() == [None]
+    station.take()
+    world.power_on()
+    if outcome is Outcome.VERIFIED:
+        world.plug()
+    world.wait_ready(boot_ms / 1000 + 15)
+    world.run(1)
+    assert world.stored == records_of(NEW if outcome is Outcome.VERIFIED else OLD)
+    assert (ARRIVED if outcome is Outcome.VERIFIED else KEPT) in station.texts()
+    assert world.store.outcomes() == [outcome]
+
+
+@pytest.mark.parametrize(("items", "outcome"), [(OLD, Outcome.VERIFIED), (NEW, Outcome.FAILED)])
+def test_a_mission_that_a_killed_daemon_left_pending_is_settled_at_the_start(
+    items: list[object], outcome: Outcome
+) -> None:
+    world = World(speeds=(115200,), flash=OLD_FLASH)
+    verdict = check_list(items, HarakiriRules())  # type: ignore[arg-type]
+    world.store.missions.append((ArrivedMission("udp", tuple(items), verdict), None))  # type: ignore[arg-type]
+    world.wait_ready()
+    world.run(1)
+    assert world.store.outcomes() == [outcome]
