@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station reads the mission: the vehicle's side of MAVLink's download (mission-rules.md, "Read-back")."""
+"""A ground station reads the mission: the vehicle's side of MAVLink's download (docs/mission-rules.md, "Read-back")."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -128,14 +128,14 @@ class MissionDownloads:
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...]) -> None:
         if question.seq is None:
-            self._send_count(question.station, items)
+            # DroneKit takes home from a download, and waits for ever without one: an empty list has a home, if known.
+            self._send_count(question.station, len(items) or int(self._home() is not None))
         else:
             self._send_item(question.station, items, question.seq, as_int=question.as_int)
 
-    def _send_count(self, station: Station, items: tuple[MissionItem, ...]) -> None:
+    def _send_count(self, station: Station, count: int) -> None:
         self._post.to(
-            station,
-            messages.MAVLink_mission_count_message(station.sysid, station.compid, len(items), MISSION_TYPE_MISSION),
+            station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count, MISSION_TYPE_MISSION)
         )
 
     def _send_item(self, station: Station, items: tuple[MissionItem, ...], seq: int, *, as_int: bool) -> None:

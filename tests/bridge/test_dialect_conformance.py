@@ -112,7 +112,7 @@ def assert_is_true(craft: Craft, delivery: Delivery, old: Sequence[MissionItem],
         assert craft.holds(old)
     elif delivery.text != PushFailure.UNCERTAIN.value:
         # An INAV is made to load its saved mission again, which the pilot is told.
-        assert craft.download() == [] or craft.holds(old)
+        assert len(craft.download()) <= 1 or craft.holds(old)
 
 
 @pytest.fixture(params=MAKERS)
@@ -157,7 +157,7 @@ def test_a_cleared_one_reads_as_none_and_takes_a_list_again(craft: Craft) -> Non
     craft.station.send(clear_message())
     craft.world.run(6)
     assert craft.world.store.outcomes()[-1] is Outcome.VERIFIED
-    assert craft.download() == []
+    assert len(craft.download()) <= 1
     assert (craft.pull().records, craft.pull().items) == ((), ())
     assert craft.upload(craft.plan(7)) is ACCEPTED
     assert craft.holds(craft.plan(7))

@@ -120,13 +120,17 @@ def test_a_record_that_we_do_not_know_is_shown_as_nothing_that_flies() -> None:
     assert (item.command, item.p1) == (0, 99.0)
 
 
-def test_an_empty_list_is_a_count_of_none() -> None:
+def test_an_empty_list_is_a_count_of_none_until_home_is_known() -> None:
+    """Then it is home alone: DroneKit takes home from a download, and waits for ever without one."""
     world = World(speeds=(115200,))
-    world.wait_ready()
+    world.wait_until(lambda w: w.is_found, 5)
     station = GroundStation(world)
-    download = Download(station)
-    download.run(2)
-    assert (download.count, download.items) == (0, [])
+    (count,) = ask(station, list_message())
+    assert count.count == int(world.bridge._vehicle.home() is not None)
+    world.run(6)
+    (home,) = Download(station).run(2)
+    assert (home.seq, home.command, home.frame) == (0, 16, 0)
+    assert (home.lat_e7, home.lon_e7) == world.bridge._vehicle.home()
     world.run(1.1)
     assert station.said("MISSION_CURRENT")[-1].mission_state == 1
 

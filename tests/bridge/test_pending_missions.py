@@ -9,7 +9,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.missions.list_check import check_list
 from bridge.model.mission_log import ArrivedMission, Outcome
-from protocols.mission_item import MissionResult
+from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.options import SimOptions
@@ -61,11 +61,11 @@ def test_a_board_that_resets_while_it_stores_is_asked_when_it_is_back(
 
 @pytest.mark.parametrize(("items", "outcome"), [(OLD, Outcome.VERIFIED), (NEW, Outcome.FAILED)])
 def test_a_mission_that_a_killed_daemon_left_pending_is_settled_at_the_start(
-    items: list[object], outcome: Outcome
+    items: list[MissionItem], outcome: Outcome
 ) -> None:
     world = World(speeds=(115200,), flash=OLD_FLASH)
-    verdict = check_list(items, HarakiriRules())  # type: ignore[arg-type]
-    world.store.missions.append((ArrivedMission("udp", tuple(items), verdict), None))  # type: ignore[arg-type]
+    verdict = check_list(items, HarakiriRules())
+    world.store.missions.append((ArrivedMission("udp", tuple(items), verdict), None))
     world.wait_ready()
     world.run(1)
     assert world.store.outcomes() == [outcome]

@@ -126,7 +126,7 @@ def test_another_list_is_there_after_the_board_was_changed(start: Starter) -> No
         until(lambda: bench.daemon.has_logged("fc.port_lost"), "the loss of the port")
         bench.daemon.wait()
         assert board.records() == []
-        assert station.download() == []
+        assert len(station.download()) <= 1  # home
 
 
 # -- other flight controllers --------------------------------------------------------------------------------
