@@ -67,7 +67,7 @@ class ListCheck(ABC):
         why: str,
         news: News = News.NOTICE,
     ) -> None:
-        if becomes == DROPPED and item.command != Command.DO_SET_ROI_NONE:
+        if becomes == DROPPED and news is News.NOTICE and item.command != Command.DO_SET_ROI_NONE:
             news = News.WARNING
         self._findings.append(Finding(item.seq, name, was, becomes, why, item.command, news))
 
@@ -79,10 +79,15 @@ class ListCheck(ABC):
             self._note(item, name, given(value), stored, allowed.reason(value), news)
         return stored
 
-    def _no_position(self, item: MissionItem) -> None:
+    def _warn(self, item: MissionItem, name: str, why: str) -> None:
+        """Tell of a value that is stored as it was sent, and flown otherwise than a pilot would expect."""
+        value = given(getattr(item, name))
+        self._note(item, name, value, value, why, News.WARNING)
+
+    def _no_position(self, item: MissionItem, news: News = News.NOTICE) -> None:
         for name, value in (("lat_e7", item.lat_e7), ("lon_e7", item.lon_e7)):
             if value:
-                self._note(item, name, value, 0, UNUSED.why)
+                self._note(item, name, value, 0, UNUSED.why, news)
 
     def _note_home(self, item: MissionItem) -> None:
         """Item 0 is home; MAVSDK's `mission` plugin puts none in front, and its first waypoint would be missing."""

@@ -69,6 +69,9 @@ class Finding:
             return self.why
         if self.field == "frame" or (self.news is News.WARNING and self.field in ("lat_e7", "lon_e7")):
             return f"{who}: {self.why}"
+        if self.was == self.becomes:
+            # Nothing is changed: the pilot is warned of what is sent.
+            return f"{who}: {self.why}"
         label = self._label()
         unit = " m" if self.field in _METRES or label in _METRES else ""
         was, becomes = self._shown(self.was), self._shown(self.becomes)

@@ -14,7 +14,7 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, items_from_records
 from bridge.controllers.nav.rules import ENDLESS_S, inav_profile, multiwii_profile
 from bridge.missions.list_check import check_count, check_list
-from bridge.model.finding import DROPPED, REJECTED
+from bridge.model.finding import DROPPED, REJECTED, News
 from bridge.model.verdict import Result, Verdict
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_from_float_message
@@ -65,12 +65,9 @@ def speed(metres: float, kind: float = 1, throttle: float = 0) -> MissionItem:
         (replace(WP, frame=0), NavRecord(A.WAYPOINT, LAT, LON, 5000, p3=1)),
         (replace(WP, frame=5), NavRecord(A.WAYPOINT, LAT, LON, 5000, p3=1)),
         (replace(WP, frame=6), NavRecord(A.WAYPOINT, LAT, LON, 5000)),
-        (replace(WP, alt_m=-12.34), NavRecord(A.WAYPOINT, LAT, LON, -1234)),
         (replace(WP, p1=7), NavRecord(A.POSHOLD_TIME, LAT, LON, 5000, 7)),
         (item(C.NAV_LOITER_TIME, p1=32766), NavRecord(A.POSHOLD_TIME, LAT, LON, 5000, 32766)),
         (item(C.NAV_LOITER_UNLIM), NavRecord(A.POSHOLD_TIME, LAT, LON, 5000, ENDLESS_S)),
-        (item(C.NAV_RETURN_TO_LAUNCH, at=False), NavRecord(A.RTH)),
-        (item(C.NAV_RETURN_TO_LAUNCH, at=False, p1=1), NavRecord(A.RTH, p1=1)),
         (item(C.NAV_LAND), NavRecord(A.LAND, LAT, LON, 5000)),
         (item(C.NAV_ROI), NavRecord(A.SET_POI, LAT, LON, 5000)),
         (item(C.DO_SET_ROI, frame=0), NavRecord(A.SET_POI, LAT, LON, 5000, p3=1)),
@@ -96,8 +93,11 @@ def test_what_can_be_held_is_held_and_read_as_it_was_sent(sent: MissionItem, rec
         (replace(WP, frame=10), A.WAYPOINT, [("frame", 10, 3)]),
         (replace(WP, alt_m=50.123), A.WAYPOINT, [("alt_m", 50.123, 50.12)]),
         (replace(WP, alt_m=1e30), A.WAYPOINT, [("alt_m", 1e30, 32767)]),
-        (item(C.NAV_RETURN_TO_LAUNCH), A.RTH, [("lat_e7", LAT, 0), ("lon_e7", LON, 0), ("alt_m", 50, 0)]),
-        (item(C.CONDITION_YAW, at=False, p1=360, p3=-1), A.SET_HEAD, [("p1", 360, 359), ("p3", -1, 0)]),
+        (item(C.CONDITION_YAW, at=False, p1=360, p3=-1), A.SET_HEAD, [("p1", 360, 0), ("p3", -1, 0)]),
+        (item(C.CONDITION_YAW, at=False, p1=-90), A.SET_HEAD, [("p1", -90, 270)]),
+        (replace(WP, alt_m=-12.34), A.WAYPOINT, [("alt_m", -12.34, -12.34)]),
+        (replace(WP, alt_m=0.0), A.WAYPOINT, [("alt_m", 0, 2)]),
+        (replace(WP, alt_m=0.0, frame=0), A.WAYPOINT, [("alt_m", 0, 0)]),
         (item(C.NAV_LAND, alt_m=0.0), A.LAND, [("alt_m", 0, 50)]),
         (item(C.NAV_LAND, at=False), A.LAND, [("lat_e7", 0, LAT), ("lon_e7", 0, LON), ("alt_m", 0, 50)]),
     ],
@@ -118,6 +118,7 @@ def test_what_cannot_be_held_is_told(sent: MissionItem, record: NavAction, findi
         item(C.CONDITION_YAW, at=False, p1=math.nan),
         speed(5, kind=2),
         speed(-1),
+        speed(0),
         speed(math.nan),
     ],
 )
@@ -149,9 +150,9 @@ def test_a_speed_goes_back_to_the_set_one() -> None:
 
 def test_of_a_speed_what_is_lost_is_told() -> None:
     assert said(speed(0.1, 0, 50), WP) == [
+        (1, "p3", 50, 0),
         (1, "p1", 0, 1),
         (1, "p2", 0.1, 0.5),
-        (1, "p3", 50, 0),
     ]
     assert said(WP, speed(5), item(C.NAV_RETURN_TO_LAUNCH, at=False)) == [(2, "command", 178, DROPPED)]
     assert said(speed(1e30), WP) == [(1, "p2", 1e30, 327.67)]
@@ -256,13 +257,100 @@ def test_home_is_no_record_and_may_be_anywhere() -> None:
 
 
 def test_multiwii_has_an_endless_hold_a_height_on_the_way_home_and_no_speeds() -> None:
-    sent = (WP, item(C.NAV_RETURN_TO_LAUNCH, at=False, alt_m=30.0), item(C.NAV_LOITER_UNLIM))
+    sent = (WP, item(C.NAV_LOITER_UNLIM), item(C.NAV_RETURN_TO_LAUNCH, at=False, alt_m=30.0))
     verdict = verdict_on(*sent, rules=MULTIWII)
     assert verdict.findings == ()
-    assert [(r.action, r.alt_cm) for r in verdict.records] == [(1, 5000), (4, 3000), (2, 5000)]
+    assert [(r.action, r.alt_cm) for r in verdict.records] == [(1, 5000), (2, 5000), (4, 3000)]
     assert list(verdict.items[1:]) == [replace(it, seq=n) for n, it in enumerate(sent, 1)]
     assert said(speed(5), WP, rules=MULTIWII) == [(1, "command", 178, DROPPED)]
     assert said(replace(WP, frame=0), rules=MULTIWII) == [(1, "frame", 0, 3)]
+
+
+# -- flown otherwise than it reads ---------------------------------------------------------------------------
+
+RTL, RTL_LANDS = (item(C.NAV_RETURN_TO_LAUNCH, at=False, p1=p1) for p1 in (0.0, 1.0))
+
+
+@pytest.mark.parametrize("rules", [INAV, MULTIWII])
+def test_what_comes_behind_the_way_home_is_left_out(rules: NavRules) -> None:
+    assert [r.action for r in kept(WP, WP, RTL_LANDS, WP, WP, rules=rules)] == [1, 1, 4]
+    assert said(WP, RTL, WP, WP, rules=rules) == [(3, "command", 16, DROPPED), (4, "command", 16, DROPPED)]
+    # A jump leads behind it.
+    over = (WP, WP, WP, jump(1), WP) if rules is MULTIWII else (WP, jump(4), RTL, WP, WP)
+    assert said(*over, rules=rules) == []
+
+
+def test_an_rtl_that_the_last_item_would_make_land_or_hover_rejects_the_list_on_inav() -> None:
+    over = (WP, jump(5), WP, RTL_LANDS, WP, WP)
+    assert verdict_on(*over).ack is MissionResult.INVALID_PARAM1
+    assert [r.p1 for r in kept(*(RTL if it is RTL_LANDS else it for it in over)) if r.action == A.RTH] == [0]
+    assert verdict_on(*over[:-2], speed(5), WP, WP).result is Result.ACCEPTED
+
+
+def test_a_jump_to_the_first_record_as_the_last_one_means_hover() -> None:
+    """INAV keeps its target as an index, 0."""
+    assert verdict_on(WP, jump(5), WP, RTL, WP, WP, jump(1)).result is Result.ACCEPTED
+    assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, jump(1)).result is Result.REJECTED
+    assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, WP, jump(5)).result is Result.ACCEPTED
+
+
+def test_an_rtl_alone_in_front_leaves_nothing_to_fly() -> None:
+    assert verdict_on(RTL, WP, WP).ack is MissionResult.INVALID
+
+
+@pytest.mark.parametrize(
+    "last", [item(C.NAV_ROI), item(C.DO_SET_ROI_NONE, at=False), item(C.CONDITION_YAW, at=False, p1=90)]
+)
+def test_multiwii_overlooks_the_end_on_a_turn_so_it_is_left_out_there(last: MissionItem) -> None:
+    assert kept(WP, WP, last, rules=MULTIWII) == kept(WP, WP, rules=MULTIWII)
+    assert [(f.seq, f.becomes, f.news) for f in verdict_on(WP, WP, last, rules=MULTIWII).findings] == [
+        (3, DROPPED, News.WARNING)
+    ]
+    assert len(kept(WP, WP, last)) == 3
+
+
+def test_a_jump_within_a_jump_is_rejected_on_multiwii_and_one_behind_it_is_not() -> None:
+    assert verdict_on(WP, WP, jump(1), WP, jump(1), rules=MULTIWII).ack is MissionResult.INVALID_PARAM1
+    assert len(kept(WP, WP, jump(1), WP, WP, jump(4), rules=MULTIWII)) == 6
+    assert len(kept(WP, WP, WP, jump(1), WP, WP, jump(1))) == 7
+
+
+@pytest.mark.parametrize(("seconds", "held"), [(65, 65), (66, 65), (70000, 65)])
+def test_multiwii_holds_at_most_65_s(seconds: float, held: int) -> None:
+    for sent in (item(C.NAV_LOITER_TIME, p1=seconds), replace(WP, p1=seconds)):
+        verdict = verdict_on(WP, sent, WP, rules=MULTIWII)
+        assert verdict.records[1].p1 == held
+        assert [f.news for f in verdict.findings] == ([] if seconds == held else [News.WARNING])
+
+
+def test_a_height_that_is_not_used_may_be_anything() -> None:
+    for unused in (item(C.NAV_ROI, alt_m=math.nan), replace(RTL, alt_m=math.nan)):
+        assert len(kept(WP, unused, *((WP,) if unused.command == C.NAV_ROI else ()))) >= 2
+        assert said(WP, WP, unused) == []
+    assert kept(WP, replace(RTL, alt_m=math.nan), rules=MULTIWII)[1].alt_cm == 0
+
+
+def test_what_is_not_used_is_no_news_unless_something_is_lost() -> None:
+    def news(sent: MissionItem) -> list[News]:
+        return [finding.news for finding in verdict_on(WP, sent, WP).findings]
+
+    assert [finding.news for finding in verdict_on(WP, WP, replace(jump(1), p3=3.0)).findings] == [News.NONE]
+    assert news(item(C.DO_SET_ROI_NONE)) == [News.NONE] * 3
+    assert news(item(C.DO_CHANGE_SPEED, p1=1.0, p2=0.0, at=False)) == [News.NONE]
+    assert news(replace(WP, p2=2.0)) == [News.NOTICE]
+    assert news(item(C.NAV_LOITER_TURNS, p1=3)) == [News.NOTICE, News.WARNING]
+
+
+def test_legs_after_a_jump_are_flown_at_their_own_speeds_which_is_told_and_shown() -> None:
+    sent = (WP, WP, speed(5), WP, WP, jump(1))
+    verdict = verdict_on(*sent)
+    assert [(f.seq, f.was, f.becomes, f.news) for f in verdict.findings] == [(6, 1, 1, News.WARNING)]
+    shown = [(it.command, it.p1, it.p2) for it in verdict.items[1:]]
+    assert shown == [(178, 1, -2), (16, 0, 0), (16, 0, 0), (178, 1, 5), (16, 0, 0), (16, 0, 0), (177, 1, 2)]
+    again = check_list(verdict.items, INAV)
+    assert (again.records, again.findings) == (verdict.records, ())
+    assert said(WP, speed(5), WP, WP, WP, jump(2)) == []
+    assert said(speed(5), WP, WP, WP, jump(2)) == []
 
 
 def test_what_others_wrote_is_shown_whatever_it_is() -> None:
@@ -341,7 +429,9 @@ def test_what_is_read_and_written_again_is_the_same_without_a_finding(
         # As the wire has it: heights and parameters in single precision, places in degrees * 1e7.
         read = tuple(through_the_wire(shown) for shown in read)
     again = check_list(read, rules)
-    assert (again.result, again.findings) == (Result.ACCEPTED, ())
+    assert again.result is Result.ACCEPTED
+    # What is dangerous as it stands is said every time.
+    assert [finding for finding in again.findings if finding.was != finding.becomes] == []
     assert again.records == verdict.records
     if remembered and not as_float:
         assert again.items == verdict.items

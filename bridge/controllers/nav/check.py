@@ -5,13 +5,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from bridge.controllers.nav.items import home_item, items_from_records
+from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
+from bridge.controllers.nav.items import home_item, items_from_records, leg_speed
 from bridge.controllers.nav.jumps import Jumps
 from bridge.controllers.nav.landing import placed_landing
 from bridge.controllers.nav.leg_speed import LegSpeed
 from bridge.controllers.nav.rules import (
-    HEADING,
+    HOLD,
     LANDS,
+    LEAST_HEIGHT_M,
     NAV_RULES,
     REPEATS,
     ROI_COMMANDS,
@@ -38,6 +40,8 @@ from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord
 
 #: So high a single-precision number still holds a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
+_FULL_CIRCLE = 360
+_TURNS = (NavAction.SET_POI, NavAction.SET_HEAD)
 #: DO_CHANGE_SPEED, param3: none, no change, as set.
 _NO_THROTTLE = (0, -1, -2)
 
@@ -78,6 +82,8 @@ class NavCheck(ListCheck):
         self._others = others
         self._home = home_item(fallback_home)
         self._records: list[NavRecord] = []
+        #: The item of each record.
+        self._sent: list[MissionItem] = []
         self._jumps = Jumps(back_only=profile.jumps_back_only)
         self._sent_as: dict[int, int] = {}
         self._speed = LegSpeed()
@@ -121,7 +127,7 @@ class NavCheck(ListCheck):
         if rule.position and (rejection := refuse_position(item)):
             return rejection
         if not math.isfinite(item.alt_m):
-            if rule.height is Height.FLOWN and item.command not in ROI_COMMANDS:
+            if rule.height is Height.FLOWN:
                 return self._drop(item, "alt_m", given(item.alt_m), "Alt is not a number")
             item = replace(item, alt_m=0.0)
         if item.command == Command.NAV_LAND:
@@ -133,13 +139,20 @@ class NavCheck(ListCheck):
             return self._drop(item, *missing, "no Lat/Long")
         if rejection := refuse_frame(item, needs_position=rule.position):
             return rejection
-        p1 = self._fit(item, "p1", rule.p1)
+        p1 = self._hold(item) if rule.p1 is HOLD else self._fit(item, "p1", rule.p1)
+        # MAVLink gives these no meaning for an RTL or a ROI: nothing is lost.
+        news = News.NOTICE if rule.height in (Height.FLOWN, Height.APPROACH) else News.NONE
         for name in ("p2", "p3", "p4"):
-            self._fit(item, name, UNUSED)
+            self._fit(item, name, UNUSED, news)
         if not rule.position:
-            self._no_position(item)
+            self._no_position(item, News.NONE)
         self._keep(item, self._record(item, rule, p1))
         return None
+
+    def _hold(self, item: MissionItem) -> int:
+        allowed = self._profile.longest_hold
+        is_cut = math.isfinite(item.p1) and item.p1 >= allowed.high + 1
+        return self._fit(item, "p1", allowed, News.WARNING if is_cut else News.NOTICE)
 
     def _record(self, item: MissionItem, rule: NavRule, p1: int) -> NavRecord:
         place = (item.lat_e7 or 0, item.lon_e7 or 0)
@@ -162,7 +175,7 @@ class NavCheck(ListCheck):
                 self._sent_as[len(self._records)] = command
                 return NavRecord(NavAction.SET_POI, *place, alt_cm, 0, 0, datum)
         if item.command == Command.NAV_LOITER_TURNS:
-            self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "it flies no circles")
+            self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "it flies no circles", News.WARNING)
         return NavRecord(NavAction.WAYPOINT, *place, alt_cm, speed, 0, datum)
 
     def _take_heading(self, item: MissionItem) -> Rejection | None:
@@ -171,8 +184,14 @@ class NavCheck(ListCheck):
             return self._drop(item, "p4", item.p4, "it turns to no relative heading")
         if not math.isfinite(item.p1):
             return self._drop(item, "p1", given(item.p1), "no heading is given")
-        heading = self._fit(item, "p1", HEADING)
-        self._unused(item, "p2", "p3", "p4")
+        heading = math.trunc(item.p1) % _FULL_CIRCLE
+        if heading != item.p1:
+            is_same = item.p1 % _FULL_CIRCLE == heading
+            why = "the same heading" if is_same else "whole numbers only"
+            self._note(item, "p1", item.p1, heading, why, News.NONE if is_same else News.NOTICE)
+        for name in ("p2", "p3", "p4"):
+            self._fit(item, name, UNUSED)
+        self._unused(item)
         self._keep(item, NavRecord(NavAction.SET_HEAD, p1=heading))
         return None
 
@@ -189,6 +208,7 @@ class NavCheck(ListCheck):
         repeats = self._fit(item, "p2", REPEATS)
         self._unused(item, "p3", "p4")
         self._jumps.wanted.append((len(self._records), item))
+        self._speed.at_jump[len(self._records)] = self._speed.cms
         self._keep(item, NavRecord(NavAction.JUMP, p2=repeats))
         return None
 
@@ -198,18 +218,65 @@ class NavCheck(ListCheck):
             return self._drop(item, "command", item.command, "its legs have no speeds")
         if fault := self._speed.fault(item):
             return self._drop(item, *fault)
+        if item.p3 not in _NO_THROTTLE:
+            self._fit(item, "p3", UNUSED)
+        if self._speed.leaves_it(item):
+            return self._drop(item, "p2", given(item.p2), "it changes nothing", News.NONE)
         self._speed.change(item, self._note)
-        self._unused(item, *(() if item.p3 in _NO_THROTTLE else ("p3",)), "p4")
+        self._unused(item, "p4")
         return None
 
     def _refuse_kept_list(self) -> Rejection | None:
-        if not any(record.action in LEGS for record in self._records):
-            return reject_list(MissionResult.INVALID, self._count, "no waypoint is left to fly to")
+        if rejection := self._refuse_without_legs():
+            return rejection
         if rejection := self._jumps.aim(self._records, self._note):
             return rejection
         if lost := self._speed.waiting:
             self._drop(lost, "command", lost.command, "no leg follows")
+        if not self._profile.ends_on_any_record:
+            legs = [place for place, record in enumerate(self._records) if record.action not in _TURNS]
+            self._cut(legs[-1] + 1, "it flies past the end of a list that ends with this")
+        self._cut(flown_size(self._records), "never flown: the RTL before it ends the mission")
+        return self._refuse_without_legs() or self._refuse_as_flown()
+
+    def _refuse_without_legs(self) -> Rejection | None:
+        if any(record.action in LEGS for record in self._records):
+            return None
+        return reject_list(MissionResult.INVALID, self._count, "no waypoint is left to fly to")
+
+    def _cut(self, size: int, why: str) -> None:
+        """Leave out the last records, from place `size` on."""
+        for item in self._sent[size:]:
+            self._drop(item, "command", item.command, why, News.WARNING)
+        for place in range(size, len(self._records)):
+            self._sent_as.pop(place, None)
+        del self._records[size:], self._sent[size:]
+
+    def _refuse_as_flown(self) -> Rejection | None:
+        """Reject a list that is flown otherwise than it reads, and warn of legs that are."""
+        if self._profile.jumps_back_only and (place := jump_within_jump(self._records)) is not None:
+            why = "a jump within another's loop never ends"
+            return reject(MissionResult.INVALID_PARAM1, self._sent[place], "p1", why)
+        for item, record in zip(self._sent, self._records, strict=True):
+            lands = record.p1 > 0
+            if record.action != NavAction.RTH or self._profile.own_rth_landing:
+                continue
+            if lands != lands_after_rth(self._records):
+                why = f"it would {'hover' if lands else 'land'}, as the last item says: put this RTL last"
+                return reject(MissionResult.INVALID_PARAM1, item, "p1", why)
+        for place, item in self._jumps.wanted:
+            if place < len(self._records) and self._speed_differs(place, item):
+                self._warn(item, "p1", "the legs after it are flown at their own speeds again")
         return None
+
+    def _speed_differs(self, place: int, jump: MissionItem) -> bool:
+        """Whether a pilot expects another speed after a JUMP than its target's own."""
+        record = self._records[place]
+        target = record.p1 - 1
+        if not (self._profile.leg_speed and record.p2):
+            return False
+        sets_speed = any(jump.p1 <= seq <= self._sent[target].seq for seq in self._speed.changed_at)
+        return not sets_speed and self._speed.at_jump[place] != leg_speed(self._records[target], 0)
 
     def _conclude(self) -> Verdict[NavRecord]:
         records = (*self._records[:-1], replace(self._records[-1], flag=LAST))
@@ -224,11 +291,14 @@ class NavCheck(ListCheck):
         if record.action in LEGS:
             self._speed.waiting = None
         self._records.append(record)
+        self._sent.append(item)
 
-    def _drop(self, item: MissionItem, name: str, was: float | None, why: str) -> Rejection | None:
+    def _drop(
+        self, item: MissionItem, name: str, was: float | None, why: str, news: News = News.NOTICE
+    ) -> Rejection | None:
         """Leave one item out, which rejects nothing."""
         self._jumps.dropped.add(item.seq)
-        self._note(item, name, was, DROPPED, why)
+        self._note(item, name, was, DROPPED, why, news)
         return None
 
     def _height(self, item: MissionItem, rule: NavRule) -> tuple[int, int]:
@@ -239,18 +309,35 @@ class NavCheck(ListCheck):
         alt_cm = _centimetres(item.alt_m)
         if not is_single(item.alt_m, alt_cm / 100):
             self._note(item, "alt_m", item.alt_m, alt_cm / 100, "whole cm, at most 32767 m")
+        if rule.height is Height.RTH:
+            if alt_cm < 0:
+                self._note(item, "alt_m", item.alt_m, 0, "the flight controller's own height", News.WARNING)
+            return max(alt_cm, 0), 0
         above_sea = item.frame in SEA_LEVEL_FRAMES
-        if rule.height is Height.RTH or (above_sea and self._profile.sea_level):
-            return alt_cm, int(above_sea and self._profile.sea_level and rule.height is not Height.RTH)
+        counts_from_sea = above_sea and self._profile.sea_level
+        if rule.height is not Height.POINT:
+            alt_cm = self._flown_height(item, alt_cm, above_sea=counts_from_sea)
+        if counts_from_sea:
+            return alt_cm, 1
         if above_sea or item.frame in TERRAIN_FRAMES:
             self._now_relative(item)
         return alt_cm, 0
 
+    def _flown_height(self, item: MissionItem, alt_cm: int, *, above_sea: bool) -> int:
+        """A leg is flown at whatever height it has, the ground included."""
+        if alt_cm == 0 and not above_sea:
+            self._note(item, "alt_m", item.alt_m, LEAST_HEIGHT_M, "0 m is not allowed", News.WARNING)
+            return 100 * LEAST_HEIGHT_M
+        if alt_cm <= 0:
+            level = "at or below sea level" if above_sea else "below home"
+            self._warn(item, "alt_m", f"flown {level}, at {item.alt_m:g} m")
+        return alt_cm
+
     def _unused(self, item: MissionItem, *names: str) -> None:
-        """Tell of values that mean nothing here, in `names` and where a place would be."""
+        """Take note of values that mean nothing, in `names` and where a place would be: nothing is lost."""
         for name in (*names, "alt_m"):
-            self._fit(item, name, UNUSED)
-        self._no_position(item)
+            self._fit(item, name, UNUSED, News.NONE)
+        self._no_position(item, News.NONE)
 
 
 def _centimetres(height_m: float) -> int:

@@ -6,6 +6,7 @@ none of them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate
 from types import MappingProxyType
 
 from bridge.controllers.nav.rules import ENDLESS_S, LEAST_SPEED_CMS, ROI_COMMANDS
@@ -30,29 +31,50 @@ def items_from_records(
 ) -> tuple[MissionItem, ...]:
     """Return the read-back form of a list; `sent_as`: a record's place (from 0) -> the MAV_CMD that it was sent as."""
     seqs = item_seqs(records)
+    speeds = _shown_speeds(records)
+    after = _speeds_after(records)
     items = [home]
-    speed = 0
     for place, record in enumerate(records):
-        changed = leg_speed(record, speed)
-        if changed != speed:
-            speed = changed
-            items.append(
-                _item(len(items), Command.DO_CHANGE_SPEED, p1=GROUND_SPEED, p2=speed / 100 if speed else AS_SET)
-            )
-        items.append(_shown(len(items), record, sent_as.get(place), seqs))
+        if place in speeds:
+            speed_ms = speeds[place] / 100 if speeds[place] else AS_SET
+            items.append(_item(len(items), Command.DO_CHANGE_SPEED, p1=GROUND_SPEED, p2=speed_ms))
+        target = _jump_target(record, len(records))
+        if record.action != NavAction.JUMP:
+            items.append(_shown(len(items), record, sent_as.get(place)))
+        elif target is None:
+            items.append(_item(len(items), Command.DO_JUMP, p2=record.p2))
+        else:
+            # To the change of speed before the leg, unless the leg is flown at the speed that holds at the jump.
+            is_same = leg_speed(records[target], after[place]) == after[place]
+            items.append(_item(len(items), Command.DO_JUMP, p1=seqs[target] - (not is_same), p2=record.p2))
     return tuple(items)
 
 
-def item_seqs(records: Iterable[NavRecord]) -> list[int]:
-    """Return the item's number for each record, in their order."""
-    seqs: list[int] = []
-    speed = seq = 0
-    for record in records:
-        changed = leg_speed(record, speed)
-        seq += 1 if changed == speed else 2
-        speed = changed
-        seqs.append(seq)
-    return seqs
+def item_seqs(records: Sequence[NavRecord]) -> list[int]:
+    """The item's number for each record, in their order."""
+    speeds = _shown_speeds(records)
+    return list(accumulate(2 if place in speeds else 1 for place in range(len(records))))
+
+
+def _shown_speeds(records: Sequence[NavRecord]) -> dict[int, int]:
+    """The speed in a DO_CHANGE_SPEED before a record, by its place: where it changes on any way that leads there."""
+    after = _speeds_after(records)
+    shown = {place: speed for place, speed in enumerate(after) if speed != (after[place - 1] if place else 0)}
+    for place, record in enumerate(records):
+        target = _jump_target(record, len(records))
+        if target is not None and (speed := leg_speed(records[target], after[place])) != after[place]:
+            shown[target] = speed
+    return shown
+
+
+def _speeds_after(records: Iterable[NavRecord]) -> list[int]:
+    speed = 0
+    return [speed := leg_speed(record, speed) for record in records]
+
+
+def _jump_target(record: NavRecord, count: int) -> int | None:
+    """The place that a JUMP goes to; None if it is no JUMP, or goes nowhere."""
+    return record.p1 - 1 if record.action == NavAction.JUMP and 1 <= record.p1 <= count else None
 
 
 def leg_speed(record: NavRecord, before: int) -> int:
@@ -67,7 +89,7 @@ def leg_speed(record: NavRecord, before: int) -> int:
     return speed if speed >= LEAST_SPEED_CMS else 0
 
 
-def _shown(seq: int, record: NavRecord, sent_as: int | None, seqs: Sequence[int]) -> MissionItem:
+def _shown(seq: int, record: NavRecord, sent_as: int | None) -> MissionItem:
     match record.action:
         case NavAction.WAYPOINT:
             return _leg(seq, Command.NAV_WAYPOINT, record)
@@ -82,9 +104,6 @@ def _shown(seq: int, record: NavRecord, sent_as: int | None, seqs: Sequence[int]
             return _item(seq, Command.NAV_RETURN_TO_LAUNCH, p1=int(record.p1 > 0), alt_m=record.alt_cm / 100)
         case NavAction.SET_POI:
             return _leg(seq, sent_as if sent_as in ROI_COMMANDS else Command.NAV_ROI, record)
-        case NavAction.JUMP:
-            target = seqs[record.p1 - 1] if 1 <= record.p1 <= len(seqs) else 0
-            return _item(seq, Command.DO_JUMP, p1=target, p2=record.p2)
         case NavAction.SET_HEAD if 0 <= record.p1 <= _HIGHEST_HEADING:
             return _item(seq, Command.CONDITION_YAW, p1=record.p1)
         case NavAction.SET_HEAD:

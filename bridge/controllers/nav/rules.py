@@ -16,6 +16,9 @@ INAV_CAPACITY = 120
 MULTIWII_CAPACITY = 178
 #: Speeds below this are none to INAV, cm/s.
 LEAST_SPEED_CMS = 50
+#: Metres above home that a height of 0 becomes.
+LEAST_HEIGHT_M = 2
+HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
 ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
 
 
@@ -25,8 +28,10 @@ class NavProfile:
 
     capacity: records that fit; home is none of them. endless_hold: action and p1 of a hold without end. sea_level:
     whether a height may count from mean sea level. leg_speed: whether a leg may have a speed of its own. rth_height:
-    whether the way home may have a height. jumps_back_only: whether a JUMP must go back; else it may go to any leg that
-    is not next to it.
+    whether the way home may have a height. jumps_back_only: whether a JUMP must go back, and its loop hold no other;
+    else it may go to any leg that is not next to it. longest_hold: seconds. ends_on_any_record: whether it notices the
+    end of a list on a SET_POI or SET_HEAD. own_rth_landing: whether an RTH's own p1 decides if it lands; else the last
+    record's p1 does.
     """
 
     name: str
@@ -36,6 +41,9 @@ class NavProfile:
     leg_speed: bool
     rth_height: bool
     jumps_back_only: bool
+    longest_hold: Range
+    ends_on_any_record: bool
+    own_rth_landing: bool
 
     @property
     def max_items(self) -> int:
@@ -53,6 +61,9 @@ def inav_profile(capacity: int = INAV_CAPACITY) -> NavProfile:
         leg_speed=True,
         rth_height=False,
         jumps_back_only=False,
+        longest_hold=HOLD,
+        ends_on_any_record=True,
+        own_rth_landing=False,
     )
 
 
@@ -66,6 +77,10 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         leg_speed=False,
         rth_height=True,
         jumps_back_only=True,
+        # It counts 1000 * seconds in 16 bits.
+        longest_hold=Range(0, 65, "it holds at most 65 s"),
+        ends_on_any_record=False,
+        own_rth_landing=True,
     )
 
 
@@ -77,11 +92,11 @@ class Height(Enum):
     RTH = auto()
     #: Where the landing begins; 0, as planners have it, is the height of the leg before.
     APPROACH = auto()
+    #: Stored, and flown by nothing.
+    POINT = auto()
 
 
-HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
 LANDS = Range(0, 1, "1 = land at home")
-HEADING = Range(0, 359, "degrees 0..359")
 REPEATS = Range(-1, 32767, "repeats -1..32767")
 
 
@@ -95,7 +110,7 @@ class NavRule:
     height: Height
 
 
-_ROI = NavRule("ROI", UNUSED, True, Height.FLOWN)
+_ROI = NavRule("ROI", UNUSED, True, Height.POINT)
 #: Commands that become a record of their own with nothing but these fields. `check` in this package has the others:
 #: CONDITION_YAW, DO_SET_ROI_NONE, DO_JUMP, DO_CHANGE_SPEED.
 NAV_RULES: Mapping[int, NavRule] = {
