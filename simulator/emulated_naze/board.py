@@ -108,6 +108,10 @@ class EmulatedNaze:
         """Bytes of the chip's RAM, as a debugger would see them."""
         return self._chip.cpu.load(address, size)
 
+    def poke(self, address: int, data: bytes) -> None:
+        """Overwrite bytes of the chip's RAM, as a debugger would."""
+        self._chip.cpu.store(address, data)
+
     def truth(self, _: float) -> Craft | None:
         """None: the board lies on a bench."""
         return None

@@ -18,33 +18,32 @@ from protocols.msp.mission import (
     encode_read,
 )
 from protocols.wp_record import WpRecord
+from simulator.far_end import FarEnd
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions
 
 BOOT_SECONDS = 2.0
 
 
-class Bench:
-    """The board has just booted at time 0. `heard` keeps all bytes that came from it."""
+class WireBench:
+    """A client at the UART of a board that is supplied and booted. `heard` keeps all bytes that came from it."""
 
-    def __init__(self, options: SimOptions | None = None, faults: Faults | None = None) -> None:
-        self.naze = SimulatedNaze(options, faults)
-        self.naze.power_on(-BOOT_SECONDS)
-        self.naze.advance(0.0)
-        self.now = 0.0
+    def __init__(self, board: FarEnd, now: float = 0.0) -> None:
+        self._board = board
+        self.now = now
         self.heard = bytearray()
         self._parser = MspParser()
         self._frames: list[MspFrame] = []
 
     def send(self, data: bytes) -> None:
-        self.naze.receive(data, self.now)
+        self._board.receive(data, self.now)
 
     def run(self, seconds: float) -> bytes:
         """Let time pass as a link would; return what was heard meanwhile."""
         end = self.now + seconds
         before = len(self.heard)
         while self.now < end:
-            self.now = min(max(self.naze.next_wakeup(self.now), self.now + 1e-6), end)
+            self.now = min(max(self._board.next_wakeup(self.now), self.now + 1e-6), end)
             self._collect()
         return bytes(self.heard[before:])
 
@@ -57,7 +56,7 @@ class Bench:
     def next_frame(self, timeout: float = 1.0) -> MspFrame | None:
         end = self.now + timeout
         while not self._frames and self.now < end:
-            self.now = min(max(self.naze.next_wakeup(self.now), self.now + 1e-6), end)
+            self.now = min(max(self._board.next_wakeup(self.now), self.now + 1e-6), end)
             self._collect()
         return self._frames.pop(0) if self._frames else None
 
@@ -100,9 +99,19 @@ class Bench:
             records += answer.records
 
     def _collect(self) -> None:
-        data = self.naze.advance(self.now)
+        data = self._board.advance(self.now)
         self.heard += data
         self._frames += self._parser.feed(data)
+
+
+class Bench(WireBench):
+    """A simulated Naze that has just booted at time 0."""
+
+    def __init__(self, options: SimOptions | None = None, faults: Faults | None = None) -> None:
+        self.naze = SimulatedNaze(options, faults)
+        self.naze.power_on(-BOOT_SECONDS)
+        self.naze.advance(0.0)
+        super().__init__(self.naze)
 
 
 def mission(count: int, seed: int = 0) -> list[WpRecord]:

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A client at the UART of an emulated board with a real image, and a clock that only the test moves."""
+
+from naze_bench import WireBench
+
+from protocols.msp.frame import request
+from simulator.emulated_naze.board import EmulatedNaze, EmulatedPower
+from simulator.emulated_naze.image import Image
+from simulator.msp_port import HarakiriCommand
+
+IDENT = request(HarakiriCommand.IDENT)
+#: Reception begins before this, and what comes then waits for the end of the boot.
+_DEAF_S = 0.6
+_LONGEST_BOOT_S = 12.0
+_CALIBRATION_S = 15.0
+_WRITE_PENDING = "ScheduleEEPROMwriteMS"
+
+
+class RealBench(WireBench):
+    """The board has booted and answers."""
+
+    def __init__(self, image: Image, flash: bytes | None = None, seed: int = 0) -> None:
+        self.image = image
+        self.flash = memoryview(bytearray(flash or b"\xff" * 0x2_0000))
+        self.naze = EmulatedNaze(image, flash=self.flash, seed=seed)
+        super().__init__(self.naze)
+        self.naze.power_on(0.0)
+        self.wait_for_boot()
+
+    def wait_for_boot(self) -> float:
+        """The seconds until the first answer."""
+        begun = self.now
+        self.run(_DEAF_S)
+        assert self.ask(IDENT, _LONGEST_BOOT_S) is not None, "the board does not boot"
+        return self.now - begun
+
+    def power_cycle(self) -> float:
+        """Switch off and on; the seconds until the first answer."""
+        self.naze.power_off(self.now)
+        self.naze.power_on(self.now)
+        return self.wait_for_boot()
+
+    @property
+    def is_off(self) -> bool:
+        return self.naze.power is EmulatedPower.OFF
+
+    def arm(self, armed: bool = True) -> None:
+        """Let the pilot do it, with the sticks."""
+        self.naze.faults.armed = armed
+        for _ in range(50):
+            self.run(0.1)
+            if self.naze.armed is armed:
+                return
+        raise AssertionError("the firmware refuses it")
+
+    def set_byte(self, symbol: str, value: int) -> None:
+        """Overwrite a byte of RAM."""
+        self.naze.poke(self.image.symbols[symbol], bytes((value,)))
+
+    def hold_write(self, pending: bool) -> None:
+        """Let a write of the configuration be scheduled for a time that does not come, or for none."""
+        at_ms = int(self.now * 1000) + 10_000_000 if pending else 0
+        self.naze.poke(self.image.symbols[_WRITE_PENDING], at_ms.to_bytes(4, "little"))
+
+
+def calibrated_flash(image: Image) -> bytes:
+    """Let a blank board calibrate its accelerometer, without which it does not arm."""
+    bench = RealBench(image)
+    bench.ask(request(HarakiriCommand.ACC_CALIBRATION))
+    bench.run(_CALIBRATION_S)
+    bench.wait_for_boot()
+    bench.naze.power_off(bench.now)
+    return bytes(bench.flash)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/msp-mission.md, held against the image: the conformance tests, on the emulated board's UART."""
+
+import pytest
+from c_core import PowerCut
+from real_bench import RealBench
+from test_mission_extension import (  # noqa: F401  (collected here)
+    OLD,
+    OLDER,
+    Companion,
+    test_a_chunk_past_the_announced_count_is_refused,
+    test_a_chunk_too_early_is_out_of_sequence,
+    test_a_full_list_is_pushed_read_back_and_survives_a_reset,
+    test_a_power_cut_leaves_the_old_list,
+    test_a_scheduled_write_makes_it_busy,
+    test_a_stored_list_is_not_written_again,
+    test_an_unknown_record_command_drops_the_transfer,
+    test_another_begin_replaces_the_transfer,
+    test_arming_drops_the_transfer_and_refuses_changes,
+    test_commit_of_an_incomplete_list,
+    test_commit_of_another_list_than_begun,
+    test_commit_of_other_records_than_announced,
+    test_count_zero_clears,
+    test_failing_flash_leaves_the_old_list,
+    test_info_tells_limits_and_state,
+    test_malformed_requests_change_nothing,
+    test_more_records_than_there_is_room_for,
+    test_other_commands_are_left_to_the_firmware,
+    test_read_past_the_end,
+    test_requests_may_be_repeated,
+    test_without_a_transfer_nothing_is_taken,
+)
+
+from protocols.msp.frame import Direction, request
+from simulator.emulated_naze.image import Image
+
+
+class RealDevice:
+    """The image in the clothes of the conformance tests' devices; see mission_devices.Device."""
+
+    def __init__(self, bench: RealBench) -> None:
+        self._bench = bench
+
+    def request(self, command: int, payload: bytes) -> bytes | None:
+        frame = self._bench.ask(request(command, payload), 2.0)
+        if self._bench.is_off:
+            raise PowerCut
+        assert frame is not None
+        return frame.payload if frame.direction is Direction.REPLY else None
+
+    def advance(self, milliseconds: int) -> None:
+        self._bench.run(milliseconds / 1000)
+
+    def arm(self, armed: bool) -> None:
+        self._bench.hold_write(False)
+        self._bench.arm(armed)
+
+    def set_busy(self, busy: bool) -> None:
+        self._bench.hold_write(busy)
+
+    def power_cycle(self) -> None:
+        self._bench.power_cycle()
+
+    def cut_power_at(self, operation: int) -> None:
+        self._bench.naze.faults.power_cut_at_flash_operation = operation
+
+    def fail_at(self, operation: int) -> None:
+        assert operation in (0, 1)
+        self._bench.naze.faults.flash_failures = operation
+
+    @property
+    def list(self) -> bytes:
+        return b"".join(self._bench.naze.stored_records)
+
+
+@pytest.fixture(scope="session")
+def used_flash(image: Image, flash: bytes) -> bytes:
+    """Both slots in use."""
+    bench = RealBench(image, flash)
+    companion = Companion(RealDevice(bench))
+    companion.push(OLDER)
+    companion.push(OLD)
+    bench.naze.power_off(bench.now)
+    return bytes(bench.flash)
+
+
+@pytest.fixture
+def fc(image: Image, used_flash: bytes) -> Companion:
+    return Companion(RealDevice(RealBench(image, used_flash)))

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the image does with its serial port: booting, arming, the CLI, Harakiri's own MAVLink upload."""
+
+import pytest
+from conftest import Figure
+from naze_bench import mission
+from real_bench import IDENT, RealBench
+
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mission_record import identify
+from protocols.msp.mission import INFO_REQUEST, decode_info
+from simulator.emulated_naze.image import Image
+from simulator.options import TelemetryProtocol
+
+
+def test_it_boots_and_answers(bench: RealBench, figure: Figure) -> None:
+    figure("boot to the first answer", f"{bench.power_cycle():.2f} s")
+    begun = bench.now
+    assert bench.ask(IDENT) is not None
+    figure("IDENT answered after", f"{(bench.now - begun) * 1000:.1f} ms")
+
+
+def test_what_comes_during_the_boot_is_answered_in_one_burst(bench: RealBench, figure: Figure) -> None:
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    for _ in range(12):
+        bench.run(0.5)
+        bench.send(IDENT)
+    heard = bench.run(6.0).count(b"$M>")
+    figure("requests of the boot answered", f"{heard} of 12")
+    assert heard >= 10
+
+
+@pytest.mark.parametrize("protocol", TelemetryProtocol)
+def test_arming_by_stick(image: Image, flash: bytes, figure: Figure, protocol: TelemetryProtocol) -> None:
+    bench = RealBench(image, flash)
+    enter_cli(bench)
+    command(bench, f"set tele_prot={protocol.value}")
+    command(bench, "save")
+    bench.run(1.5)
+    bench.wait_for_boot()
+    bench.arm()
+    bench.run(3.0)
+    expected = {TelemetryProtocol.FRSKY_9600: 9600, TelemetryProtocol.MAVLINK_57600: 57600}.get(protocol, 115200)
+    assert bench.naze.baud == expected
+    before = len(bench.heard)
+    answers = bench.ask(IDENT) is not None
+    heard = bytes(bench.heard[before:]) + bench.run(1.0)
+    mavlink = [frame.msgid for frame in MavlinkSplitter().feed(heard)]
+    figure(f"armed with tele_prot {protocol.value}", f"{bench.naze.baud} baud, {kind(answers, mavlink, heard)}")
+    assert answers is (protocol is TelemetryProtocol.MSP)
+    assert bool(mavlink) is (protocol in (TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600))
+    assert (b"^" in heard) is (protocol is TelemetryProtocol.FRSKY_9600) or mavlink
+    bench.arm(False)
+    bench.run(5.0)
+    assert bench.naze.baud == 115200
+    assert bench.ask(IDENT) is not None
+
+
+def kind(answers: bool, mavlink: list[int], heard: bytes) -> str:
+    if answers:
+        return "MSP"
+    return f"MAVLink, messages {sorted(set(mavlink))}" if mavlink else f"{len(heard)} bytes of FrSky a second"
+
+
+def enter_cli(bench: RealBench) -> bytes:
+    bench.send(b"\r\r\r")
+    return bench.run(0.5)
+
+
+def command(bench: RealBench, line: str) -> str:
+    bench.send(line.encode() + b"\r")
+    return bench.run(1.0).decode("latin-1")
+
+
+def test_the_cli(bench: RealBench, figure: Figure) -> None:
+    bench.push(mission(5))
+    assert b"#" in enter_cli(bench)
+    status = command(bench, "status")
+    assert "5" in status
+    assert bench.ask(IDENT) is None
+    command(bench, "wpflush")
+    command(bench, "save")
+    bench.run(2.0)
+    bench.wait_for_boot()
+    assert bench.pull() == []
+    figure("CLI", "status, wpflush and save work; the only way out is a reset")
+
+
+def test_the_boot_loader_is_reached_by_three_letters_only_while_nothing_is_spoken(bench: RealBench) -> None:
+    bench.send(b"RRR")
+    assert bench.naze.counters.bootloader_entered is False
+    bench.run(6.0)
+    bench.send(b"RRR")
+    bench.run(3.0)
+    assert bench.naze.counters.bootloader_entered or bench.naze.counters.resets
+
+
+def test_a_cut_frame_is_forgotten(bench: RealBench, figure: Figure) -> None:
+    bench.send(b"$M<\xf3\xc0")
+    bench.run(0.1)
+    assert bench.ask(IDENT, 0.2) is not None
+    figure("a cut frame", "is forgotten within 100 ms")
+
+
+def test_info_after_a_push(bench: RealBench) -> None:
+    records = mission(146)
+    bench.push(records)
+    assert bench.pull() == records
+    info = decode_info(bench.payload(INFO_REQUEST))
+    assert info is not None
+    assert info.stored == identify(records)
