@@ -8,6 +8,7 @@
 #   make lint           check style, format and types
 #   make bench          measure speed and memory
 #   make pictures       take the docs' pictures of the status page
+#   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts)
 #   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
@@ -27,7 +28,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench pictures soak deb deb-trial image-check lock message-table config-sample cli-page zenoh-schemas clean
+.PHONY: demo test lint bench pictures real-board soak deb deb-trial image-check lock message-table config-sample cli-page zenoh-schemas clean
 
 # Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -64,6 +65,10 @@ bench: $(VENV)/.test-ready
 # The pictures of the status page in the docs, taken by what tests it.
 pictures: $(VENV)/.test-ready
 	PYTHONPATH=.:tests/e2e:tests/web $(BIN)/python tests/web/take_pictures.py
+
+real-board: $(VENV)/.test-ready
+	@test -n '$(IMAGE)' || { echo 'Say which image: make real-board IMAGE=path/to/X.elf' >&2; exit 1; }
+	NAZE_IMAGE='$(IMAGE)' NAZE_CUTS=$(or $(CUTS),200) $(BIN)/python -m pytest tests/real_board --timeout 0 $(ARGS)
 
 soak: $(VENV)/.test-ready
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The same conversation with the image and with the simulated Naze: every reply must be the same."""
+
+import random
+
+from conftest import Figure
+from naze_bench import Bench, WireBench, mission
+from real_bench import RealBench
+
+from protocols.mission_record import identify
+from protocols.msp.frame import MspFrame, request
+from protocols.msp.mission import (
+    ABORT_REQUEST,
+    INFO_REQUEST,
+    encode_begin,
+    encode_chunk,
+    encode_commit,
+    encode_radius,
+    encode_read,
+)
+from simulator.emulated_naze.image import Image
+from simulator.msp_port import HarakiriCommand as Msp
+
+_EXCHANGES = 100
+#: What is measured or chosen by the pilot: here the lengths must be the same.
+_MEASURED = frozenset(
+    (Msp.STATUS, Msp.RAW_IMU, Msp.RC, Msp.RAW_GPS, Msp.COMP_GPS, Msp.ATTITUDE, Msp.ALTITUDE, Msp.BAT, Msp.DEBUG, Msp.MOTOR)
+)
+#: Answered with settings of this craft, which the model does not have.
+_SETTINGS = frozenset((Msp.RC_TUNING, Msp.PID, Msp.BOX, Msp.SERVO, Msp.MISC))
+_READS = tuple(command for command in Msp if command < Msp.WP and command is not Msp.BOXNAMES)
+
+
+def test_a_hundred_exchanges(image: Image, flash: bytes, figure: Figure) -> None:
+    real, model = RealBench(image, flash), Bench()
+    dice = random.Random(13)
+    different = []
+    lists = [mission(count, seed) for count in (0, 1, 15, 40) for seed in (1, 2)]
+    records = lists[0]
+    for number in range(_EXCHANGES):
+        if not number % 10:
+            records = dice.choice(lists)
+        frame = dice.choice(requests(dice, records))
+        answers = [ask(bench, frame) for bench in (real, model)]
+        if comparable(frame, answers[0]) != comparable(frame, answers[1]):
+            different.append(f"{frame.hex()}: image {answers[0]}, model {answers[1]}")
+    figure("exchanges that differ from the model's", f"{len(different)} of {_EXCHANGES}")
+    assert not different, "\n".join(different)
+
+
+def requests(dice: random.Random, records: list) -> list[bytes]:  # type: ignore[type-arg]
+    """Some of each kind, those of an upload more often than not in an order that works."""
+    identity = identify(records)
+    first = dice.choice((0, 0, 14, 15, 30))
+    return [
+        request(dice.choice(_READS)),
+        request(Msp.WP, bytes((dice.choice((0, 16, 3)),))),
+        request(dice.choice((1, 99, 189, 197, 209, 253))),
+        INFO_REQUEST,
+        encode_begin(identity),
+        encode_chunk(records, first, 15).frame if first < len(records) else INFO_REQUEST,
+        encode_commit(identity),
+        ABORT_REQUEST,
+        encode_read(dice.choice((0, 3, 39)), dice.choice((1, 6))),
+        encode_radius(dice.choice((100, 200, 2001))),
+    ]
+
+
+def ask(bench: WireBench, frame: bytes) -> MspFrame | bytes | None:
+    """The reply; for a malformed one its bytes."""
+    before = len(bench.heard)
+    answer = bench.ask(frame, 1.5)
+    bench.run(0.25)
+    return answer or bytes(bench.heard[before:]) or None
+
+
+def comparable(frame: bytes, answer: MspFrame | bytes | None) -> object:
+    command = frame[4]
+    if isinstance(answer, MspFrame) and command in _MEASURED | _SETTINGS:
+        return answer.direction, answer.command, len(answer.payload)
+    return answer
+
+
