@@ -18,7 +18,7 @@ from simulator.mission_slots import flash_size
 from simulator.missions import BootMissions
 from simulator.msp_options import MspOptions
 from simulator.naze import SimulatedNaze
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.options import Faults, SimOptions, TelemetryProtocol, Tree
 from simulator.other_boards import run_other_board
 from simulator.playback_command import play_capture
 from simulator.run_board import Running, run_board
@@ -80,6 +80,14 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
 @click.option("--lost-bytes", type=_RATE, default=0.0, help="Probability that a byte is lost.")
 @click.option("--flash-stall", type=_PERIOD, default=100.0, show_default=True, help="Time to erase a slot, ms.")
 @click.option("--program-stall", type=_PERIOD, default=0.45, show_default=True, help="Time to program a record, ms.")
+@click.option("--boot", type=_PERIOD, default=SimOptions().boot_ms, show_default=True, help="Time to boot, ms.")
+@click.option(
+    "--tree",
+    type=click.Choice([tree.name.lower() for tree in Tree]),
+    default=SimOptions().tree.name.lower(),
+    show_default=True,
+    help="Which of Harakiri's trees.",
+)
 @click.option("--capacity", type=click.IntRange(2, 1000), help="Records that fit: 146 on a Naze, 178 on a MultiWii.")
 @click.option(
     "--wp-radius-cm", type=click.IntRange(0, 2000), default=200, show_default=True, help="gps_wp_radius, if blank."
@@ -118,6 +126,8 @@ def sim(
     lost_bytes: float,
     flash_stall: float,
     program_stall: float,
+    boot: float,
+    tree: str,
     capacity: int | None,
     wp_radius_cm: int,
     seed: int,
@@ -152,6 +162,8 @@ def sim(
         seed=seed,
         baud=int(baud),
         tele_prot=TelemetryProtocol(tele_prot),
+        boot_ms=boot,
+        tree=Tree[tree.upper()],
         capacity=capacity or 146,
         wp_radius_cm=wp_radius_cm,
         flash_erase_ms=flash_stall,

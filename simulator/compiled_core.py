@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from protocols.msp.mission import Status
 from protocols.wp_record import RECORD_SIZE
 from simulator.flash import FlashError, NorFlash, PowerCutError
 from simulator.mission_slots import flash_size, slot_pages
@@ -73,6 +74,14 @@ class CompiledCore:
         """The stored list's records."""
         records = self._library.nm_records(self._core)
         return ctypes.string_at(records, self._core.stored.count * RECORD_SIZE) if records else b""
+
+    def store(self, records: bytes) -> None:
+        """Make records the stored list; see Missions."""
+        status = self._library.nm_store(self._core, records, len(records) // RECORD_SIZE)
+        if self._board.power_is_cut:
+            raise PowerCutError
+        if status == Status.FLASH:
+            raise FlashError
 
     @property
     def writes(self) -> int:
@@ -185,5 +194,6 @@ _FUNCTIONS = {
     "nm_start": (None, [POINTER(_Core), POINTER(_Board), py_object]),
     "nm_poll": (None, [POINTER(_Core)]),
     "nm_handle": (c_int, [POINTER(_Core), c_uint8, POINTER(c_uint8), c_uint8]),
+    "nm_store": (c_int, [POINTER(_Core), ctypes.c_char_p, c_uint16]),
     "nm_records": (c_void_p, [POINTER(_Core)]),
 }

@@ -10,10 +10,12 @@ from math import ceil
 
 from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkSplitter
+from protocols.msp.mission import MissionCommand
 from protocols.wp_record import RECORD_SIZE
 from simulator import frsky
 from simulator.flash import FlashError, NorFlash
 from simulator.flight import Craft, FlightState, fly
+from simulator.harakiri_cli import BANNER, PROMPT, CliRequest, CommandLine
 from simulator.harakiri_mission_store import Floppy
 from simulator.mavlink_port import MavlinkSchedule, MavlinkSender
 from simulator.mission_slots import StoredConfig
@@ -31,8 +33,10 @@ _CALIBRATIONS: dict[int, str] = {
 }
 _FRSKY_BAUD = 9600
 _MINIMOSD_BAUD = 57600
-_CLI_PROMPT = b"\r\n# "
-_CLI_BANNER = b"\r\nSimulated Naze, command line" + _CLI_PROMPT
+#: systemReset() waits so long.
+_CLI_REBOOT_S = 1.0
+#: FDByteSize.
+_FLOPPY_SIZE = 2340
 # Times are seconds as floats: what is due now is due.
 _EPSILON = 1e-9
 
@@ -74,8 +78,8 @@ class Firmware:
         self._looptime = options.looptime_ms / 1000
         self._flown = 0.0
         self._home: tuple[int, int] | None = None
-        # A calibration freezes all until it restarts the board.
-        self._calibrated_at: float | None = None
+        # A calibration, and leaving the CLI, freeze all until they restart the board.
+        self._resets_at: float | None = None
 
         self._config = StoredConfig(flash, options)
         self._board = Board(options, faults, self._config.load())
@@ -85,8 +89,9 @@ class Firmware:
         self._answers = MspAnswers(lambda: self.craft_at(self._clock))
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
-        # The firmware's own list, which the extension takes the place of.
-        self._floppy = None if self._missions else Floppy(flash, self._board, self._send_message)
+        # Harakiri's own list and MAVLink upload; with the extension, beside it.
+        self._floppy = Floppy(flash, self._board, self._missions, self._send_message)
+        self._cli = CommandLine(self._cli_status)
         self._schedule = MavlinkSchedule(now)
         self._frsky_number, self._frsky_time = 0, now
         self._traps = TrapCounters()
@@ -107,8 +112,8 @@ class Firmware:
 
     def next_loop(self) -> float | None:
         """Tell when the next main loop runs that has anything to do; None if it waits for a byte or the pilot."""
-        if self._calibrated_at is not None:
-            return self._calibrated_at
+        if self._resets_at is not None:
+            return self._resets_at
         wanted = [self._uart.next_arrival()]
         if not self.in_cli:
             if self._pilot_is_obeyed():
@@ -127,13 +132,15 @@ class Firmware:
         if self.armed:
             self._flown += at - self._clock
         self._clock = at
-        if self._calibrated_at is not None:
-            self._write_config()
+        if self._resets_at is not None:
+            if not self.in_cli:
+                self._write_config()
             raise ResetError
         if self.in_cli:
             self._serve_cli()
         else:
             self._follow_pilot()
+            self._floppy.drop_stale(at)
             self._write_config_if_due()
             self._serve_uart()
         self._next_loop = max(at + self._looptime, self._clock)
@@ -175,9 +182,9 @@ class Firmware:
         """Write the whole configuration; the firmware does not look whether it took (writeParams)."""
         self._board.config_write_due = None
         with contextlib.suppress(FlashError):
+            # With the extension first the list, where a power cut costs nothing; without it they are one block.
+            self._floppy.save()
             self._config.save(self._board.wp_radius_cm)
-            if self._floppy:
-                self._floppy.save()
         self._stall()
 
     def _stall(self) -> None:
@@ -194,7 +201,7 @@ class Firmware:
         self._send_telemetry()
         if self._missions and self._clock - self._last_byte > self._options.inter_byte_timeout_ms / 1000:
             self._msp.forget()
-        while self._calibrated_at is None and (byte := self._uart.read(self._clock)) is not None:
+        while self._resets_at is None and (byte := self._uart.read(self._clock)) is not None:
             self._last_byte = self._clock
             match self._traps.count(byte, self.protocol is Protocol.AUTOSENSE, self.armed):
                 case Trap.CLI:
@@ -258,8 +265,7 @@ class Firmware:
             for frame in self._mavlink.feed(bytes((byte,))):
                 if frame.version == 1:
                     self._switch(Protocol.MAVLINK)
-                    if self._floppy:
-                        self._floppy.take(frame, self._clock)
+                    self._floppy.take(frame, self._clock)
                     return True
         if self.protocol is not Protocol.MAVLINK and self._faults.msp and (request := self._msp.push(byte)):
             self._switch(Protocol.MSP)
@@ -270,27 +276,39 @@ class Firmware:
     def _answer(self, command: int, payload: bytes) -> None:
         if self._missions and (answer := self._missions.answer(command, payload, self._clock)) is not None:
             frame = reply(command, answer)
+            self._msp.overwrite(answer)
+            if command == MissionCommand.COMMIT:
+                self._floppy.load()
             self._counters.flash_writes = self._missions.writes
         else:
             if command == HarakiriCommand.EEPROM_WRITE:
                 self._write_config()
             elif command in _CALIBRATIONS:
                 seconds = getattr(self._options, _CALIBRATIONS[command]) / 1000
-                self._calibrated_at = self._clock + seconds
-            frame = self._answers.answer(command, payload)
+                self._resets_at = self._clock + seconds
+            frame = self._answers.answer(command, payload or self._msp.leftover)
         self._stall()
         self._uart.write(frame, self._clock)
 
-    # -- the CLI, from which no way leads back but a reset ---------------------------------------------------
+    # -- the CLI, from which only a reset leads back ---------------------------------------------------------
 
     def _enter_cli(self) -> None:
         self.in_cli = True
         self._counters.cli_entered = True
-        self._uart.write(_CLI_BANNER, self._clock)
+        self._uart.write(BANNER, self._clock)
 
     def _serve_cli(self) -> None:
         while (byte := self._uart.read(self._clock)) is not None:
-            if byte == ord("\r"):
-                self._uart.write(_CLI_PROMPT, self._clock)
-            elif ord(" ") <= byte <= ord("~"):
-                self._uart.write(bytes((byte,)), self._clock)
+            printed, asked = self._cli.type(byte)
+            if asked is CliRequest.FLUSH:
+                self._floppy.clear()
+                printed = printed.removesuffix(PROMPT) + self._cli_status().encode() + PROMPT
+            elif asked is CliRequest.SAVE:
+                self._write_config()
+            self._uart.write(printed, self._clock)
+            if asked in (CliRequest.SAVE, CliRequest.REBOOT):
+                self._resets_at = self._clock + _CLI_REBOOT_S
+                return
+
+    def _cli_status(self) -> str:
+        return f"Floppy: {_FLOPPY_SIZE} B, {self._floppy.count} Datasets of {self._options.capacity} possible\r\n\r\n"

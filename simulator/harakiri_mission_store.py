@@ -12,11 +12,11 @@ from protocols.mavlink.codec import MavlinkDecoder, Packed, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mission_record import identify
+from protocols.mission_record import pack_records
 from protocols.wp_record import WpCommand, WpRecord, unpack_records
 from simulator.flash import NorFlash
 from simulator.mission_slots import MissionSlots
-from simulator.missions import Board
+from simulator.missions import Board, Missions
 
 _TIMEOUT_S = 0.5
 _WRITE_DELAY_S = 1.0
@@ -38,15 +38,22 @@ _NOT_ALONE = (WpCommand.SETROI, WpCommand.RETURN_TO_LAUNCH, WpCommand.LAND, WpCo
 
 
 class Floppy:
-    """One boot's store. `send` packs and sends a message to a partner."""
+    """One boot's store. `send` packs and sends a message to a partner.
 
-    def __init__(self, flash: NorFlash, board: Board, send: Callable[[Packed], None]) -> None:
+    With the extension, `missions`, that keeps the list, and an upload that breaks off leaves the old one. Without it,
+    the list is written with the configuration, complete or not.
+    """
+
+    def __init__(
+        self, flash: NorFlash, board: Board, missions: Missions | None, send: Callable[[Packed], None]
+    ) -> None:
         self._board = board
+        self._missions = missions
         self._slots = MissionSlots(flash, board.options)
         self._send = send
         self._decoder = MavlinkDecoder()
         self._partner = (0, 0)
-        self._list = list(unpack_records(self.stored))
+        self.load()
         self._receiving = self._sending = self._knows_roi = False
         self._total = self._expected = 0
         self._touched = 0.0
@@ -54,14 +61,33 @@ class Floppy:
     @property
     def stored(self) -> bytes:
         """The records in flash."""
-        return self._slots.read(0, self._slots.stored.count)
+        return self._missions.stored if self._missions else self._slots.read(0, self._slots.stored.count)
+
+    @property
+    def count(self) -> int:
+        """How many records the list in RAM has."""
+        return len(self._list)
+
+    def load(self) -> None:
+        """Take the list from flash."""
+        self._list = list(unpack_records(self.stored))
+
+    def clear(self) -> None:
+        """Empty the list in RAM."""
+        self._list.clear()
 
     def save(self) -> None:
         """Write the list in RAM to flash. FlashError, PowerCutError."""
-        self._slots.prepare()
-        for index, record in enumerate(self._list):
-            self._slots.stage(index, record.pack())
-        self._slots.commit(identify(self._list))
+        if self._missions and self._receiving:
+            self._reset()
+            self.load()
+        (self._missions or self._slots).store(pack_records(self._list))
+
+    def drop_stale(self, now: float) -> None:
+        """With the extension, an upload that breaks off leaves the list that was there."""
+        if self._missions and self._receiving and now - self._touched > _TIMEOUT_S:
+            self._reset()
+            self.load()
 
     def take(self, frame: MavlinkFrame, now: float) -> None:
         """Act on a MAVLink frame."""
@@ -69,6 +95,7 @@ class Floppy:
         if message is None:
             return
         self._partner = (frame.sysid, frame.compid)
+        self.drop_stale(now)
         if (self._receiving or self._sending) and now - self._touched > _TIMEOUT_S:
             self._reset()
         match frame.msgid:
@@ -98,7 +125,9 @@ class Floppy:
     def _ack(self, result: int) -> None:
         if self._board.config_write_due is not None and result != m.MAV_MISSION_ACCEPTED:
             self._board.config_write_due = None
-            self._list = list(unpack_records(self.stored))
+            self.load()
+        elif self._missions and result != m.MAV_MISSION_ACCEPTED:
+            self.load()
         self._send(pack(m.MAVLink_mission_ack_message(*self._partner, result)))
         self._reset()
 

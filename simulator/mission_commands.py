@@ -87,6 +87,12 @@ class MissionCommands:
         """The stored list's records."""
         return self._slots.read(0, self._slots.stored.count)
 
+    def store(self, records: bytes) -> None:
+        """Make records the stored list; see Missions."""
+        if not self._board.armed:
+            self._transfer = None
+            self._slots.store(records)
+
     @property
     def writes(self) -> int:
         """How many lists were ever made valid in this flash."""

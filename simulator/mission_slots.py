@@ -99,6 +99,15 @@ class MissionSlots:
         self.stored = identity
         self.writes += 1
 
+    def store(self, records: bytes) -> None:
+        """Make a whole list the stored one, unless it is that already. FlashError, PowerCutError."""
+        identity = ListIdentity(len(records) // RECORD_SIZE, zlib.crc32(records))
+        if identity != self.stored:
+            self.prepare()
+            for index in range(identity.count):
+                self.stage(index, records[index * RECORD_SIZE :][:RECORD_SIZE])
+            self.commit(identity)
+
     @property
     def _unused(self) -> int:
         return 1 - self._active

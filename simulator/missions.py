@@ -43,6 +43,9 @@ class Missions(Protocol):
     def stored(self) -> bytes:
         """The stored list's records."""
 
+    def store(self, records: bytes) -> None:
+        """Make records the stored list that the firmware got some other way (nm_store). FlashError, PowerCutError."""
+
     @property
     def writes(self) -> int:
         """How many lists were ever made valid in this flash."""

@@ -21,6 +21,8 @@ _BOXES = (
     "ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO", "PASSTHRU",
     "HEADFREE", "BEEPER", "HEADADJ", "OSD SW", "GTUNE",
 )  # fmt: skip
+#: Of roll and pitch, whose P the firmware divides by.
+_CLAMPED_PIDS = (0, 3)
 _PIDS = ("ROLL", "PITCH", "YAW", "ALT", "Pos", "PosR", "NavR", "LEVEL", "MAG", "VEL")
 _RSSI = 230
 _HOME, _HOLD = 0, 16
@@ -100,6 +102,15 @@ class MspReceiver:
         """Tell whether a frame has begun."""
         return self._state != 0
 
+    @property
+    def leftover(self) -> bytes:
+        """What the buffer holds of earlier frames: the firmware reads it where a payload is missing."""
+        return bytes(self._buffer)
+
+    def overwrite(self, data: bytes) -> None:
+        """The extension puts its replies into the same buffer."""
+        self._buffer[: len(data)] = data
+
     def forget(self) -> None:
         """Drop a frame that has begun (the patched firmware's inter-byte time-out)."""
         self._state = 0
@@ -140,12 +151,14 @@ class MspAnswers:
         }
 
     def answer(self, command: int, payload: bytes) -> bytes:
-        """Return the whole reply frame."""
+        """Return the whole reply frame. WP without a payload is up to the caller."""
         if command == HarakiriCommand.WP:
             return self._waypoint(payload)
         if command in _SETTERS:
             setting = _SETTERS[HarakiriCommand(command)]
             if len(payload) == len(self._settings[setting]):
+                if command == HarakiriCommand.SET_PID:
+                    payload = bytes(max(byte, 1) if at in _CLAMPED_PIDS else byte for at, byte in enumerate(payload))
                 self._settings[setting] = payload
             return reply(command)
         if command in _ACKNOWLEDGED:
@@ -204,7 +217,7 @@ class MspAnswers:
 
     def _waypoint(self, payload: bytes) -> bytes:
         craft = self._craft()
-        match payload[0] if payload else _HOME:
+        match payload[0]:
             case 0:
                 number, (lat, lon) = _HOME, craft.home or (0, 0)
             case 16:

@@ -52,7 +52,7 @@ class SimulatedNaze:
             memory = memoryview(bytearray((ERASED,)) * flash_size(self.options))
         self._flash = NorFlash(memory, self.faults)
         self._boot_missions = boot_missions
-        self._uart = Uart(self.options.baud, self.counters)
+        self._uart = Uart(self.options.baud, self.counters, self.options.tree.value)
         self._random = random.Random(self.options.seed)
         self._hazards = HazardWatch()
         # No firmware while the board boots, and no such time while it has no power.
@@ -152,7 +152,9 @@ class SimulatedNaze:
             if self._firmware:
                 self._run_loop(self._firmware, at)
             else:
-                self._uart.discard_arrived(at)
+                heard_ms = min(self.options.reception_ms, self.options.boot_ms)
+                self._uart.discard_arrived(at + (heard_ms - self.options.boot_ms) / 1000)
+                self._uart.keep_arrived(at)
                 self._firmware = Firmware(
                     self.options, self.faults, self.counters, self._uart, self._flash, self._boot_missions, at
                 )

@@ -2,7 +2,7 @@
 """What a simulated Naze can be made to be, and what it has counted."""
 
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
 
 
 class TelemetryProtocol(IntEnum):
@@ -14,14 +14,24 @@ class TelemetryProtocol(IntEnum):
     MAVLINK_57600 = 3
 
 
+class Tree(Enum):
+    """Harakiri's published trees, by the size of their serial rings in bytes."""
+
+    TESTCODE3 = 264
+    WEBSTORE1 = 256
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimOptions:
-    """A board and its firmware; the defaults are Harakiri's own."""
+    """A board and its firmware; the defaults are Harakiri's own, times as measured on the emulated board."""
 
     seed: int = 0
     baud: int = 115200
     looptime_ms: float = 3.0
-    boot_ms: float = 2000.0
+    tree: Tree = Tree.TESTCODE3
+    boot_ms: float = 7100.0
+    #: What comes before this is lost; what comes later waits in the ring for the end of the boot.
+    reception_ms: float = 470.0
     tele_prot: TelemetryProtocol = TelemetryProtocol.MSP
 
     # The mission extension (docs/msp-mission.md).
@@ -36,8 +46,9 @@ class SimOptions:
     # What the CPU does nothing else for.
     flash_erase_ms: float = 100.0
     record_program_ms: float = 0.45
-    config_write_ms: float = 150.0
-    config_write_delay_ms: float = 1000.0
+    config_write_ms: float = 180.0
+    #: From setting the radius to the write: it is done in the next main loop.
+    config_write_delay_ms: float = 0.0
     # Gyro, then 3100 samples at 500 Hz; 525 averages of five at 42 Hz (sensors.c).
     acc_calibration_ms: float = 9400.0
     mag_calibration_ms: float = 61000.0
@@ -75,7 +86,7 @@ class Counters:
     """What happened to the board since it was made.
 
     hazard_runs: three equal hazard bytes in a row on the RX pin, acted on or not.
-    rx_overflows, tx_overflows: how often a ring was lapped.
+    rx_overflows, tx_overflows: how often a ring was lapped while the firmware ran.
     max_outstanding_reply_bytes: of the 255 that the TX ring holds.
     cli_entered, bootloader_entered, crashes: ways into a state that only a reset ends.
     flash_writes: mission lists that were ever made valid in this flash, as of the last mission command.

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""USART1 of the board: two wires at the baud rate, and a 256-byte ring behind each (drv_uart.c)."""
+"""USART1 of the board: two wires at the baud rate, and a ring behind each (drv_uart.c)."""
 
 from collections import deque
 
 from simulator.options import Counters
 
-RING_SIZE = 256
 _BITS_PER_BYTE = 10
 # Times are seconds as floats: a byte that ends exactly now has ended.
 _EPSILON_BYTES = 1e-3
@@ -16,16 +15,17 @@ GATHER_SECONDS = 0.004
 class Uart:
     """Bytes on their way in (`receive` to `read`) and out (`write` to `transmitted`)."""
 
-    def __init__(self, baud: int, counters: Counters) -> None:
+    def __init__(self, baud: int, counters: Counters, ring_size: int = 256) -> None:
         self.baud = baud
         self._counters = counters
+        self._size = ring_size
         self._byte_time = _BITS_PER_BYTE / baud
         # Incoming: what is still on the wire, as (time the first start bit begins, bytes).
         self._wire: deque[tuple[float, bytes]] = deque()
         self._wire_free_at = 0.0
         self._unread = bytearray()
         # Outgoing: the ring, the DMA's running transfer of it, and where each written burst ends.
-        self._ring = bytearray(RING_SIZE)
+        self._ring = bytearray(ring_size)
         self._head = 0
         self._tail = 0
         self._dma_left = 0
@@ -79,6 +79,11 @@ class Uart:
         self._leave_wire(now)
         self._unread.clear()
 
+    def keep_arrived(self, now: float) -> None:
+        """Keep what arrived until `now`, while nobody read it: a lapped ring is no client's fault then."""
+        self._leave_wire(now)
+        self._drop_lapped()
+
     def read(self, now: float) -> int | None:
         """Return the next unread byte; None when there is none."""
         self._arrive(now)
@@ -86,10 +91,14 @@ class Uart:
 
     def _arrive(self, now: float) -> None:
         self._leave_wire(now)
-        if len(self._unread) >= RING_SIZE:
+        if len(self._unread) >= self._size:
             # The DMA has lapped the reader, who sees only the distance between the two positions.
             self._counters.rx_overflows += 1
-            del self._unread[: len(self._unread) - len(self._unread) % RING_SIZE]
+            self._drop_lapped()
+
+    def _drop_lapped(self) -> None:
+        if len(self._unread) >= self._size:
+            del self._unread[: len(self._unread) - len(self._unread) % self._size]
 
     def _leave_wire(self, now: float) -> None:
         while self._wire:
@@ -111,11 +120,11 @@ class Uart:
         outstanding = self._outstanding() + len(data)
         counters = self._counters
         counters.max_outstanding_reply_bytes = max(counters.max_outstanding_reply_bytes, outstanding)
-        if outstanding >= RING_SIZE:
+        if outstanding >= self._size:
             counters.tx_overflows += 1
         for byte in data:
             self._ring[self._head] = byte
-            self._head = (self._head + 1) % RING_SIZE
+            self._head = (self._head + 1) % self._size
             if not self._dma_left:
                 self._dma_time = now
                 self._start_dma()
@@ -138,7 +147,7 @@ class Uart:
         return max(end for end in self._burst_ends if end <= latest)
 
     def _outstanding(self) -> int:
-        return self._dma_left + (self._head - self._tail) % RING_SIZE
+        return self._dma_left + (self._head - self._tail) % self._size
 
     def _start_dma(self) -> None:
         """Send up to the head, or to the ring's end first (uartTxDMA)."""
@@ -147,7 +156,7 @@ class Uart:
             self._dma_left = self._head - self._tail
             self._tail = self._head
         else:
-            self._dma_left = RING_SIZE - self._tail
+            self._dma_left = self._size - self._tail
             self._tail = 0
 
     def _transmit(self, now: float) -> None:

@@ -256,17 +256,17 @@ def test_one_is_read_by_index_or_by_name(
 
 def test_the_radius_is_set_on_the_flight_controller() -> None:
     world, station = radius_world()
+    operations = world.naze.flash_operations
     station.send(param_set(b"WPNAV_RADIUS", 350.0))
     world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 1)
     assert values(station.said()) == [("WPNAV_RADIUS", 350.0, 1, 2)]
     assert station.texts() == []
-    operations = world.naze.flash_operations
     world.run(2)
-    # It is the firmware that writes it, a second later.
+    # It is the firmware that writes it, in its next loop.
     assert world.naze.flash_operations > operations
     world.power_off()
     world.power_on()
-    world.run(6)
+    world.run(world.naze.options.boot_ms / 1000 + 3)
     assert values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1] == 350.0
 
 
@@ -292,7 +292,9 @@ def test_a_value_out_of_range_changes_nothing_and_says_so(value: float) -> None:
 @pytest.mark.parametrize("value", [0.0, 1.0, 13.0, 35.0, 82.0, 209.99998, 2000.0])
 def test_every_radius_in_range_is_set(value: float) -> None:
     world, station = radius_world()
-    assert values(answers((world, station), param_set(b"WPNAV_RADIUS", value)))[0][1] == round(value)
+    station.send(param_set(b"WPNAV_RADIUS", value))
+    world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 1)
+    assert values(station.said())[0][1] == round(value)
     world.assert_line_was_clean()
 
 

@@ -105,7 +105,7 @@ def test_the_heartbeat_tells_whether_a_flight_controller_is_there_and_armed() ->
     assert station.said("HEARTBEAT")[-1].system_status == m.MAV_STATE_UNINIT
     assert station.said("ATTITUDE", "GPS_RAW_INT") == []
     world.power_on()
-    world.run(6)
+    world.run(world.naze.options.boot_ms / 1000 + 3)
     assert station.said("HEARTBEAT")[-1].system_status == m.MAV_STATE_STANDBY
     world.faults.armed = True
     world.run(2)

@@ -824,7 +824,7 @@ def test_the_flight_controller_is_lost_in_the_middle(lose: Callable[[World], Non
     assert state(world) is None
     assert world.stored == OLD_RECORDS
     world.plug() if lose is World.unplug else world.power_on()
-    world.run(5)
+    world.run(world.naze.options.boot_ms / 1000 + 3)
     assert Upload(station, waypoints(30)).run() is A.ACCEPTED
 
 

@@ -101,6 +101,8 @@ class Board(Program):
         self.fc = f"tcp:{address}" if tcp else str(self.link)
         self._control = directory / "naze.sock"
         place = ("--tcp", address) if tcp else ("--link", str(self.link))
+        # A boot takes 7 s, for which no test here needs to wait.
+        place = (*place, "--boot", "2000")
         super().__init__(directory / "board.log", "sim", *place, "--control", str(self._control), *options)
 
     def wait(self) -> None:

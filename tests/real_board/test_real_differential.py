@@ -18,14 +18,14 @@ from protocols.msp.mission import (
     encode_radius,
     encode_read,
 )
+from protocols.wp_record import WpRecord
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand as Msp
 
 _EXCHANGES = 100
 #: What is measured or chosen by the pilot: here the lengths must be the same.
-_MEASURED = frozenset(
-    (Msp.STATUS, Msp.RAW_IMU, Msp.RC, Msp.RAW_GPS, Msp.COMP_GPS, Msp.ATTITUDE, Msp.ALTITUDE, Msp.BAT, Msp.DEBUG, Msp.MOTOR)
-)
+_MEASURED = {Msp.STATUS, Msp.RAW_IMU, Msp.RC, Msp.RAW_GPS, Msp.COMP_GPS, Msp.ATTITUDE, Msp.ALTITUDE, Msp.BAT}
+_MEASURED |= {Msp.DEBUG, Msp.MOTOR, Msp.WP}
 #: Answered with settings of this craft, which the model does not have.
 _SETTINGS = frozenset((Msp.RC_TUNING, Msp.PID, Msp.BOX, Msp.SERVO, Msp.MISC))
 _READS = tuple(command for command in Msp if command < Msp.WP and command is not Msp.BOXNAMES)
@@ -43,12 +43,12 @@ def test_a_hundred_exchanges(image: Image, flash: bytes, figure: Figure) -> None
         frame = dice.choice(requests(dice, records))
         answers = [ask(bench, frame) for bench in (real, model)]
         if comparable(frame, answers[0]) != comparable(frame, answers[1]):
-            different.append(f"{frame.hex()}: image {answers[0]}, model {answers[1]}")
+            different.append(f"{frame.hex()}: image {answers[0]!r}, model {answers[1]!r}")
     figure("exchanges that differ from the model's", f"{len(different)} of {_EXCHANGES}")
     assert not different, "\n".join(different)
 
 
-def requests(dice: random.Random, records: list) -> list[bytes]:  # type: ignore[type-arg]
+def requests(dice: random.Random, records: list[WpRecord]) -> list[bytes]:
     """Some of each kind, those of an upload more often than not in an order that works."""
     identity = identify(records)
     first = dice.choice((0, 0, 14, 15, 30))
@@ -79,5 +79,3 @@ def comparable(frame: bytes, answer: MspFrame | bytes | None) -> object:
     if isinstance(answer, MspFrame) and command in _MEASURED | _SETTINGS:
         return answer.direction, answer.command, len(answer.payload)
     return answer
-
-

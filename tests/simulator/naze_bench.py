@@ -22,7 +22,7 @@ from simulator.far_end import FarEnd
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions
 
-BOOT_SECONDS = 2.0
+BOOT_SECONDS = SimOptions().boot_ms / 1000
 
 
 class WireBench:

@@ -152,7 +152,7 @@ def test_frsky_is_sent_at_9600_eight_times_a_second() -> None:
 
 
 def test_arming_is_refused_while_a_configuration_write_is_scheduled() -> None:
-    bench = Bench()
+    bench = Bench(SimOptions(config_write_delay_ms=1000))
     assert bench.ask(encode_radius(300)) is not None
     bench.naze.faults.armed = True
     bench.run(0.5)

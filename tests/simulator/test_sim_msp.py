@@ -191,15 +191,41 @@ def test_without_power_nothing_is_heard_or_answered() -> None:
     assert bench.naze.power is Power.OFF
 
 
-def test_what_comes_while_it_boots_is_not_heard() -> None:
+def test_what_comes_while_it_boots_is_answered_in_one_burst_but_for_the_first_half_second() -> None:
     bench = Bench()
     bench.naze.power_off(bench.now)
     bench.naze.power_on(bench.now)
-    bench.send(IDENT * 60)
-    bench.run(2.5)
+    for _ in range(14):
+        bench.send(IDENT)
+        bench.run(0.5)
     assert bench.heard.count(b"$M>") == 0
-    assert bench.naze.counters.rx_overflows == 0
+    bench.run(0.15)
+    assert bench.heard.count(b"$M>") == 13
+
+
+def test_more_than_the_ring_holds_is_lost_while_it_boots() -> None:
+    bench = Bench()
+    bench.naze.power_off(bench.now)
+    bench.naze.power_on(bench.now)
+    bench.run(1.0)
+    bench.send(IDENT * 44)
+    bench.run(BOOT_SECONDS)
+    assert bench.heard.count(b"$M>") == 0
     assert bench.ask(IDENT) is not None
+
+
+def test_waypoint_without_a_payload_is_answered_from_what_the_buffer_held() -> None:
+    bench = Bench()
+    bench.payload(request(118, b"\x10"))
+    assert bench.payload(request(118))[0] == 16
+    bench.payload(request(118, b"\0"))
+    assert bench.payload(request(118))[0] == 0
+
+
+def test_p_of_roll_and_pitch_is_never_zero() -> None:
+    bench = Bench()
+    bench.payload(request(202, bytes(30)))
+    assert bench.payload(request(112)) == bytes((1, 0, 0, 1)) + bytes(26)
 
 
 def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:

@@ -159,9 +159,46 @@ def test_the_cli_echoes_and_a_power_cycle_leads_out_of_it() -> None:
     bench = Bench()
     bench.send(b"\r\r\r")
     bench.run(0.1)
-    bench.send(b"help\r")
-    assert bench.run(0.1) == b"help\r\n# "
+    bench.send(b"\r nonsense\r")
+    assert bench.run(0.1) == b"nonsense\r\nThat was Harakiri, try 'help'\r\n# "
     bench.naze.power_off(bench.now)
     bench.naze.power_on(bench.now)
     bench.run(BOOT_SECONDS + 0.1)
     assert speaks_msp(bench)
+
+
+def in_cli(records: int = 0) -> Bench:
+    bench = Bench()
+    if records:
+        bench.push(mission(records))
+    bench.send(b"\r\r\r")
+    assert bench.run(0.2).endswith(b"\r\n# ")
+    return bench
+
+
+def typed(bench: Bench, line: bytes, seconds: float = 0.3) -> bytes:
+    bench.send(line + b"\r")
+    return bench.run(seconds)
+
+
+def test_the_clis_status_counts_the_records() -> None:
+    assert b"5 Datasets of 146 possible" in typed(in_cli(5), b"status")
+
+
+def test_wpflush_counts_after_save() -> None:
+    bench = in_cli(5)
+    assert b"0 Datasets" in typed(bench, b"wpflush")
+    assert len(bench.naze.stored_records) == 5
+    assert b"Rebooting" in typed(bench, b"save", 2.0)
+    assert bench.naze.counters.resets == 1
+    bench.run(BOOT_SECONDS)
+    assert bench.pull() == []
+
+
+def test_exit_restarts_the_board_and_saves_nothing() -> None:
+    bench = in_cli(5)
+    typed(bench, b"wpflush")
+    typed(bench, b"exit", 2.0)
+    bench.run(BOOT_SECONDS)
+    assert bench.naze.counters.resets == 1
+    assert bench.pull() == mission(5)
