@@ -53,9 +53,23 @@ class RealBench(WireBench):
                 return
         raise AssertionError("the firmware refuses it")
 
-    def set_byte(self, symbol: str, value: int) -> None:
-        """Overwrite a byte of RAM."""
-        self.naze.poke(self.image.symbols[symbol], bytes((value,)))
+    def enter_cli(self) -> bytes:
+        """Type three returns; what is printed."""
+        self.send(b"\r\r\r")
+        return self.run(0.5)
+
+    def type_line(self, line: str) -> str:
+        """Type a line into the CLI; what is printed within a second."""
+        self.send(line.encode() + b"\r")
+        return self.run(1.0).decode("latin-1")
+
+    def set_tele_prot(self, value: int) -> None:
+        """In the CLI, which is left by saving and restarting."""
+        self.enter_cli()
+        self.type_line(f"set tele_prot={value}")
+        self.type_line("save")
+        self.run(1.5)
+        self.wait_for_boot()
 
     def hold_write(self, pending: bool) -> None:
         """Let a write of the configuration be scheduled for a time that does not come, or for none."""

@@ -12,6 +12,9 @@ from protocols.msp.mission import INFO_REQUEST, decode_info
 from simulator.emulated_naze.image import Image
 from simulator.options import TelemetryProtocol
 
+#: Begins every value of the FrSky hub protocol, and ends every frame.
+_FRSKY_FRAME = b"^"
+
 
 def test_it_boots_and_answers(bench: RealBench, figure: Figure) -> None:
     figure("boot to the first answer", f"{bench.power_cycle():.2f} s")
@@ -34,11 +37,7 @@ def test_what_comes_during_the_boot_is_answered_in_one_burst(bench: RealBench, f
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
 def test_arming_by_stick(image: Image, flash: bytes, figure: Figure, protocol: TelemetryProtocol) -> None:
     bench = RealBench(image, flash)
-    enter_cli(bench)
-    command(bench, f"set tele_prot={protocol.value}")
-    command(bench, "save")
-    bench.run(1.5)
-    bench.wait_for_boot()
+    bench.set_tele_prot(protocol.value)
     bench.arm()
     bench.run(3.0)
     expected = {TelemetryProtocol.FRSKY_9600: 9600, TelemetryProtocol.MAVLINK_57600: 57600}.get(protocol, 115200)
@@ -48,9 +47,11 @@ def test_arming_by_stick(image: Image, flash: bytes, figure: Figure, protocol: T
     heard = bytes(bench.heard[before:]) + bench.run(1.0)
     mavlink = [frame.msgid for frame in MavlinkSplitter().feed(heard)]
     figure(f"armed with tele_prot {protocol.value}", f"{bench.naze.baud} baud, {kind(answers, mavlink, heard)}")
-    assert answers is (protocol is TelemetryProtocol.MSP)
-    assert bool(mavlink) is (protocol in (TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600))
-    assert (b"^" in heard) is (protocol is TelemetryProtocol.FRSKY_9600) or mavlink
+    # FrSky frames are sent beside whatever was spoken before.
+    speaks_mavlink = protocol in (TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600)
+    assert answers is not speaks_mavlink
+    assert bool(mavlink) is speaks_mavlink
+    assert (_FRSKY_FRAME in heard) is (protocol is TelemetryProtocol.FRSKY_9600)
     bench.arm(False)
     bench.run(5.0)
     assert bench.naze.baud == 115200
@@ -58,29 +59,18 @@ def test_arming_by_stick(image: Image, flash: bytes, figure: Figure, protocol: T
 
 
 def kind(answers: bool, mavlink: list[int], heard: bytes) -> str:
-    if answers:
-        return "MSP"
-    return f"MAVLink, messages {sorted(set(mavlink))}" if mavlink else f"{len(heard)} bytes of FrSky a second"
-
-
-def enter_cli(bench: RealBench) -> bytes:
-    bench.send(b"\r\r\r")
-    return bench.run(0.5)
-
-
-def command(bench: RealBench, line: str) -> str:
-    bench.send(line.encode() + b"\r")
-    return bench.run(1.0).decode("latin-1")
+    if mavlink:
+        return f"MAVLink, messages {sorted(set(mavlink))}"
+    return f"{'MSP' * answers}{', FrSky' * (_FRSKY_FRAME in heard)}"
 
 
 def test_the_cli(bench: RealBench, figure: Figure) -> None:
     bench.push(mission(5))
-    assert b"#" in enter_cli(bench)
-    status = command(bench, "status")
-    assert "5" in status
+    assert b"#" in bench.enter_cli()
+    assert "5 Datasets of 146 possible" in bench.type_line("status")
     assert bench.ask(IDENT) is None
-    command(bench, "wpflush")
-    command(bench, "save")
+    bench.type_line("wpflush")
+    bench.type_line("save")
     bench.run(2.0)
     bench.wait_for_boot()
     assert bench.pull() == []

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Harakiri's own MAVLink upload, on the image with the patch."""
+
+import mavlink_missions as page
+from conftest import Figure
+from real_bench import RealBench
+
+
+def test_an_upload_becomes_the_stored_list(bench: RealBench, figure: Figure) -> None:
+    page.an_upload_becomes_the_stored_list(bench)
+    figure("MAVLink upload", "becomes the stored list")
+
+
+def test_an_upload_that_breaks_off_leaves_what_was_there(bench: RealBench, figure: Figure) -> None:
+    page.an_upload_that_breaks_off_leaves_what_was_there(bench)
+    figure("MAVLink upload that breaks off", "leaves the old list, and none on a fresh board")
+
+
+def test_an_upload_while_armed_is_an_error(bench: RealBench, figure: Figure) -> None:
+    bench.set_tele_prot(2)
+    page.an_upload_while_armed_is_an_error(bench, bench.arm)
+    figure("MAVLink upload while armed", "MISSION_ACK 1")

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A ground station at a board's UART: Harakiri's own MAVLink upload."""
+
+from naze_bench import WireBench
+
+from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkSplitter
+
+_BOARD = (1, 200)
+
+
+def item(seq: int) -> Message:
+    """A waypoint near the field."""
+    place = (45.3838 + seq / 1e4, 8.4733, 20.0 + seq)
+    frame, command = m.MAV_FRAME_GLOBAL_RELATIVE_ALT, m.MAV_CMD_NAV_WAYPOINT
+    return m.MAVLink_mission_item_message(*_BOARD, seq, frame, command, 0, 1, 0.0, 3.0, 0.0, 0.0, *place)
+
+
+class MavlinkGround:
+    """Speaks MAVLink 1 over a bench."""
+
+    def __init__(self, bench: WireBench) -> None:
+        self._bench = bench
+        self._writer = FrameWriter(255, 190)
+        self._splitter = MavlinkSplitter()
+        self._decoder = MavlinkDecoder()
+
+    def send(self, message: Message) -> None:
+        self._bench.send(self._writer.frame(pack(message), 1))
+
+    def wait(self, *wanted: int, seconds: float = 2.0) -> Message | None:
+        """The next message of one of these kinds."""
+        end = self._bench.now + seconds
+        while self._bench.now < end:
+            for frame in self._splitter.feed(self._bench.run(0.02)):
+                if frame.msgid in wanted:
+                    return self._decoder.decode(frame)
+        return None
+
+    def upload(self, count: int, stop_after: int | None = None) -> int | None:
+        """Upload waypoints; the result of the ACK, or None if it was left off before."""
+        self.send(m.MAVLink_mission_count_message(*_BOARD, count))
+        for _ in range(count + 1):
+            asked = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)
+            assert asked is not None, "no reply"
+            if asked.get_msgId() == m.MAVLINK_MSG_ID_MISSION_ACK:
+                return int(asked.type)
+            if asked.seq == stop_after:
+                return None
+            self.send(item(asked.seq))
+        raise AssertionError("no end")

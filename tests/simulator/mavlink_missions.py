@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Harakiri's own MAVLink upload does beside the mission extension: for the model and for the image."""
+
+from collections.abc import Callable
+
+from mavlink_ground import MavlinkGround
+from naze_bench import WireBench, mission
+
+from protocols.msp.mission import INFO_REQUEST, decode_info
+
+ACCEPTED, ERROR = 0, 1
+_WRITTEN_S = 3.0
+_AUTOSENSE_S = 5.0
+
+
+def count(bench: WireBench) -> int:
+    """How many records the extension says are stored, once the board takes MSP again."""
+    bench.run(_WRITTEN_S + _AUTOSENSE_S)
+    info = decode_info(bench.payload(INFO_REQUEST, 3.0))
+    assert info is not None
+    return info.stored.count
+
+
+def an_upload_becomes_the_stored_list(bench: WireBench) -> None:
+    assert MavlinkGround(bench).upload(4) == ACCEPTED
+    assert count(bench) == 4
+    assert [record.height_m for record in bench.pull()] == [20, 21, 22, 23]
+
+
+def an_upload_that_breaks_off_leaves_what_was_there(bench: WireBench) -> None:
+    assert MavlinkGround(bench).upload(4, stop_after=2) is None
+    assert count(bench) == 0
+    records = mission(3)
+    bench.push(records)
+    bench.run(_AUTOSENSE_S)
+    assert MavlinkGround(bench).upload(5, stop_after=2) is None
+    assert count(bench) == 3
+    assert bench.pull() == records
+
+
+def an_upload_while_armed_is_an_error(bench: WireBench, arm: Callable[[], None]) -> None:
+    arm()
+    bench.run(1.0)
+    assert MavlinkGround(bench).upload(4) == ERROR

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The patched firmware's own MAVLink upload, in the model; tests/real_board says the same of the image."""
+
+import mavlink_missions as page
+from naze_bench import Bench
+
+from simulator.options import Faults, SimOptions, TelemetryProtocol
+
+
+def test_an_upload_becomes_the_stored_list() -> None:
+    page.an_upload_becomes_the_stored_list(Bench())
+
+
+def test_an_upload_that_breaks_off_leaves_what_was_there() -> None:
+    page.an_upload_that_breaks_off_leaves_what_was_there(Bench())
+
+
+def test_an_upload_while_armed_is_an_error() -> None:
+    bench = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), Faults())
+    page.an_upload_while_armed_is_an_error(bench, lambda: setattr(bench.naze.faults, "armed", True))
