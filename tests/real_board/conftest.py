@@ -2,16 +2,14 @@
 """Tests on a real firmware image, patched, which this project does not have: NAZE_IMAGE names one (make real-board)."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from real_bench import RealBench, calibrated_flash
+from real_bench import Figure, RealBench, calibrated_flash
 
 from simulator.emulated_naze.image import Image, load_image
 
 _ROWS = pytest.StashKey[list[tuple[str, str]]]()
-Figure = Callable[[str, object], None]
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A client at the UART of an emulated board with a real image, and a clock that only the test moves."""
 
+from collections.abc import Callable
+
 from naze_bench import WireBench
 
 from protocols.msp.frame import request
@@ -8,6 +10,8 @@ from simulator.emulated_naze.board import EmulatedNaze, EmulatedPower
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand
 
+#: Puts a name and a value into the table at the end.
+Figure = Callable[[str, object], None]
 IDENT = request(HarakiriCommand.IDENT)
 #: Reception begins before this, and what comes then waits for the end of the boot.
 _DEAF_S = 0.6

@@ -3,9 +3,8 @@
 
 import random
 
-from conftest import Figure
 from naze_bench import Bench, WireBench, mission
-from real_bench import RealBench
+from real_bench import Figure, RealBench
 
 from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, request

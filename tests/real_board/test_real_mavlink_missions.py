@@ -2,8 +2,7 @@
 """Harakiri's own MAVLink upload, on the image with the patch."""
 
 import mavlink_missions as page
-from conftest import Figure
-from real_bench import RealBench
+from real_bench import Figure, RealBench
 
 
 def test_an_upload_becomes_the_stored_list(bench: RealBench, figure: Figure) -> None:

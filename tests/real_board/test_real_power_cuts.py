@@ -3,9 +3,8 @@
 
 import os
 
-from conftest import Figure
 from naze_bench import mission
-from real_bench import RealBench
+from real_bench import Figure, RealBench
 
 from simulator.emulated_naze.image import Image
 

@@ -2,9 +2,8 @@
 """What the image does with its serial port: booting, arming, the CLI, Harakiri's own MAVLink upload."""
 
 import pytest
-from conftest import Figure
 from naze_bench import mission
-from real_bench import IDENT, RealBench
+from real_bench import IDENT, Figure, RealBench
 
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_record import identify

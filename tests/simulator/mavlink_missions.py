@@ -22,12 +22,14 @@ def count(bench: WireBench) -> int:
 
 
 def an_upload_becomes_the_stored_list(bench: WireBench) -> None:
+    bench.run(_AUTOSENSE_S)
     assert MavlinkGround(bench).upload(4) == ACCEPTED
     assert count(bench) == 4
     assert [record.height_m for record in bench.pull()] == [20, 21, 22, 23]
 
 
 def an_upload_that_breaks_off_leaves_what_was_there(bench: WireBench) -> None:
+    bench.run(_AUTOSENSE_S)
     assert MavlinkGround(bench).upload(4, stop_after=2) is None
     assert count(bench) == 0
     records = mission(3)
