@@ -102,8 +102,9 @@ class Board(Program):
         self._control = directory / "naze.sock"
         place = ("--tcp", address) if tcp else ("--link", str(self.link))
         # A boot takes 7 s, for which no test here needs to wait.
-        place = (*place, "--boot", "2000")
-        super().__init__(directory / "board.log", "sim", *place, "--control", str(self._control), *options)
+        super().__init__(
+            directory / "board.log", "sim", *place, "--boot", "2000", "--control", str(self._control), *options
+        )
 
     def wait(self) -> None:
         until(lambda: "Simulated " in self.printed or not self.is_alive, "the simulated board")
