@@ -115,7 +115,9 @@ class Bridge:
         )
         self.local = LocalMissions(self.missions, self.runner, self.ground, log_event, self._incidents, home)
         self._watch = MissionWatch(self.missions, self.runner, self.ground, log_event)
-        self._downloads = MissionDownloads(self.missions, self.runner, self.ground, self._is_armed, home)
+        self._downloads = MissionDownloads(
+            self.missions, self.runner, self.ground, self._is_armed, lambda: self.session.vehicle.home_or_position()
+        )
         self._parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
         self.sharing = MspSharing(self.session, self.runner)

@@ -87,10 +87,13 @@ class MissionService:
         self._pending: list[PendingMission] = []
         self._has_asked_store = False
         self.held: HeldMission | None = None
+        #: Item 0 of the last list that was known: arming may change the protocol, and the list is unknown then.
+        self.former_home: MissionItem | None = None
 
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
         """Work with another flight controller from now on; with a Refusal, every attempt gets it as the reply."""
         self._dialect, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
+        self.former_home = self.home_item()
         self.held = None
         self._is_settled = self._told_unloaded = False
 
@@ -108,6 +111,10 @@ class MissionService:
     def dialect(self) -> AnyFcMissionStore | None:
         """How the present flight controller stores missions; None if it does not."""
         return self._dialect
+
+    def home_item(self) -> MissionItem | None:
+        """Item 0 of the flight controller's list, as last known."""
+        return self.held.items[0] if self.held is not None and self.held.items else self.former_home
 
     def seq_of(self, number: int) -> int:
         """Return the number of the item that the flight controller's record `number` is shown as; 0: none is known."""

@@ -2,14 +2,15 @@
 """A ground station reads the mission: the vehicle's side of MAVLink's download (docs/mission-rules.md, "Read-back")."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.station import Post, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
-from bridge.model.refusal import ARMED, Refusal
+from bridge.model.refusal import Refusal
+from bridge.model.vehicle import Home
 from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
@@ -22,6 +23,7 @@ _MAX_READERS = 16
 _READING_S = 20.0
 #: Questions that wait for the list to be read; more are not answered, and repeated by who asked.
 _MAX_QUESTIONS = 32
+_ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to read the mission")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +52,7 @@ class MissionDownloads:
         runner: Runner,
         post: Post,
         is_armed: Callable[[], bool | None],
-        home: Callable[[], tuple[int, int] | None],
+        home: Callable[[], Home | None],
     ) -> None:
         self._missions = missions
         self._runner = runner
@@ -66,7 +68,7 @@ class MissionDownloads:
         if mission_type != MISSION_TYPE_MISSION:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
         elif self._is_armed():
-            self._refuse(station, Refusal(MissionResult.DENIED, "Armed: disarm to read the mission"))
+            self._refuse(station, _ARMED)
         else:
             self._ask(_Question(station, None, as_int=True), now)
 
@@ -77,11 +79,14 @@ class MissionDownloads:
             return
         question = _Question(station, seq, as_int)
         snapshot = self._snapshots.get(station)
-        if snapshot is not None and now < snapshot.until:
+        if self._is_armed():
+            if seq == 0:
+                self._send_item(station, self._present_home(), as_int=as_int)
+            else:
+                self._refuse(station, _ARMED)
+        elif snapshot is not None and now < snapshot.until:
             snapshot.until = now + _READING_S
             self._answer(question, snapshot.items)
-        elif self._is_armed() and seq != 0:
-            self._refuse(station, ARMED)
         else:
             self._ask(question, now)
 
@@ -114,9 +119,9 @@ class MissionDownloads:
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):
-                if question.seq == 0 and self._home() is not None:
+                if question.seq == 0 and (self._is_armed() or self._home() is not None):
                     # Mission Planner asks for it on arming, which may have changed the protocol just now.
-                    self._answer(question, ())
+                    self._send_item(question.station, self._present_home(), as_int=question.as_int)
                 else:
                     self._refuse(question.station, held)
                 continue
@@ -130,28 +135,35 @@ class MissionDownloads:
         if question.seq is None:
             # DroneKit takes home from a download, and waits for ever without one: an empty list has a home, if known.
             self._send_count(question.station, len(items) or int(self._home() is not None))
+        elif question.seq < len(items):
+            self._send_item(question.station, items[question.seq], as_int=question.as_int)
+        elif question.seq == 0:
+            self._send_item(question.station, self._home_item(), as_int=question.as_int)
         else:
-            self._send_item(question.station, items, question.seq, as_int=question.as_int)
+            self._ack(question.station, MissionResult.INVALID_SEQUENCE)
 
     def _send_count(self, station: Station, count: int) -> None:
         self._post.to(
             station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count, MISSION_TYPE_MISSION)
         )
 
-    def _send_item(self, station: Station, items: tuple[MissionItem, ...], seq: int, *, as_int: bool) -> None:
-        if seq < len(items):
-            item = items[seq]
-        elif seq == 0:
-            item = self._home_item()
-        else:
-            self._ack(station, MissionResult.INVALID_SEQUENCE)
-            return
+    def _send_item(self, station: Station, item: MissionItem, *, as_int: bool) -> None:
         self._post.to(station, item_message(item, station.sysid, station.compid, as_int=as_int))
 
+    def _present_home(self) -> MissionItem:
+        """Item 0 as last read, at the height of HOME_POSITION: Mission Planner takes its ground level from it."""
+        known, home = self._missions.home_item(), self._home()
+        if known is None:
+            return self._home_item()
+        altitude_m = None if home is None else home.altitude_m
+        return known if altitude_m is None else replace(known, alt_m=altitude_m)
+
     def _home_item(self) -> MissionItem:
-        """Item 0 of an empty list: where the flight controller's own home is, as far as it is known."""
-        lat_e7, lon_e7 = self._home() or (0, 0)
-        return MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, lat_e7, lon_e7, 0)
+        """Item 0 of an empty list: home, as far as it is known."""
+        home = self._home() or Home(0, 0)
+        return MissionItem(
+            0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, home.lat_e7, home.lon_e7, home.altitude_m or 0.0
+        )
 
     def _refuse(self, station: Station, refusal: Refusal) -> None:
         self._post.say(Severity.ERROR, refusal.text, station)

@@ -289,17 +289,36 @@ def test_without_a_link_and_without_a_store_the_reason_is_told() -> None:
 def test_armed_in_mavlink_mode_home_is_served_and_no_more() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.run(6)
-    home = world.bridge.session.vehicle.home
-    assert home is not None
     world.faults.armed = True
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
     world.run(1.5)
     (item,) = ask(station, request_message(0))
-    assert (item.x, item.y) == (home.lat_e7, home.lon_e7)
+    home = world.bridge.session.vehicle.home
+    assert home is not None
+    assert (item.x, item.y, item.z) == (OLD[0].lat_e7, OLD[0].lon_e7, home.altitude_m)
+    texts = []
     for message in (request_message(1), list_message()):
         (ack,) = ask(station, message)
         assert ack.type == A.DENIED
-    assert any("Armed" in text for text in station.texts())
+        texts += station.texts()
+    assert "Armed: disarm to read the mission" in texts
+
+
+@pytest.mark.parametrize("protocol", list(TelemetryProtocol))
+def test_a_craft_that_is_armed_from_the_start_has_an_item_0(protocol: TelemetryProtocol) -> None:
+    world = World(SimOptions(tele_prot=protocol), Faults(armed=True), powered=False, plugged=False)
+    world.power_on()
+    world.run(6)
+    world.plug()
+    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 12)
+    station = GroundStation(world)
+    (item,) = ask(station, request_message(0))
+    assert item.get_type() == "MISSION_ITEM_INT"
+    world.run(3)
+    (home_item,) = ask(station, request_message(0))
+    for home in station.said("HOME_POSITION")[-1:]:
+        assert (home_item.x, home_item.y, home_item.z) == (home.latitude, home.longitude, home.altitude / 1000)
+    assert not any("disarm" in text for text in station.texts())
 
 
 def test_reading_goes_on_beside_an_upload_by_another() -> None:
