@@ -11,7 +11,7 @@ An autopilot that speaks MAVLink for itself is not represented but passed throug
     FcSession <-> PassThrough <-> Ground
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
@@ -58,6 +58,7 @@ _AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
 class BridgeConfig:
     """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed.
 
+    `unix_time_s`: the time of day at a monotonic time, None if unknown.
     `links`: who may write over which link, by its name; over others everyone may. `passes_everything`: an autopilot
     that speaks MAVLink for itself gets commands over those others, too.
     """
@@ -69,6 +70,7 @@ class BridgeConfig:
     autopilot: Autopilot = Autopilot.AUTO
     profiles: Sequence[Profile] = PROFILES
     links: Mapping[str, LinkAccess] = field(default_factory=dict)
+    unix_time_s: Callable[[float], float | None] = lambda _now: None
     passes_everything: bool = False
 
 
@@ -107,7 +109,9 @@ class Bridge:
         self.missions = MissionService(
             lambda mission, delivery: self._mission_endings.append((mission, delivery)), self._is_armed
         )
-        self._vehicle = OwnVehicle(self.session, self.missions, self.ground, lambda: self._announcer.is_lost, now)
+        self._vehicle = OwnVehicle(
+            self.session, self.missions, self.ground, lambda: self._announcer.is_lost, config.unix_time_s, now
+        )
         self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
         home = self._vehicle.home
         self._uploads = MissionUploads(
@@ -348,6 +352,7 @@ class Bridge:
         return profile.open_store(controller, view, RuleSettings(self._config.takeoff_max_m))
 
     def _pass_on_news(self, now: float) -> None:
+        self.report.now = now
         if self.report.is_watched:
             self.session.settle_telemetry()
         news = self.session.vehicle.take_news()

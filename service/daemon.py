@@ -2,6 +2,7 @@
 """The running bridge: its links, its store and its clock, on one event loop."""
 
 import asyncio
+import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -95,6 +96,7 @@ class Daemon:
                 takeoff_max_m=settings.takeoff_max_m,
                 autopilot=settings.autopilot,
                 links={**self._signing.links, **_ZENOH},
+                unix_time_s=lambda now: time.time() - self._loop.time() + now,
                 passes_everything=settings.pass_through is PassThroughRule.EVERYTHING,
             ),
             self._log_event,

@@ -20,6 +20,7 @@ from bridge.model.vehicle import (
     Height,
     Orientation,
     Power,
+    Pressure,
     Signal,
     Source,
     Sticks,
@@ -69,6 +70,7 @@ class MavlinkTelemetry:
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position_int,
             m.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
             m.MAVLINK_MSG_ID_HOME_POSITION: self._home_position,
+            m.MAVLINK_MSG_ID_SCALED_PRESSURE: self._scaled_pressure,
             m.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels,
             m.MAVLINK_MSG_ID_RC_CHANNELS_RAW: self._rc_channels,
         }
@@ -196,6 +198,9 @@ class MavlinkTelemetry:
         power = self._vehicle.last(Power)
         if power is not None and message.current_consumed >= 0:
             self._vehicle.hear(Power(now, Source.MAVLINK, power.voltage_v, power.current_a, message.current_consumed))
+
+    def _scaled_pressure(self, message: Message, now: float) -> None:
+        self._vehicle.hear(Pressure(now, Source.MAVLINK, message.press_abs, message.temperature / 100))
 
     def _rc_channels(self, message: Message, now: float) -> None:
         values = [getattr(message, f"chan{number}_raw", _UNKNOWN_U16) for number in range(1, _CHANNELS + 1)]

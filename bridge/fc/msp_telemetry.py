@@ -15,6 +15,7 @@ from bridge.model.vehicle import (
     Height,
     ImuSample,
     MissionLeg,
+    Motors,
     Orientation,
     Power,
     Reading,
@@ -36,12 +37,13 @@ from protocols.msp.telemetry import (
     decode_box_activation,
     decode_channels,
     decode_home,
+    decode_motors,
     decode_raw_gps,
     decode_raw_imu,
     decode_status,
 )
 
-#: The poll whose reply carries a reading.
+#: The poll whose reply carries a reading; the others are heard in MAVLink mode only.
 POLL_FOR: Mapping[type[Reading], Msp] = {
     Orientation: Msp.ATTITUDE,
     GpsFix: Msp.RAW_GPS,
@@ -52,6 +54,7 @@ POLL_FOR: Mapping[type[Reading], Msp] = {
     Power: Msp.ANALOG,
     Signal: Msp.ANALOG,
     Sticks: Msp.RC,
+    Motors: Msp.MOTOR,
     ImuSample: Msp.RAW_IMU,
     MissionLeg: Msp.NAV_STATUS,
 }
@@ -145,6 +148,12 @@ def _rc(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: fl
         vehicle.hear(Sticks(now, Source.MSP, (roll, pitch, throttle, yaw, *aux)))
 
 
+def _motor(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    outputs = decode_motors(payload)
+    if outputs is not None:
+        vehicle.hear(Motors(now, Source.MSP, outputs))
+
+
 def _raw_imu(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     imu = decode_raw_imu(payload)
     if imu is not None:
@@ -176,6 +185,7 @@ _DECODERS: Mapping[int, Decoder] = {
     Msp.STATUS: _status,
     Msp.ANALOG: _analog,
     Msp.RC: _rc,
+    Msp.MOTOR: _motor,
     Msp.RAW_IMU: _raw_imu,
     Msp.BOX: _box,
     Msp.WP: _wp,

@@ -63,6 +63,7 @@ POLLS = (
     Poll(Msp.ANALOG, request(Msp.ANALOG), 9, 1.0),
     Poll(Msp.RC, request(Msp.RC), 68, 1.0),
     Poll(Msp.WP, request(Msp.WP, b"\0"), 21, 2.0),
+    Poll(Msp.MOTOR, request(Msp.MOTOR), 16, inf),
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
 )
 #: For boards that report their progress in a mission.

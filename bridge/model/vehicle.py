@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import TypeVar
 
+from bridge.model.battery import least_cells, remaining_percent
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import GroundTrack, distance_m
 from protocols.msp.nav import NavStatus
@@ -91,11 +92,16 @@ class Height(Reading):
 
 @dataclass(frozen=True, slots=True)
 class Power(Reading):
-    """The battery. A flight controller without a sensor reports 0 V, which is unknown here."""
+    """The battery. A flight controller without a sensor reports 0 V, which is unknown here.
+
+    cells, remaining_percent: from flight controllers that know them; Vehicle estimates them for the others.
+    """
 
     voltage_v: float | None
     current_a: float | None = None
     drawn_mah: int | None = None
+    cells: int | None = None
+    remaining_percent: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,11 +136,30 @@ class FlightState(Reading):
 
 @dataclass(frozen=True, slots=True)
 class Health(Reading):
-    """The flight controller itself. sensors: fitted and answering. i2c_errors: sensor reads that failed since boot."""
+    """The flight controller itself. sensors: fitted and answering. i2c_errors: sensor reads that failed since boot.
+
+    cpu_load: 0..1.
+    """
 
     sensors: Sensor
     cycle_time_us: int | None = None
     i2c_errors: int | None = None
+    cpu_load: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Motors(Reading):
+    """Motor outputs, microseconds."""
+
+    outputs_us: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Pressure(Reading):
+    """The barometer."""
+
+    absolute_hpa: float
+    temperature_c: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +201,7 @@ class Vehicle:
         self.track = GroundTrack()
         self._readings: dict[type[Reading], Reading] = {}
         self._news: set[type[Reading]] = set()
+        self._cells = 1
         #: False while home is only where the craft stands before its first arming.
         self.is_home_settled = False
 
@@ -191,6 +217,13 @@ class Vehicle:
         self._readings[kind] = reading
         self._news.add(kind)
         self.heard_at = max(reading.heard_at, self.heard_at or reading.heard_at)
+        if isinstance(reading, Power) and reading.voltage_v is not None and reading.cells is None:
+            # Never fewer than before: a battery that runs down is not one of fewer cells.
+            self._cells = max(self._cells, least_cells(reading.voltage_v))
+            percent = reading.remaining_percent
+            if percent is None:
+                percent = remaining_percent(reading.voltage_v, self._cells)
+            self._readings[kind] = replace(reading, cells=self._cells, remaining_percent=percent)
         if kind in _PLACES_HOME:
             self._place_home(has_armed=was_armed is False and self.armed is True)
 

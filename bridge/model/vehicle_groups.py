@@ -24,6 +24,10 @@ class Group(Enum):
     __hash__ = object.__hash__
 
 
+#: Of every group.
+Age = Annotated[float | None, "seconds since it was heard; above 1.5 it is stale"]
+
+
 @dataclass(frozen=True, slots=True)
 class Attitude:
     """How the vehicle is turned."""
@@ -31,6 +35,7 @@ class Attitude:
     roll_deg: Annotated[float | None, "right side down is positive"] = None
     pitch_deg: Annotated[float | None, "nose up is positive"] = None
     heading_deg: Annotated[float | None, "0 up to 360, clockwise from north; only with a compass"] = None
+    age_s: Age = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +49,11 @@ class Position:
     climb_m_s: Annotated[float | None, "upwards is positive"] = None
     north_m_s: Annotated[float | None, "speed over ground, northward part"] = None
     east_m_s: Annotated[float | None, "speed over ground, eastward part"] = None
-    home_lat_deg: Annotated[float | None, "home: where the vehicle took off"] = None
-    home_lon_deg: Annotated[float | None, "home: where the vehicle took off"] = None
+    home_lat_deg: Annotated[float | None, "home: where the vehicle was armed; before that, where it stands"] = None
+    home_lon_deg: Annotated[float | None, "home: where the vehicle was armed; before that, where it stands"] = None
     home_distance_m: Annotated[float | None, "way to home"] = None
     home_direction_deg: Annotated[float | None, "direction of home, clockwise from north"] = None
+    age_s: Age = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +65,7 @@ class Gps:
     hdop: Annotated[float | None, "horizontal dilution of precision"] = None
     ground_speed_m_s: Annotated[float | None, "speed over ground"] = None
     course_deg: Annotated[float | None, "direction of the movement, clockwise from north"] = None
+    age_s: Age = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +75,9 @@ class Battery:
     voltage_v: float | None = None
     current_a: float | None = None
     drawn_mah: Annotated[int | None, "since the flight controller was switched on"] = None
+    cells: Annotated[int | None, "estimated from the voltage, unless the flight controller knows"] = None
+    remaining_percent: Annotated[int | None, "estimated from the voltage, unless the flight controller knows"] = None
+    age_s: Age = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +86,7 @@ class Rc:
 
     channels_us: Annotated[tuple[int, ...] | None, "pulse widths: roll, pitch, throttle, yaw, then aux 1.."] = None
     rssi_percent: Annotated[float | None, "strength of the received signal"] = None
+    age_s: Age = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +98,7 @@ class Status:
     sensors: Annotated[tuple[str, ...] | None, "what is on board and answers"] = None
     cycle_time_us: Annotated[int | None, "one turn of its main loop"] = None
     i2c_errors: Annotated[int | None, "failed talks with a sensor since its start"] = None
+    age_s: Age = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,40 +19,57 @@ from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import MissionProgress
 from bridge.model.vehicle import FlightState, Home, MissionLeg, Reading
 from bridge.vehicle import vehicle_messages
-from bridge.vehicle.telemetry_table import EXTENDED_STATUS, NO_STREAM, TELEMETRY, Row
+from bridge.vehicle.telemetry_table import EXTENDED_STATUS, EXTRA3, NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 
-#: HEARTBEAT and MISSION_CURRENT come from no poll.
+#: HEARTBEAT, and the messages that follow no reading.
 _TICK_S = 1.0
 #: Mission Planner needs two heartbeats to connect.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
-_MISSION_CURRENT = messages.MAVLINK_MSG_ID_MISSION_CURRENT
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
-_STREAMS = {row.msgid: row.stream for row in TELEMETRY} | {_MISSION_CURRENT: EXTENDED_STATUS}
+_TICKED_STREAMS = {
+    messages.MAVLINK_MSG_ID_MISSION_CURRENT: EXTENDED_STATUS,
+    messages.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: EXTENDED_STATUS,
+    messages.MAVLINK_MSG_ID_SYSTEM_TIME: EXTRA3,
+}
+_STREAMS = {row.msgid: row.stream for row in TELEMETRY} | _TICKED_STREAMS
 _READINGS = {row.msgid: row.reading for row in TELEMETRY}
 (_SYS_STATUS,) = (row for row in TELEMETRY if row.msgid == messages.MAVLINK_MSG_ID_SYS_STATUS)
-_DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | {_MISSION_CURRENT: _TICK_S}
+_DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | dict.fromkeys(_TICKED_STREAMS, _TICK_S)
 
 
 class OwnVehicle:
     """Sends what is known of the vehicle, each ground station what and as often as it wishes."""
 
     def __init__(
-        self, session: FcSession, missions: MissionService, ground: Ground, is_lost: Callable[[], bool], now: float
+        self,
+        session: FcSession,
+        missions: MissionService,
+        ground: Ground,
+        is_lost: Callable[[], bool],
+        unix_time_s: Callable[[float], float | None],
+        now: float,
     ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
         self._is_lost = is_lost
+        self._unix_time_s = unix_time_s
         self._started_at = self._now = now
         self._tick_due = now
         self._rates = MessageRates(_DEFAULTS)
         self._progress = MissionProgress()
+        #: Messages that follow no reading.
+        self._ticked: Mapping[int, Callable[[], Message | None]] = {
+            messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+            messages.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._nav_controller_output,
+            messages.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
+        }
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
         #: New ground stations, and until when they get more heartbeats.
@@ -79,7 +96,11 @@ class OwnVehicle:
         self._rates.keep(everyone)
         self._set_polls(everyone)
         self._ground.introduce(self._heartbeat())
-        self._ground.multicast(pack(self._mission_current()), self._rates.take_due(_MISSION_CURRENT, everyone, now))
+        for msgid, make in self._ticked.items():
+            peers = self._rates.take_due(msgid, everyone, now)
+            message = make() if peers else None
+            if message is not None:
+                self._ground.multicast(pack(message), peers)
         if self._is_lost():
             # No reading triggers it now.
             self._send(_SYS_STATUS, self._moment(), everyone)
@@ -161,7 +182,8 @@ class OwnVehicle:
         if not self._rates.knows(msgid):
             return None
         reading = _READINGS.get(msgid)
-        pace_s = _TICK_S if reading is None else self._session.polls.interval_s(POLL_FOR[reading])
+        poll = None if reading is None else POLL_FOR.get(reading)
+        pace_s = _TICK_S if poll is None else self._session.polls.interval_s(poll)
         return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
 
     def _set_polls(self, everyone: Sequence[Peer]) -> None:
@@ -176,8 +198,8 @@ class OwnVehicle:
     def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:
         if msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             return [vehicle_messages.autopilot_version]
-        if msgid == _MISSION_CURRENT:
-            return [self._mission_current]
+        if msgid in self._ticked:
+            return [self._ticked[msgid]]
         makers = (make for row in TELEMETRY if row.msgid == msgid for make in row.makers)
         return [partial(make, self._moment()) for make in makers]
 
@@ -203,6 +225,26 @@ class OwnVehicle:
         seq = self._missions.seq_of(self._progress.number)
         return vehicle_messages.mission_current(0 if held is None else len(held.items), seq, self._progress.progress)
 
+    def _nav_controller_output(self) -> Message | None:
+        """The way to the waypoint, or home."""
+        state, held = self._session.vehicle.last(FlightState), self._missions.held
+        seq = self._missions.seq_of(self._progress.number)
+        if state is None or not state.armed:
+            return None
+        if held is not None and 0 < seq < len(held.items):
+            item = held.items[seq]
+            if item.lat_e7 and item.lon_e7:
+                target = Home(item.lat_e7, item.lon_e7)
+                return vehicle_messages.nav_controller_output(self._moment(), target, item.alt_m)
+        home = self._session.vehicle.home
+        if state.mode is not FlightMode.RTL or home is None:
+            return None
+        return vehicle_messages.nav_controller_output(self._moment(), home, None)
+
+    def _system_time(self) -> Message | None:
+        unix_s = self._unix_time_s(self._now)
+        return None if unix_s is None else vehicle_messages.system_time(self._moment(), unix_s)
+
     def _follow_mission(self) -> None:
         """Tell at once what was reached; where it flies to next comes every second."""
         leg = self._session.vehicle.last(MissionLeg)
@@ -223,5 +265,6 @@ class OwnVehicle:
 
 
 def _want(wanted: dict[Msp, float], reading: type[Reading], interval_s: float) -> None:
-    poll = POLL_FOR[reading]
-    wanted[poll] = min(wanted.get(poll, inf), interval_s)
+    poll = POLL_FOR.get(reading)
+    if poll is not None:
+        wanted[poll] = min(wanted.get(poll, inf), interval_s)

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from bridge.model.flight_mode import FlightMode
-from bridge.model.ground_track import bearing_deg, distance_m
+from bridge.model.ground_track import Place, bearing_deg, distance_m, north_east_m
 from bridge.model.mission_progress import Progress
 from bridge.model.vehicle import (
     STALE_S,
@@ -19,8 +19,10 @@ from bridge.model.vehicle import (
     Health,
     Height,
     ImuSample,
+    Motors,
     Orientation,
     Power,
+    Pressure,
     ReadingT,
     Signal,
     Sticks,
@@ -86,6 +88,8 @@ _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_U8 = 0xFF
 _RAW_CHANNELS, _CHANNELS = 8, 18
 _MAX_RSSI = 254
+#: An armed craft that is higher or faster than this is in the air.
+_FLYING_M, _FLYING_M_S = 1.0, 0.5
 _THROTTLE = 2
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
 
@@ -251,16 +255,21 @@ def sys_status(at: Moment) -> Message | None:
     for sensor, bit in _SENSORS.items():
         if sensor & health.sensors:
             sensors |= bit
-    is_heard = at.fresh(Health) is not None
+    healthy = sensors if at.fresh(Health) is not None else 0
+    if at.vehicle.last(Sticks) is not None:
+        sensors |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+        signal = at.vehicle.last(Signal)
+        if at.fresh(Sticks) is not None and (signal is None or signal.strength > 0):
+            healthy |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
     power = at.fresh(Power)
     return messages.MAVLink_sys_status_message(
         sensors,
         sensors,
-        (sensors if is_heard else 0) | _NEVER_ILL,
-        0,
+        healthy | _NEVER_ILL,
+        round((health.cpu_load or 0.0) * 1000),
         _scaled_u16(None if power is None else power.voltage_v, 1000),
         -1 if power is None or power.current_a is None else _fit(round(power.current_a * 100), 16),
-        -1,
+        -1 if power is None or power.remaining_percent is None else power.remaining_percent,
         0,
         health.i2c_errors or 0,
         0,
@@ -278,7 +287,8 @@ def battery_status(at: Moment) -> Message | None:
     voltages = [_scaled_u16(power.voltage_v, 1000), *[_UNKNOWN_U16] * 9]
     current = -1 if power.current_a is None else _fit(round(power.current_a * 100), 16)
     drawn = -1 if power.drawn_mah is None else power.drawn_mah
-    return messages.MAVLink_battery_status_message(0, 0, 0, 32767, voltages, current, drawn, -1, -1)
+    remaining = -1 if power.remaining_percent is None else power.remaining_percent
+    return messages.MAVLink_battery_status_message(0, 0, 0, 32767, voltages, current, drawn, -1, remaining)
 
 
 def rc_channels(at: Moment) -> Message | None:
@@ -309,12 +319,84 @@ def raw_imu(at: Moment) -> Message | None:
     return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, *imu.acc, *imu.gyro, *imu.mag)
 
 
+def servo_output_raw(at: Moment) -> Message | None:
+    """SERVO_OUTPUT_RAW: the motors, microseconds."""
+    motors = at.fresh(Motors)
+    if motors is None:
+        return None
+    outputs = (*motors.outputs_us, *[0] * _RAW_CHANNELS)[:_RAW_CHANNELS]
+    return messages.MAVLink_servo_output_raw_message(at.boot_ms * 1000 & 0xFFFFFFFF, 0, *outputs)
+
+
+def scaled_pressure(at: Moment) -> Message | None:
+    """SCALED_PRESSURE: hPa, 0.01 degrees Celsius."""
+    pressure = at.fresh(Pressure)
+    if pressure is None:
+        return None
+    temperature = _fit(round(pressure.temperature_c * 100), 16)
+    return messages.MAVLink_scaled_pressure_message(at.boot_ms, pressure.absolute_hpa, 0.0, temperature)
+
+
+def attitude_quaternion(at: Moment) -> Message | None:
+    """ATTITUDE_QUATERNION: w, x, y, z."""
+    now = at.fresh(Orientation)
+    if now is None:
+        return None
+    halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
+    (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
+    rates = map(math.radians, now.rates_deg_s or (math.nan,) * 3)
+    return messages.MAVLink_attitude_quaternion_message(
+        at.boot_ms,
+        cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
+        sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
+        cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
+        cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
+        *rates,
+    )
+
+
+def local_position_ned(at: Moment) -> Message | None:
+    """LOCAL_POSITION_NED: metres from home, m/s."""
+    position, height, home = at.fresh(GlobalPosition), at.fresh(Height), at.vehicle.home
+    if position is None or height is None or home is None or position.north_m_s is None or position.east_m_s is None:
+        return None
+    north, east = north_east_m(home, position)
+    return messages.MAVLink_local_position_ned_message(
+        at.boot_ms, north, east, -height.height_m, position.north_m_s, position.east_m_s, -height.climb_m_s
+    )
+
+
+def nav_controller_output(at: Moment, target: Place, height_m: float | None) -> Message | None:
+    """NAV_CONTROLLER_OUTPUT: the way to a place, degrees and metres. The flight controller's own aims are unknown."""
+    position, now, height = at.fresh(GlobalPosition), at.fresh(Orientation), at.fresh(Height)
+    if position is None or now is None:
+        return None
+    bearing = round((bearing_deg(position, target) + 180) % 360 - 180)
+    distance = min(round(distance_m(position, target)), _UNKNOWN_U16)
+    climb_m = 0.0 if height_m is None or height is None else height_m - height.height_m
+    return messages.MAVLink_nav_controller_output_message(
+        now.roll_deg, now.pitch_deg, bearing, bearing, distance, climb_m, 0.0, 0.0
+    )
+
+
+def system_time(at: Moment, unix_s: float) -> Message:
+    """SYSTEM_TIME: the Pi's clock."""
+    return messages.MAVLink_system_time_message(round(unix_s * 1e6), at.boot_ms)
+
+
 def extended_sys_state(at: Moment) -> Message | None:
-    """EXTENDED_SYS_STATE: disarmed is on the ground; of an armed craft it is not known."""
+    """EXTENDED_SYS_STATE: disarmed is on the ground; armed it depends on height, climb and speed."""
     state = at.fresh(FlightState)
     if state is None or state.armed is None:
         return None
-    landed = messages.MAV_LANDED_STATE_UNDEFINED if state.armed else messages.MAV_LANDED_STATE_ON_GROUND
+    landed = messages.MAV_LANDED_STATE_ON_GROUND
+    if state.armed:
+        height, gps = at.fresh(Height), at.fresh(GpsFix)
+        speed = None if gps is None else gps.ground_speed_m_s
+        if height is None:
+            landed = messages.MAV_LANDED_STATE_UNDEFINED
+        elif height.height_m > _FLYING_M or abs(height.climb_m_s) > _FLYING_M_S or (speed or 0) > _FLYING_M_S:
+            landed = messages.MAV_LANDED_STATE_IN_AIR
     return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, landed)
 
 

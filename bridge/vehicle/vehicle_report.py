@@ -68,6 +68,8 @@ class VehicleReporter:
         self._missions = missions
         self._ground = ground
         self._want = want
+        #: Ages are counted to this time, monotonic s.
+        self.now = 0.0
         self._fresh: set[Group] = set()
         self._watched: frozenset[Group] = frozenset()
         self._makers: Mapping[Group, Callable[[], Any]] = {group: getattr(self, f"_{group.value}") for group in Group}
@@ -112,12 +114,15 @@ class VehicleReporter:
     def _last(self, kind: type[ReadingT]) -> ReadingT | None:
         return self._session.vehicle.last(kind)
 
+    def _age_s(self, reading: Reading | None) -> float | None:
+        return None if reading is None else max(round(self.now - reading.heard_at, 1), 0.0)
+
     def _attitude(self) -> Attitude:
         now = self._last(Orientation)
         if now is None:
             return Attitude()
         heading_deg = _rounded(now.heading_deg) if now.is_north_known else None
-        return Attitude(_rounded(now.roll_deg), _rounded(now.pitch_deg), heading_deg)
+        return Attitude(_rounded(now.roll_deg), _rounded(now.pitch_deg), heading_deg, self._age_s(now))
 
     def _position(self) -> Position:
         home, here, height = self._session.vehicle.home, self._last(GlobalPosition), self._last(Height)
@@ -133,6 +138,7 @@ class VehicleReporter:
             home_lon_deg=None if home is None else home.lon_e7 / 1e7,
             home_distance_m=None if home is None or here is None else round(distance_m(here, home), 1),
             home_direction_deg=None if home is None or here is None else round(bearing_deg(here, home), 1) % 360,
+            age_s=self._age_s(here or height),
         )
 
     def _gps(self) -> Gps:
@@ -140,17 +146,20 @@ class VehicleReporter:
         if now is None:
             return Gps()
         course_deg = _rounded(now.course_deg)
-        return Gps(_FIXES[now.fix], now.satellites, now.hdop, now.ground_speed_m_s, course_deg)
+        return Gps(_FIXES[now.fix], now.satellites, now.hdop, now.ground_speed_m_s, course_deg, self._age_s(now))
 
     def _battery(self) -> Battery:
         now = self._last(Power)
-        return Battery() if now is None else Battery(now.voltage_v, now.current_a, now.drawn_mah)
+        if now is None:
+            return Battery()
+        more = now.cells, now.remaining_percent, self._age_s(now)
+        return Battery(now.voltage_v, now.current_a, now.drawn_mah, *more)
 
     def _rc(self) -> Rc:
         sticks, signal = self._last(Sticks), self._last(Signal)
         if sticks is None:
             return Rc()
-        return Rc(sticks.channels_us, None if signal is None else round(signal.strength * 100, 1))
+        return Rc(sticks.channels_us, None if signal is None else round(signal.strength * 100, 1), self._age_s(sticks))
 
     def _status(self) -> Status:
         state, health = self._last(FlightState), self._last(Health)
@@ -161,6 +170,7 @@ class VehicleReporter:
             sensors=None if health is None else _names(health.sensors),
             cycle_time_us=None if health is None else health.cycle_time_us,
             i2c_errors=None if health is None else health.i2c_errors,
+            age_s=self._age_s(state),
         )
 
     def _link(self) -> Link:

@@ -12,6 +12,7 @@ class Msp(IntEnum):
     IDENT = 100
     STATUS = 101
     RAW_IMU = 102
+    MOTOR = 104
     RC = 105
     RAW_GPS = 106
     ATTITUDE = 108

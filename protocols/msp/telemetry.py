@@ -10,6 +10,7 @@ from enum import IntFlag
 
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
+_MOTORS = struct.Struct("<8H")
 _RAW_IMU = struct.Struct("<9h")
 _RAW_GPS = struct.Struct("<BBiihH")
 _ATTITUDE = struct.Struct("<hhh")
@@ -147,6 +148,11 @@ def decode_channels(payload: bytes) -> tuple[int, ...] | None:
     if count < _MIN_CHANNELS:
         return None
     return struct.unpack_from(f"<{min(count, _MAX_CHANNELS)}H", payload)
+
+
+def decode_motors(payload: bytes) -> tuple[int, ...] | None:
+    """Read MSP_MOTOR: eight outputs in microseconds, 0 for a motor that is not there."""
+    return _MOTORS.unpack_from(payload) if len(payload) >= _MOTORS.size else None
 
 
 def decode_raw_gps(payload: bytes) -> RawGps | None:

@@ -14,7 +14,7 @@ from bridge.line.poll_schedule import POLLS, PollSchedule
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
-REPLY_PAYLOADS = {101: 11, 102: 18, 105: 16, 106: 14, 108: 8, 109: 6, 110: 5, 118: 12}
+REPLY_PAYLOADS = {101: 11, 104: 16, 102: 18, 105: 16, 106: 14, 108: 8, 109: 6, 110: 5, 118: 12}
 #: Answers a command with a payload's size; None: not at all, -1: an error.
 Answer = Callable[[int], int | None]
 
@@ -71,7 +71,7 @@ class Line:
 def test_at_first_all_is_asked_at_once() -> None:
     line = Line()
     asked = line.run(0.2)
-    assert set(asked) == set(REPLY_PAYLOADS) - {Msp.RAW_IMU}
+    assert set(asked) == set(REPLY_PAYLOADS) - {Msp.RAW_IMU, Msp.MOTOR}
 
 
 def test_what_is_refused_is_asked_twice_and_never_again_until_another_is_there() -> None:

@@ -173,7 +173,7 @@ def test_a_battery_whose_current_is_measured_and_one_whose_is_not() -> None:
         1234,
         350,
     )
-    assert (battery["temperature"], battery["battery_remaining"], battery["energy_consumed"]) == (32767, -1, -1)
+    assert (battery["temperature"], battery["battery_remaining"], battery["energy_consumed"]) == (32767, 93, -1)
     assert made(make.sys_status(at(state))).current_battery == 1234
     told(state, BETAFLIGHT, ANALOG=struct.pack("<BHHh", 124, 0, 0, 0))
     assert (
@@ -284,3 +284,67 @@ def test_sensors_and_errors() -> None:
     assert present.errors_comm == 9
     assert not present.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
     assert not present.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS
+
+
+@pytest.mark.parametrize(
+    ("volts", "percent"), [((16.8,), 100), ((12.6,), 100), ((12.6, 11.4), 45), ((12.6, 10.5), 5), ((12.6, 9.0), 0)]
+)
+def test_what_is_left_of_a_battery_is_estimated(volts: tuple[float, ...], percent: int) -> None:
+    """By its cells, which are counted while it is full: it does not become a smaller one as it runs down."""
+    state = told(Vehicle(), HARAKIRI, STATUS=status())
+    for voltage in volts:
+        told(state, HARAKIRI, ANALOG=struct.pack("<BHH", round(voltage * 10), 0, 0))
+    assert made(make.sys_status(at(state))).battery_remaining == percent
+    assert made(make.battery_status(at(state))).battery_remaining == percent
+
+
+def test_a_receiver_is_healthy_while_it_has_a_signal() -> None:
+    state = told(Vehicle(), HARAKIRI, STATUS=status())
+    bit = m.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    assert not made(make.sys_status(at(state))).onboard_control_sensors_present & bit
+    told(state, HARAKIRI, RC=struct.pack("<8H", *[1500] * 8))
+    assert made(make.sys_status(at(state))).onboard_control_sensors_health & bit
+    told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 500))
+    told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
+    power = made(make.sys_status(at(state)))
+    assert power.onboard_control_sensors_present & bit
+    assert not power.onboard_control_sensors_health & bit
+
+
+@pytest.mark.parametrize(
+    ("flags", "height_cm", "climb_cms", "speed", "landed"),
+    [
+        (1, 2000, 0, 0, m.MAV_LANDED_STATE_ON_GROUND),
+        (1 << 5, 20, 0, 0, m.MAV_LANDED_STATE_ON_GROUND),
+        (1 << 5, 200, 0, 0, m.MAV_LANDED_STATE_IN_AIR),
+        (1 << 5, 20, 80, 0, m.MAV_LANDED_STATE_IN_AIR),
+        (1 << 5, -200, 0, 300, m.MAV_LANDED_STATE_IN_AIR),
+    ],
+)
+def test_in_the_air_and_on_the_ground(flags: int, height_cm: int, climb_cms: int, speed: int, landed: int) -> None:
+    state = told(Vehicle(), HARAKIRI, STATUS=status(flags=flags), RAW_GPS=gps(speed=speed))
+    told(state, HARAKIRI, ALTITUDE=struct.pack("<ih", height_cm, climb_cms))
+    assert made(make.extended_sys_state(at(state))).landed_state == landed
+
+
+def test_motors_and_local_position() -> None:
+    state = told(
+        Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(speed=0), MOTOR=struct.pack("<8H", *range(1000, 1008))
+    )
+    motors = made(make.servo_output_raw(at(state)))
+    assert [getattr(motors, f"servo{n}_raw") for n in range(1, 9)] == [*range(1000, 1008)]
+    told(state, HARAKIRI, STATUS=status(flags=1 << 5), ALTITUDE=struct.pack("<ih", 1500, 20))
+    told(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 1797, more=struct.pack("<H", 0)))
+    local = made(make.local_position_ned(at(state)))
+    assert (local.x, local.y, local.z) == (pytest.approx(20, abs=0.1), pytest.approx(0, abs=0.1), -15)
+    assert (local.vx, local.vy, local.vz) == (pytest.approx(2.5), pytest.approx(0), pytest.approx(-0.2))
+
+
+@pytest.mark.parametrize(("roll", "pitch", "yaw"), [(0, 0, 0), (30, 0, 0), (0, -20, 0), (10, 20, 170), (-5, 3, -90)])
+def test_the_quaternion_is_the_same_attitude(roll: int, pitch: int, yaw: int) -> None:
+    state = told(Vehicle(), HARAKIRI, STATUS=status(), ATTITUDE=attitude(roll * 10, -pitch * 10, yaw))
+    sent = made(make.attitude_quaternion(at(state)))
+    w, x, y, z = sent.q1, sent.q2, sent.q3, sent.q4
+    assert math.degrees(math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))) == pytest.approx(roll)
+    assert math.degrees(math.asin(2 * (w * y - z * x))) == pytest.approx(pitch)
+    assert math.degrees(math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))) == pytest.approx(yaw)

@@ -11,7 +11,10 @@ export function showOverview(state) {
   const rates = ratesOf(state.traffic);
   byId("headline").textContent = headline(state, armed);
   byId("headline").className = state.link.flight_controller === null ? "bad" : "good";
+  const stale = state.status.age_s > 1.5;
+  byId("vehicle").classList.toggle("stale", stale);
   pairs("vehicle", [
+    ...(stale ? [["Last heard", `${Math.round(state.status.age_s)} s ago`, "bad"]] : []),
     ["State", armed === null ? "unknown" : armed ? "ARMED" : "disarmed", armed ? "bad" : ""],
     ["Mode", state.status.mode ?? "–"],
     ["Battery", battery(state.battery), ""],
@@ -47,8 +50,8 @@ function headline(state, armed) {
   return `${state.link.flight_controller}, ${armed === null ? state.link.state : armed ? "ARMED" : "disarmed"}`;
 }
 
-function battery({ voltage_v: volts, current_a: amperes, drawn_mah: drawn }) {
-  const more = [amperes === null ? "" : `${amperes.toFixed(1)} A`, drawn === null ? "" : `${drawn} mAh drawn`];
+function battery({ voltage_v: volts, current_a: amperes, drawn_mah: drawn, remaining_percent: percent }) {
+  const more = [percent === null ? "" : `about ${percent} %`, amperes === null ? "" : `${amperes.toFixed(1)} A`, drawn === null ? "" : `${drawn} mAh drawn`];
   return [known(volts, " V", 1), ...more.filter(Boolean)].join(", ");
 }
 

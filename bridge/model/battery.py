@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Estimates for a LiPo battery of which only the voltage is known. Under load the voltage sags, and both read low."""
+
+from itertools import pairwise
+from math import ceil
+
+#: No charged cell has more.
+_FULL_CELL_V = 4.25
+#: Volts a cell at rest -> percent left.
+_CURVE = ((3.3, 0), (3.5, 5), (3.7, 20), (3.8, 45), (3.9, 65), (4.0, 80), (4.2, 100))
+
+
+def least_cells(voltage_v: float) -> int:
+    """The fewest cells that can have this voltage; right for a battery that was plugged in charged."""
+    return ceil(voltage_v / _FULL_CELL_V)
+
+
+def remaining_percent(voltage_v: float, cells: int) -> int:
+    """What is left, 0..100."""
+    cell_v = voltage_v / cells
+    for (low_v, low), (high_v, high) in pairwise(_CURVE):
+        if cell_v < high_v:
+            return round(max(low + (high - low) * (cell_v - low_v) / (high_v - low_v), 0))
+    return 100
