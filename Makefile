@@ -16,6 +16,7 @@
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
 #   make cli-page    write docs/cli.md anew
+#   make inav-page   write the table of docs/inav.md anew
 #   make config-sample  write systemd/config.toml and the keys of docs/configuration.md anew
 #   make zenoh-schemas  write service/zenoh_link/schemas/ anew, from the types that the payloads are made of
 #   make clean          remove everything that the above have made
@@ -28,7 +29,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench pictures real-board soak deb deb-trial image-check lock message-table config-sample cli-page zenoh-schemas clean
+.PHONY: demo test lint bench pictures real-board soak deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
 
 # Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -117,6 +118,12 @@ message-table: $(VENV)/.test-ready
 
 cli-page: $(VENV)/.test-ready
 	$(BIN)/python -m service.cli.cli_page > docs/cli.md
+
+# The table of what becomes of each command on INAV and MultiWii.
+inav-page: $(VENV)/.test-ready
+	PYTHONPATH=. $(BIN)/python tests/simulator/nav_rows.py > docs/inav.table
+	sed -i -e '/begin: make inav-page/,/end: make inav-page/{/make inav-page -->/!d}' -e '/begin: make inav-page/r docs/inav.table' docs/inav.md
+	rm docs/inav.table
 
 # The sample file of all settings, and their reference page.
 config-sample: $(VENV)/.test-ready
