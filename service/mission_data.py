@@ -8,6 +8,7 @@ from typing import Any, TypeGuard
 
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
+from protocols.mission_record import identify
 
 Json = dict[str, Any]
 
@@ -28,12 +29,15 @@ def mission_items(data: object) -> list[MissionItem]:
 
 
 def verdict_data(verdict: Verdict[Any]) -> Json:
-    """Return what the rules say of a list."""
+    """The rules' verdict on a list; `count` and `checksum` identify the records that it becomes."""
+    identity = identify(verdict.records)
     return {
         "result": verdict.result.name,
         "ack": f"MAV_MISSION_{verdict.ack.name}",
         "items": [asdict(item) for item in verdict.items],
         "records": [record.pack().hex() for record in verdict.records],
+        "count": identity.count,
+        "checksum": f"{identity.checksum:08x}",
         "findings": [asdict(finding) for finding in verdict.findings],
     }
 

@@ -17,6 +17,7 @@ from bridge.model.finding import DROPPED
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem
+from protocols.mission_record import identify
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_json, print_table
@@ -102,4 +103,5 @@ def _summary(sent: int, verdict: Verdict[Any]) -> str:
         return f"MAV_MISSION_{verdict.ack.name}, {verdict.findings[-1].text()}"
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
     changed = len(verdict.findings) - dropped
-    return f"{len(verdict.items)} of {sent} items stored, {dropped} dropped, values changed: {changed}"
+    stored = f"{len(verdict.items)} of {sent} items stored, {dropped} dropped, values changed: {changed}"
+    return f"{stored}; {identify(verdict.records)}"

@@ -12,8 +12,26 @@ from service.fleet.vehicle import Vehicle
 _UNKNOWN = "-"
 
 
-def fleet_table(fleet: Sequence[Vehicle], ages_s: Sequence[float | None] = ()) -> Table:
-    """Make one row per bridge; `ages_s`: how long ago each was heard, if that is to be shown."""
+def watch_table(rows: Sequence[tuple[Vehicle, float | None, str]]) -> Table:
+    """One row per bridge, each on one line of 80 columns: vehicle, age of its state, problem."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    table.add_column("Vehicle", no_wrap=True, overflow="ellipsis", max_width=20)
+    table.add_column("Armed", no_wrap=True)
+    for title in ("Battery", "Height"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("Mission", no_wrap=True)
+    table.add_column("Heard", justify="right", no_wrap=True)
+    table.add_column("Problem, or mode", no_wrap=True, overflow="ellipsis", max_width=20)
+    for vehicle, age_s, problem in rows:
+        name, _, armed, battery, _, _, height, mission = _cells(vehicle)
+        age = Text(_UNKNOWN if age_s is None else f"{age_s:.0f} s")
+        last = Text(problem, style="yellow") if problem else Text(vehicle.mode or _UNKNOWN)
+        table.add_row(name, armed, battery, height, mission, age, last)
+    return table
+
+
+def fleet_table(fleet: Sequence[Vehicle]) -> Table:
+    """Make one row per bridge."""
     caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, caption=caption, caption_justify="left")
     table.add_column("Vehicle", overflow="fold")
@@ -22,14 +40,8 @@ def fleet_table(fleet: Sequence[Vehicle], ages_s: Sequence[float | None] = ()) -
     for title in ("Battery", "Latitude", "Longitude", "Height"):
         table.add_column(title, justify="right", no_wrap=True)
     table.add_column("Mission", no_wrap=True)
-    if ages_s:
-        table.add_column("Heard", justify="right", no_wrap=True)
-    for row, vehicle in enumerate(fleet):
-        cells = _cells(vehicle)
-        if ages_s:
-            age_s = ages_s[row]
-            cells.append(Text(_UNKNOWN if age_s is None else f"{age_s:.0f} s"))
-        table.add_row(*cells)
+    for vehicle in fleet:
+        table.add_row(*_cells(vehicle))
     return table
 
 

@@ -5,13 +5,14 @@
 """
 
 import queue
+from collections import deque
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
 import zenoh
 
 from service.fleet.payload import decode, part, text, whole
-from service.fleet.session import ask, send_query
+from service.fleet.session import AT_ONCE, ask, send_query
 from service.fleet.vehicle import BridgeState, bridge_of, replier
 from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
@@ -36,6 +37,7 @@ class PushState:
     total: int | None = None
     result: Json | None = None
     error: str | None = None
+    is_begun: bool = False
 
     @property
     def is_done(self) -> bool:
@@ -66,9 +68,20 @@ class FleetPush:
         return [name for name, progress in self.vehicles.items() if not progress.is_done]
 
     @property
+    def running(self) -> list[str]:
+        """The vehicles that were begun and are not done."""
+        return [name for name, progress in self.vehicles.items() if progress.is_begun and not progress.is_done]
+
+    @property
     def failed(self) -> list[PushState]:
         """Those that do not hold the mission."""
         return [progress for progress in self.vehicles.values() if progress.has_failed]
+
+    def stop(self, why: str) -> None:
+        """Leave those alone that were not begun."""
+        for progress in self.vehicles.values():
+            if not progress.is_done and not progress.is_begun:
+                progress.error = f"not begun: {why}"
 
     def replied(self, vehicle: str, reply: Json | None) -> None:
         """Take a reply: progress, or the result of a mission that was accepted."""
@@ -111,8 +124,13 @@ def push(
     bridges: Collection[BridgeState],
     mission: bytes,
     show: Callable[[FleetPush], None],
+    *,
+    staged: bool = False,
 ) -> None:
-    """Send the mission to all and wait until each is done; `show` is called whenever something has changed."""
+    """Send the mission to all and wait until each is done; `show` is called whenever something has changed.
+
+    `staged`: a tenth of the vehicles first, then the others; after a failure no other one is begun.
+    """
     events: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
 
     def taken(name: str, reply: zenoh.Reply) -> None:
@@ -134,6 +152,7 @@ def push(
             fleet.ended(name, is_alive=any(replier(reply) in bridges for reply in state))
 
     def start(name: str) -> None:
+        fleet.vehicles[name].is_begun = True
         send_query(
             session,
             full(prefix, name, UPLOAD.suffix),
@@ -144,9 +163,20 @@ def push(
         )
 
     with session.liveliness().declare_subscriber(full(prefix, "*", f"{ALIVE}/*"), token):
-        for name in fleet.waiting:
-            start(name)
         show(fleet)
-        while fleet.waiting:
-            events.get()()
-            show(fleet)
+        for stage in _stages(fleet.waiting, staged=staged):
+            waiting = deque(stage)
+            while any(not fleet.vehicles[name].is_done for name in stage):
+                if staged and (failed := fleet.failed):
+                    fleet.stop(f"{failed[0].vehicle} had failed")
+                    waiting.clear()
+                while waiting and len(fleet.running) < AT_ONCE:
+                    start(waiting.popleft())
+                if fleet.running:
+                    events.get()()
+                show(fleet)
+
+
+def _stages(names: list[str], *, staged: bool) -> list[list[str]]:
+    first = max(1, len(names) // 10) if staged else 0
+    return [names[:first], names[first:]]

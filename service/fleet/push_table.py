@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How a push to the fleet goes, and how it went, for a terminal."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich import box
@@ -11,8 +11,9 @@ from rich.progress import Progress as Bars
 from rich.table import Table
 from rich.text import Text
 
-from service.fleet.payload import text
+from service.fleet.payload import part, text, whole
 from service.fleet.push import FleetPush, PushState
+from service.fleet.trial import Trial
 from service.mission_data import Json
 
 
@@ -39,9 +40,38 @@ def push_table(fleet: FleetPush) -> Table:
     table.add_column("Push", no_wrap=True)
     table.add_column("What it says")
     for progress in fleet.vehicles.values():
-        result = Text("failed", style="bold red") if progress.has_failed else Text("verified", style="green")
-        table.add_row(Text(progress.vehicle), result, Text(_words(progress)))
+        table.add_row(Text(progress.vehicle), _result(progress), Text(_words(progress)))
     return table
+
+
+def _result(progress: PushState) -> Text:
+    if progress.has_failed:
+        return Text("failed", style="bold red")
+    if progress.is_done:
+        return Text("verified", style="green")
+    return Text("under way" if progress.is_begun else "not begun", style="yellow")
+
+
+def trial_table(trials: Sequence[Trial]) -> Table:
+    """Make one row per vehicle: what the mission would become there, and each correction below it."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    table.add_column("Vehicle", overflow="fold")
+    table.add_column("Records", justify="right", no_wrap=True)
+    table.add_column("Checksum", no_wrap=True)
+    table.add_column("Holds it", no_wrap=True)
+    table.add_column("What it says")
+    for trial in trials:
+        said = [trial.error] if trial.error else [_correction(finding) for finding in trial.findings]
+        count = "" if trial.count is None else str(trial.count)
+        holds = Text("yes", style="green") if trial.is_held else Text("no", style="bold red")
+        table.add_row(Text(trial.vehicle), count, trial.checksum or "", holds, Text("\n".join(said)))
+    return table
+
+
+def _correction(finding: object) -> str:
+    data = finding if isinstance(finding, dict) else {}
+    was, becomes = (str(part(data, name)) for name in ("was", "becomes"))
+    return f"WP {whole(data, 'seq')}: {text(data, 'field')} {was} -> {becomes} ({text(data, 'why')})"
 
 
 def push_data(fleet: FleetPush) -> Json:
@@ -64,7 +94,8 @@ def push_summary(fleet: FleetPush) -> str:
 def _words(progress: PushState) -> str:
     if progress.error is not None:
         return progress.error
-    assert progress.result is not None
+    if progress.result is None:
+        return f"{progress.records} of {progress.total} records" if progress.total else ""
     findings = progress.result.get("findings")
     count = len(findings) if isinstance(findings, list) else 0
     corrections = f"; {count} correction{'s' if count > 1 else ''}" if count else ""

@@ -15,7 +15,10 @@ _PATIENCE_S = 2.0
 
 def alive(session: zenoh.Session, prefix: str) -> set[BridgeState]:
     """Return the bridges whose liveliness tokens are there."""
-    replies = session.liveliness().get(full(prefix, "*", f"{ALIVE}/*"), timeout=_PATIENCE_S)
+    replies = list(session.liveliness().get(full(prefix, "*", f"{ALIVE}/*"), timeout=_PATIENCE_S))
+    if any(reply.err is not None for reply in replies):
+        # zenoh's own error, when time is over: an empty list would be a lie.
+        raise FleetError(f"the router did not say within {_PATIENCE_S:.0f} s who is alive: it hangs, or the way is bad")
     samples = [reply.ok for reply in replies if reply.ok is not None]
     return {bridge for sample in samples if (bridge := bridge_of(str(sample.key_expr), prefix)) is not None}
 

@@ -6,17 +6,22 @@ A client, because sessions in mode peer that meet at a router only do not see ea
 
 import json
 import queue
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
+from service.fleet.refusal import refusal
 from service.zenoh_link.configuration import connect_endpoints, in_short, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
+from service.zenoh_link.keys import full
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
+#: Vehicles that are asked or written to at the same time: each holds a mission file on the way.
+AT_ONCE = 50
 #: Somebody who does not speak zenoh is given up after so long; zenoh's own patience is 10 s.
 _OPEN_TIMEOUT_MS = 3000
 
@@ -46,7 +51,7 @@ def open_session(address: FleetAddress) -> zenoh.Session:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        trouble = endpoint_trouble(endpoints, tls_files(config))
+        trouble = refusal(config) or endpoint_trouble(endpoints, tls_files(config))
         raise FleetError(f"no way into the fleet; {trouble}") from error
 
 
@@ -58,6 +63,46 @@ def ask(
     send_query(session, selector, replies.put, lambda: replies.put(None), payload, timeout_s)
     while (reply := replies.get()) is not None:
         yield reply
+
+
+def ask_each(
+    session: zenoh.Session,
+    prefix: str,
+    names: Iterable[str],
+    suffix: str,
+    timeout_s: float,
+    payload: bytes | None = None,
+) -> Iterator[tuple[str, zenoh.Reply]]:
+    """Ask vehicles one by one, some at a time, and yield each one's replies as they come."""
+    replies: queue.SimpleQueue[tuple[str, zenoh.Reply | None]] = queue.SimpleQueue()
+    waiting, running = deque(names), 0
+    while waiting or running:
+        while waiting and running < AT_ONCE:
+            _start(session, full(prefix, waiting[0], suffix), waiting.popleft(), replies, payload, timeout_s)
+            running += 1
+        name, reply = replies.get()
+        if reply is None:
+            running -= 1
+        else:
+            yield name, reply
+
+
+def _start(
+    session: zenoh.Session,
+    selector: str,
+    name: str,
+    replies: "queue.SimpleQueue[tuple[str, zenoh.Reply | None]]",
+    payload: bytes | None,
+    timeout_s: float,
+) -> None:
+    send_query(
+        session,
+        selector,
+        lambda reply: replies.put((name, reply)),
+        lambda: replies.put((name, None)),
+        payload,
+        timeout_s,
+    )
 
 
 def send_query(

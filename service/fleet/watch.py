@@ -5,16 +5,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import zenoh
 
-from service.fleet.payload import decode
+from service.fleet.payload import decode, number
 from service.fleet.session import send_query
-from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, vehicle_of
+from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, replier, vehicle_of
 from service.mission_data import Json
-from service.zenoh_link.keys import ALIVE, STATE, full
+from service.zenoh_link.keys import ALIVE, STATE, full, vehicle_in
 
 _PATIENCE_S = 2.0
+#: No queue holds samples for longer: then the vehicle's clock was set.
+_CLOCK_WAS_SET_S = 60.0
 
 
 class Watch:
@@ -25,7 +28,7 @@ class Watch:
         self._clock = clock
         self._lock = threading.Lock()
         self._bridges: set[BridgeState] = set()
-        self._states: dict[str, tuple[Json, float]] = {}
+        self._states: dict[str, _Heard] = {}
 
     def token(self, sample: zenoh.Sample) -> None:
         """Take note that somebody came or went."""
@@ -39,25 +42,57 @@ class Watch:
                 self._bridges.discard(bridge)
 
     def sample(self, sample: zenoh.Sample) -> None:
-        """Take a state."""
-        state = decode(sample)
-        if state is not None:
-            with self._lock:
-                self._states[str(sample.key_expr).split("/")[1]] = (state, self._clock())
-
-    def look(self) -> tuple[list[Vehicle], list[float | None]]:
-        """Return who is alive, by name, and how long ago each was heard."""
-        with self._lock:
-            now = self._clock()
-            told = {bridge: self._states.get(bridge.vehicle) for bridge in self._bridges}
-        fleet = as_fleet(vehicle_of(bridge, entry[0] if entry else None) for bridge, entry in told.items())
-        heard = {bridge.vehicle: entry[1] for bridge, entry in told.items() if entry}
-        return fleet, [now - heard[vehicle.name] if vehicle.name in heard else None for vehicle in fleet]
+        """Take a state that a vehicle published."""
+        self._take(sample, None)
 
     def reply(self, reply: zenoh.Reply) -> None:
-        """Take the state of somebody who was asked for it."""
-        if reply.ok is not None:
-            self.sample(reply.ok)
+        """Take the state that a bridge replied with. A storage's may be of a vehicle that is long gone."""
+        bridge = replier(reply)
+        if reply.ok is not None and bridge is not None:
+            self._take(reply.ok, bridge)
+
+    def look(self) -> tuple[list[Vehicle], list[float | None]]:
+        """The vehicles that are alive, by name, and the age of each one's newest state."""
+        with self._lock:
+            now = self._clock()
+            bridges = set(self._bridges)
+            states = {
+                name: heard for name, heard in self._states.items() if heard.replier is None or heard.replier in bridges
+            }
+        fleet = as_fleet(
+            vehicle_of(bridge, states[bridge.vehicle].state if bridge.vehicle in states else None) for bridge in bridges
+        )
+        ages_s = [now - states[each.name].made_at if each.name in states else None for each in fleet]
+        return fleet, ages_s
+
+    def _take(self, sample: zenoh.Sample, bridge: BridgeState | None) -> None:
+        state = decode(sample)
+        if state is None:
+            return
+        with self._lock:
+            now = self._clock()
+            name = vehicle_in(sample.key_expr)
+            made_s = number(state, "time_s")
+            offset_s = now - (now if made_s is None else made_s)
+            before = self._states.get(name)
+            least_s = offset_s if before is None else min(offset_s, before.offset_s)
+            if offset_s - least_s > _CLOCK_WAS_SET_S:
+                least_s = offset_s
+            self._states[name] = _Heard(state, now - (offset_s - least_s), least_s, bridge)
+
+
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    """`made_at`: when the vehicle made the state, by our clock.
+
+    `offset_s`: the least difference seen between our clock and its own. What a sample took beyond that, it spent in
+    queues: a backlog is shown as old as it is, whatever the clocks say.
+    """
+
+    state: Json
+    made_at: float
+    offset_s: float
+    replier: BridgeState | None
 
 
 @contextmanager

@@ -108,6 +108,8 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
             "ack": {"type": "string", "pattern": "^MAV_MISSION_"},
             "items": items,
             "records": {"type": "array", "items": {"type": "string", "pattern": "^([0-9a-f]{2})+$"}},
+            "count": {"type": "integer", "minimum": 0, "description": "of the records"},
+            "checksum": _CHECKSUM,
             "findings": findings,
         }
     )

@@ -76,7 +76,7 @@ def test_strict_counts_changes_as_rejection(files: dict[str, Path]) -> None:
 def test_json_has_one_object_a_file_with_the_promised_keys(files: dict[str, Path]) -> None:
     result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
     accepted, rejected, cleared, missing = objects(result)
-    keys = ["file", "result", "ack", "items", "records", "findings"]
+    keys = ["file", "result", "ack", "items", "records", "count", "checksum", "findings"]
     assert list(accepted) == list(rejected) == list(cleared) == keys
     assert (accepted["file"], accepted["result"], accepted["ack"]) == (str(FIELD), "ACCEPTED", "MAV_MISSION_ACCEPTED")
     assert (rejected["result"], rejected["ack"]) == ("REJECTED", "MAV_MISSION_INVALID")
@@ -121,7 +121,7 @@ def test_a_person_sees_sent_beside_stored_and_why() -> None:
     for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
         assert words in output
     assert "WP 1: Alt changed from 20 to 15 m (take-off 2..15)" in output
-    assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: 7" in output
+    assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: 7; 13 records, checksum " in output
 
 
 def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fleet enroll`: a new member's login, and the router's configuration that lets it in."""
+
+from pathlib import Path
+
+import click
+
+from service.cli.printing import fail
+from service.fleet.enrolment import EnrolmentError, FleetFolder, Role
+from service.fleet.options import PATH
+from service.zenoh_link.settings import DEFAULT_PREFIX, ZenohSettingsError
+
+
+@click.command()
+@click.argument("name")
+@click.option(
+    "--role",
+    type=click.Choice([each.value for each in Role]),
+    default=Role.VEHICLE.value,
+    show_default=True,
+    help="A vehicle speaks under its own name alone, a pilot may do everything, a guest only look.",
+)
+@click.option("--folder", type=PATH, default=Path("fleet"), show_default=True, help="Where the fleet's files are.")
+@click.option("--prefix", default=DEFAULT_PREFIX, show_default=True, help="First part of the vehicles' keys.")
+@click.option(
+    "--router",
+    default="tcp/router.local:7447",
+    show_default=True,
+    metavar="ENDPOINT",
+    help="Where members reach the router: tls/... for certificates, tcp/... for passwords.",
+)
+def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None:
+    """Add a vehicle or a person to a fleet: makes the login and the router's access control.
+
+    The router reads both at its start. Names that are enrolled again keep their login.
+    """
+    fleet = FleetFolder(folder.absolute(), prefix, router)
+    try:
+        files = fleet.enroll(name, Role(role))
+    except (EnrolmentError, ZenohSettingsError) as error:
+        fail(str(error))
+    click.echo(f"Copy to {name}: {', '.join(str(file) for file in files)}")
+    if role == Role.VEHICLE.value:
+        click.echo(f'In its configuration file:\n\n[zenoh]\nvehicle = "{name}"\nconfig_file = "{files[0].name}"')
+    if fleet.is_tls:
+        click.echo(f"\nCertificates: python make_certificates.py {folder} ROUTER_HOST {name} (examples/zenoh-tls)")
+    click.echo(f"\nThen restart the router with {fleet.path / 'router.json5'}.")

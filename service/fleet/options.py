@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all fleet commands share: where the fleet is, which vehicles are meant, and the session."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+import zenoh
+
+from service.cli.printing import fail
+from service.fleet.conditions import FIELDS, parse_condition
+from service.fleet.session import DEFAULT_ENDPOINT, FleetAddress, FleetError, open_session
+from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError, check_name
+
+#: As a shell's, after Ctrl-C.
+INTERRUPTED = 130
+PATH = click.Path(path_type=Path)
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def address_options(command: F) -> F:
+    """Add the options that say where the fleet is."""
+    for option in (
+        click.option("--config", type=PATH, help="The daemon's configuration file: its [zenoh] table says the rest."),
+        click.option("--prefix", help="First part of the vehicles' keys.", show_default="fleet"),
+        click.option("--zenoh-config", type=PATH, help="zenoh configuration file, for TLS, passwords and the like."),
+        click.option(
+            "--connect",
+            metavar="ENDPOINT",
+            multiple=True,
+            show_default=DEFAULT_ENDPOINT,
+            help="Router, or one vehicle that listens; of several the first that answers.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+vehicle_option = click.option(
+    "--vehicle", "names", metavar="NAME", multiple=True, help="This vehicle; several at once."
+)
+all_option = click.option("--all", "to_all", is_flag=True, help="Every vehicle that is alive.")
+
+
+def _conditions(_context: click.Context, _option: click.Parameter, texts: tuple[str, ...]) -> list[Any]:
+    try:
+        return [parse_condition(text) for text in texts]
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
+where_option = click.option(
+    "--where",
+    "conditions",
+    metavar="CONDITION",
+    multiple=True,
+    callback=_conditions,
+    help=f"Only vehicles like this, as in armed=true, battery_v<10.5 or name=kite*; several: all of them. "
+    f"Fields: {', '.join(FIELDS)}.",
+)
+
+
+@contextmanager
+def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
+    """Join the fleet for one command. A failure ends the program with one sentence, Ctrl-C with none."""
+    address = _address(**where)
+    try:
+        with open_session(address) as session:
+            yield session, address.prefix
+    except FleetError as error:
+        fail(str(error))
+    except KeyboardInterrupt:
+        raise SystemExit(INTERRUPTED) from None
+
+
+def _address(
+    connect: tuple[str, ...], zenoh_config: Path | None, prefix: str | None, config: Path | None
+) -> FleetAddress:
+    """Where the fleet is: options go over the daemon's file."""
+    try:
+        daemon = ZenohSettings() if config is None else _daemon_settings(config)
+        address = FleetAddress(prefix or daemon.prefix, connect or daemon.connect, zenoh_config or daemon.config_file)
+        check_name("prefix", address.prefix)
+    except ZenohSettingsError as error:
+        raise click.UsageError(str(error)) from error
+    return address
+
+
+def _daemon_settings(config: Path) -> ZenohSettings:
+    # Here, because most commands do without them and without all that they load.
+    from service.settings import SettingsError, load_settings
+
+    try:
+        # Its flight controller is none of our business, but a file need not name one.
+        found = load_settings(config, "sim:", (), None).zenoh
+    except SettingsError as error:
+        raise ZenohSettingsError(str(error)) from error
+    if found is None:
+        raise ZenohSettingsError(f"{config} has no [zenoh] table")
+    return found

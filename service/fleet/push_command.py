@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fleet push` and `fleet verify`: one mission for many vehicles."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+import zenoh
+
+from protocols.mission_file import MissionFileError, read_mission_file
+from service.cli.mission_source import mission_bytes
+from service.cli.printing import print_json, print_table
+from service.fleet.conditions import Condition, matching
+from service.fleet.options import (
+    INTERRUPTED,
+    PATH,
+    address_options,
+    all_option,
+    fleet_session,
+    json_option,
+    vehicle_option,
+    where_option,
+)
+from service.fleet.push import FleetPush, push
+from service.fleet.push_table import progress_bars, push_data, push_summary, push_table, trial_table
+from service.fleet.roll_call import alive, chosen, roll_call
+from service.fleet.session import FleetError
+from service.fleet.trial import Trial, try_mission
+
+_UNREADABLE = 2
+_GOES_ON = "stopped; transfers that are under way go on there: `naze-bridge fleet list` shows what each vehicle holds"
+
+
+@click.command("push")
+@click.argument("file", type=PATH)
+@vehicle_option
+@all_option
+@where_option
+@click.option("--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure.")
+@click.option("--dry-run", is_flag=True, help="Show what the mission would become on each vehicle; write nothing.")
+@address_options
+@json_option
+def push_mission(
+    file: Path,
+    names: tuple[str, ...],
+    to_all: bool,
+    conditions: list[Condition],
+    staged: bool,
+    dry_run: bool,
+    as_json: bool,
+    **where: Any,
+) -> None:
+    """Write a mission file to vehicles, each by its own rules, and verify it there.
+
+    A vehicle that fails does not stop the others, unless --staged. Exit code 0: all hold it (--dry-run: all would take
+    it), 1: one does not, 2: the file is unreadable.
+    """
+    mission, item_count = _read(file, names, to_all)
+    with fleet_session(where) as (session, prefix):
+        bridges = alive(session, prefix)
+        meant = _meant(session, prefix, names, conditions)
+        if dry_run:
+            _show_trials(try_mission(session, prefix, meant, mission), as_json)
+            return
+        delivery = FleetPush.of(meant, bridges)
+        try:
+            with progress_bars(delivery, item_count) as show:
+                push(session, prefix, delivery, bridges, mission, show, staged=staged)
+        except KeyboardInterrupt:
+            print_table(push_table(delivery))
+            click.echo(f"naze-bridge: {_GOES_ON}", err=True)
+            raise SystemExit(INTERRUPTED) from None
+    if as_json:
+        print_json(push_data(delivery))
+    else:
+        print_table(push_table(delivery))
+        click.echo(push_summary(delivery))
+    if delivery.failed:
+        raise SystemExit(1)
+
+
+@click.command("verify")
+@click.argument("file", type=PATH)
+@vehicle_option
+@all_option
+@where_option
+@address_options
+@json_option
+def verify_mission(
+    file: Path, names: tuple[str, ...], to_all: bool, conditions: list[Condition], as_json: bool, **where: Any
+) -> None:
+    """Compare what vehicles hold with a mission file, by checksum, as each one's own rules would store it.
+
+    Exit code 0: all hold it, 1: one does not, 2: the file is unreadable.
+    """
+    mission, _ = _read(file, names, to_all)
+    with fleet_session(where) as (session, prefix):
+        trials = try_mission(session, prefix, _meant(session, prefix, names, conditions), mission)
+    held = sum(trial.is_held for trial in trials)
+    if as_json:
+        print_json({"vehicles": [asdict(each) | {"is_held": each.is_held} for each in trials]})
+    else:
+        print_table(trial_table(trials))
+        click.echo(f"{held} of {len(trials)} vehicles hold the mission")
+    if held < len(trials):
+        raise SystemExit(1)
+
+
+def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]:
+    if bool(names) == to_all:
+        raise click.UsageError("say for which vehicles the mission is: --vehicle NAME, or --all")
+    try:
+        mission = mission_bytes(file)
+        return mission, len(read_mission_file(mission, click.format_filename(file)))
+    except MissionFileError as error:
+        click.echo(f"naze-bridge: {error}", err=True)
+        raise SystemExit(_UNREADABLE) from error
+
+
+def _meant(session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]) -> list[str]:
+    found = chosen(alive(session, prefix), names, prefix)
+    if not conditions:
+        return found
+    like = {vehicle.name for vehicle in matching(roll_call(session, prefix), conditions)}
+    if not like & set(found):
+        raise FleetError(f"none of {len(found)} vehicles is like this")
+    return [name for name in found if name in like]
+
+
+def _show_trials(trials: list[Trial], as_json: bool) -> None:
+    failed = sum(trial.error is not None for trial in trials)
+    if as_json:
+        print_json({"vehicles": [asdict(each) for each in trials], "failed": failed})
+    else:
+        print_table(trial_table(trials))
+        click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would take the mission; nothing was written")
+    if failed:
+        raise SystemExit(1)

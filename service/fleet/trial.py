@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a mission would become on each vehicle, by its own rules: `fleet push --dry-run` and `fleet verify`."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from service.fleet.payload import decode, part, text, whole
+from service.fleet.session import ask_each
+from service.zenoh_link.keys import CHECK, MISSION_CURRENT
+
+_TIMEOUT_S = 15.0
+_SILENT = "it takes no commands: they are off there (zenoh.commands), or the router's access control denies them to you"
+
+
+@dataclass(slots=True)
+class Trial:
+    """One vehicle's answer. `checksum`: of the records that the mission would become; `held`: of those it holds.
+
+    `error`: why nothing is known, or why it would reject the mission.
+    """
+
+    vehicle: str
+    error: str | None = _SILENT
+    count: int | None = None
+    checksum: str | None = None
+    held: str | None = None
+    findings: tuple[Any, ...] = ()
+
+    @property
+    def is_held(self) -> bool:
+        """True if the vehicle holds the mission, as far as the checksum tells."""
+        return self.error is None and self.checksum is not None and self.checksum == self.held
+
+
+def try_mission(session: zenoh.Session, prefix: str, names: Iterable[str], mission: bytes) -> list[Trial]:
+    """Have each vehicle check the mission, and ask what it holds."""
+    trials = {name: Trial(name) for name in names}
+    for name, reply in ask_each(session, prefix, trials, CHECK.suffix, _TIMEOUT_S, mission):
+        _take(trials[name], reply)
+    for name, reply in ask_each(session, prefix, trials, MISSION_CURRENT.suffix, _TIMEOUT_S):
+        if reply.ok is not None and (data := decode(reply.ok)) is not None:
+            trials[name].held = text(data, "checksum")
+    return list(trials.values())
+
+
+def _take(trial: Trial, reply: zenoh.Reply) -> None:
+    answer = reply.ok or reply.err
+    data = None if answer is None else decode(answer)
+    if data is None:
+        trial.error = _SILENT
+        return
+    result = part(data, "result")
+    if reply.ok is None or not isinstance(result, dict):
+        trial.error = text(data, "error") or "it refuses without a reason"
+        return
+    findings = part(result, "findings")
+    trial.findings = tuple(findings) if isinstance(findings, list) else ()
+    trial.count, trial.checksum = whole(result, "count"), text(result, "checksum")
+    trial.error = None if text(result, "result") != "REJECTED" else f"rejected: {_why(trial.findings)}"
+
+
+def _why(findings: tuple[Any, ...]) -> str:
+    last = findings[-1] if findings and isinstance(findings[-1], dict) else {}
+    return text(last, "why") or "without a reason"

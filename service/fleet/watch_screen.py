@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What `fleet watch` shows: a screen for a person, lines for a program."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import zenoh
+from rich.console import Console, Group
+from rich.live import Live
+from rich.text import Text
+
+from service.cli.printing import print_json
+from service.fleet.conditions import Condition
+from service.fleet.fleet_table import watch_table
+from service.fleet.keyboard import scrolling, wait_for_scroll
+from service.fleet.session import is_connected
+from service.fleet.vehicle import Vehicle
+from service.fleet.watch import Watch
+
+_REFRESH_S = 0.5
+#: The slowest profile sends the state every 15 s.
+SILENT_S = 40.0
+#: Lines that are no vehicle's: counts, column titles and rule, the last line, one that stays empty.
+_OTHER_LINES = 5
+_LINKED = ("MSP", "MAVLink")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A vehicle on the screen; `age_s`: of its newest state, None if there is none."""
+
+    vehicle: Vehicle
+    age_s: float | None
+
+    @property
+    def problem(self) -> str:
+        """Why it needs a look; empty if it does not."""
+        if self.vehicle.bridges > 1:
+            return f"{self.vehicle.bridges} bridges use this name"
+        if not self.vehicle.answers:
+            return "sends no state"
+        if self.age_s is not None and self.age_s > SILENT_S:
+            return "silent"
+        return "" if self.vehicle.protocol in _LINKED else "no flight controller"
+
+
+def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condition]) -> None:
+    """Draw the fleet until KeyboardInterrupt."""
+    console = Console(highlight=False)
+    top = 0
+    with scrolling(), Live(console=console, auto_refresh=False, vertical_overflow="crop") as live:
+        while True:
+            page = max(console.height - _OTHER_LINES, 1)
+            rows = _rows(seen, conditions)
+            top = max(0, min(top, len(rows) - page))
+            live.update(screen(rows, top, page, is_connected=is_connected(session)), refresh=True)
+            top += wait_for_scroll(_REFRESH_S, page)
+
+
+def screen(rows: Sequence[Row], top: int, page: int, *, is_connected: bool) -> Group | Text:
+    """The screen: counts, then armed vehicles, then those with problems, then the others."""
+    if not is_connected:
+        return Text("The router is gone; waiting for it. Ctrl-C ends.", style="red")
+    if not rows:
+        return Text("No such vehicle is alive. Ctrl-C ends.")
+    armed = sum(row.vehicle.armed is True for row in rows)
+    ill = sum(bool(row.problem) for row in rows)
+    head = f"{len(rows)} vehicles, {armed} armed, {ill} with problems"
+    shown = rows[top : top + page]
+    last = "Ctrl-C ends."
+    if len(shown) < len(rows):
+        last = f"{top + 1} to {top + len(shown)} of {len(rows)}; arrow keys and space scroll. {last}"
+    table = watch_table([(row.vehicle, row.age_s, row.problem) for row in shown])
+    return Group(Text(head, style="bold"), table, Text(last, style="dim"))
+
+
+def print_changes(seen: Watch, conditions: Sequence[Condition]) -> None:
+    """Print a line for each vehicle that comes, changes or goes, until KeyboardInterrupt."""
+    known: dict[str, Vehicle] = {}
+    while True:
+        now = {row.vehicle.session_id: row.vehicle for row in _rows(seen, conditions)}
+        for session_id, vehicle in now.items():
+            if known.get(session_id) != vehicle:
+                print_json({"time_s": round(time.time(), 3), "alive": True, **asdict(vehicle)})
+        for session_id in known.keys() - now.keys():
+            print_json({"time_s": round(time.time(), 3), "alive": False, "name": known[session_id].name})
+        known = now
+        time.sleep(_REFRESH_S)
+
+
+def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[Row]:
+    fleet, ages_s = seen.look()
+    rows = [Row(vehicle, age_s) for vehicle, age_s in zip(fleet, ages_s, strict=True)]
+    rows = [row for row in rows if all(condition(row.vehicle) for condition in conditions)]
+    return sorted(rows, key=lambda row: (row.vehicle.armed is not True, not row.problem, row.vehicle.name))

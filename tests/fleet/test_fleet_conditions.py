@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Conditions of --where."""
+
+import pytest
+
+from service.fleet.conditions import matching, parse_condition
+from service.fleet.vehicle import Vehicle
+
+KITE = Vehicle("kite", "1", answers=True, armed=True, battery_v=11.1, mode="AUTO")
+OWL = Vehicle("owl", "2", answers=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("armed=true", [KITE]),
+        ("armed != true", [OWL]),
+        ("answers=no", [OWL]),
+        ("battery_v<11.2", [KITE]),
+        ("battery_v>=11.2", []),
+        ("name=k*", [KITE]),
+        ("name!=k*", [OWL]),
+        ("mode=AUTO", [KITE]),
+        ("mode!=AUTO", [OWL]),
+        ("bridges=1", [KITE, OWL]),
+    ],
+)
+def test_conditions(text: str, found: list[Vehicle]) -> None:
+    assert matching([KITE, OWL], [parse_condition(text)]) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("armed", "not a condition"),
+        ("colour=red", "no 'colour'"),
+        ("armed=maybe", "true or false"),
+        ("armed<true", "true or false"),
+        ("battery_v=full", "a number"),
+        ("name<k", "with = or !="),
+        ("session_id=1", "no 'session_id'"),
+    ],
+)
+def test_conditions_that_are_none(text: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        parse_condition(text)

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`fleet enroll`: its router lets each member do what its role allows, and no more."""
+
+import json
+import socket
+import stat
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+from programs import free_port, run_naze_bridge, until
+from zenoh_router import running_router
+
+
+class Enrolled:
+    """A router, and sessions of the members."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        self.folder = folder / "fleet"
+        self.endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+        self._stack = stack
+        for name, role in {"kite": "vehicle", "owl": "vehicle", "pilot": "pilot", "guest": "guest"}.items():
+            assert self.enroll(name, "--role", role).returncode == 0
+        router = json.loads((self.folder / "router.json5").read_text())
+        assert router["transport"]["unicast"]["max_sessions"] > 1000
+        stack.enter_context(running_router(folder, self.endpoint, self.folder / "router.json5"))
+
+    def enroll(self, *arguments: str) -> Any:
+        return run_naze_bridge("fleet", "enroll", *arguments, "--folder", self.folder, "--router", self.endpoint)
+
+    def open(self, name: str) -> zenoh.Session:
+        return self._stack.enter_context(zenoh.open(zenoh.Config.from_file(str(self.folder / f"{name}.json5"))))
+
+
+@pytest.fixture(scope="module")
+def enrolled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Enrolled]:
+    with ExitStack() as stack:
+        yield Enrolled(tmp_path_factory.mktemp("enrolled"), stack)
+
+
+def replies_with(text: str) -> Any:
+    def reply(query: zenoh.Query) -> None:
+        with query:
+            query.reply(query.key_expr, text)
+
+    return reply
+
+
+def asked(session: zenoh.Session, key: str) -> list[str]:
+    return [each.ok.payload.to_string() for each in session.get(key, timeout=5.0) if each.ok]
+
+
+def test_a_vehicle_speaks_under_its_own_name_alone(enrolled: Enrolled) -> None:
+    owl, pilot = enrolled.open("owl"), enrolled.open("pilot")
+    queryables = [
+        owl.declare_queryable(key, replies_with("owl"))
+        for key in ("fleet/owl/v1/state", "fleet/kite/v1/state", "fleet/kite/@cmd/v1/mission/upload")
+    ]
+    until(lambda: asked(pilot, "fleet/owl/v1/state") == ["owl"], "its own state")
+    assert asked(pilot, "fleet/kite/v1/state") == asked(pilot, "fleet/kite/@cmd/v1/mission/upload") == []
+    heard: list[str] = []
+    with pilot.declare_subscriber("fleet/**", lambda sample: heard.append(str(sample.key_expr))):
+        until(lambda: (owl.put("fleet/owl/v1/event", "{}"), heard)[1], "its own event")
+        owl.put("fleet/kite/v1/telemetry/position", "{}")
+        owl.put("fleet/owl/v1/telemetry/gps", "{}")
+        until(lambda: "fleet/owl/v1/telemetry/gps" in heard, "the last one")
+    assert not [key for key in heard if "kite" in key]
+    del queryables
+
+
+def test_a_guest_may_look_and_nothing_else(enrolled: Enrolled) -> None:
+    kite, guest, pilot = enrolled.open("kite"), enrolled.open("guest"), enrolled.open("pilot")
+    taken: list[str] = []
+    inputs = [
+        kite.declare_subscriber(key, lambda sample: taken.append(str(sample.key_expr)))
+        for key in ("fleet/kite/@mavlink/v1/in", "fleet/kite/v1/event")
+    ]
+    queryables = [
+        kite.declare_queryable(key, replies_with("kite"))
+        for key in ("fleet/kite/v1/state", "fleet/kite/@cmd/v1/mission/clear")
+    ]
+    heard: list[str] = []
+    looks = guest.declare_subscriber("fleet/*/v1/**", lambda sample: heard.append(str(sample.key_expr)))
+    until(lambda: asked(guest, "fleet/kite/v1/state") == ["kite"], "the state")
+    until(lambda: (kite.put("fleet/kite/v1/telemetry/position", "{}"), heard)[1], "telemetry")
+    assert asked(guest, "fleet/kite/@cmd/v1/mission/clear") == []
+    forged = guest.declare_queryable("fleet/kite/v1/mission/current", replies_with("forged"))
+    token = guest.liveliness().declare_token("fleet/ghost/v1/alive/1")
+    guest.put("fleet/kite/@mavlink/v1/in", "disarm")
+    guest.put("fleet/kite/v1/event", "{}")
+    until(lambda: (pilot.put("fleet/kite/@mavlink/v1/in", "hello"), taken)[1], "the pilot's frame")
+    assert set(taken) == {"fleet/kite/@mavlink/v1/in"}
+    assert asked(pilot, "fleet/kite/v1/mission/current") == []
+    assert not [each for each in pilot.liveliness().get("fleet/ghost/**") if each.ok]
+    del inputs, queryables, looks, forged, token
+
+
+def test_logins_are_secret_and_stay(enrolled: Enrolled) -> None:
+    for name in ("passwords.txt", "kite.json5"):
+        assert stat.S_IMODE((enrolled.folder / name).stat().st_mode) == 0o600
+    before = (enrolled.folder / "kite.json5").read_text()
+    assert enrolled.enroll("kite").returncode == 0
+    assert (enrolled.folder / "kite.json5").read_text() == before
+    assert "kite is a vehicle already" in enrolled.enroll("kite", "--role", "pilot").stderr
+    assert "zenoh.vehicle is 'a/b'" in enrolled.enroll("a/b").stderr
+
+
+def test_errors_say_which(enrolled: Enrolled, tmp_path: Path) -> None:
+    config = json.loads((enrolled.folder / "pilot.json5").read_text())
+    config["transport"]["auth"]["usrpwd"]["password"] += "?"
+    wrong = tmp_path / "wrong.json5"
+    wrong.write_text(json.dumps(config))
+    refused = run_naze_bridge("fleet", "list", "--zenoh-config", wrong)
+    assert (refused.returncode, "does not accept this user and password" in refused.stderr) == (1, True), refused
+    nobody = run_naze_bridge("fleet", "list", "--connect", enrolled.endpoint)
+    assert "wants a user and a password" in nobody.stderr, nobody
+
+
+def test_a_router_without_room_says_so(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    config = tmp_path / "router.json5"
+    config.write_text(json.dumps({"listen": {"endpoints": [endpoint]}, "transport": {"unicast": {"max_sessions": 1}}}))
+    first = zenoh.Config()
+    first.insert_json5("mode", '"client"')
+    first.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    with running_router(tmp_path, endpoint, config), zenoh.open(first):
+        refused = run_naze_bridge("fleet", "list", "--connect", endpoint)
+        assert "takes no more sessions: raise transport/unicast/max_sessions" in refused.stderr, refused

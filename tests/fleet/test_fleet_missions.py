@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One mission for many: a trial that writes nothing, stages, a comparison by checksum, vehicles chosen by state."""
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from fleet_bench import Fleet
+from plan import HOME, PlanRow, plain_plan, waypoint
+from programs import run_naze_bridge, until
+
+from protocols.mission_file import write_qgc_wpl
+from protocols.mission_item import Command
+
+NAMES = ("kite", "owl", "swift")
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
+    with ExitStack() as stack:
+        fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
+        for name in NAMES:
+            fleet.start(name)
+        fleet.wait(*NAMES)
+        yield fleet
+
+
+def plan_file(folder: Path, plan: list[PlanRow]) -> Path:
+    path = folder / "plan.waypoints"
+    path.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
+    return path
+
+
+def test_a_trial_tells_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path: Path) -> None:
+    before = [fleet.daemons[name].held() for name in NAMES]
+    file = plan_file(tmp_path, [*plain_plan(4, start=90), PlanRow(178, p2=5.0)])
+    tried = fleet.ask("push", file, "--all", "--dry-run")
+    assert tried.returncode == 0, tried
+    assert tried.stdout.endswith("3 of 3 vehicles would take the mission; nothing was written\n")
+    assert tried.stdout.count("WP 4: ") == 3
+    assert [fleet.daemons[name].held() for name in NAMES] == before
+    bad = fleet.ask("push", plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]), "--all", "--dry-run")
+    assert bad.returncode == 1
+    assert "rejected: LAND must be the last item" in " ".join(bad.stdout.split())
+
+
+def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None:
+    file = plan_file(tmp_path, plain_plan(6, start=30))
+    fleet.pushed(file, "--vehicle", "kite", "--vehicle", "owl", code=0)
+    verified = fleet.ask("verify", file, "--all", "--json")
+    assert verified.returncode == 1, verified
+    vehicles = {each["vehicle"]: each for each in json.loads(verified.stdout)["vehicles"]}
+    assert {name: each["is_held"] for name, each in vehicles.items()} == {"kite": True, "owl": True, "swift": False}
+    checked = json.loads(run_naze_bridge("check", file, "--json").stdout)
+    assert checked["checksum"] == vehicles["swift"]["checksum"] == fleet.daemons["kite"].held()["checksum"]
+    told = fleet.ask("verify", file, "--vehicle", "kite", "--vehicle", "owl")
+    assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "2 of 2 vehicles hold the mission")
+
+
+def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) -> None:
+    before = [fleet.daemons[name].held()["records"] for name in NAMES]
+    bad = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
+    pushed = fleet.pushed(bad, "--all", "--staged", code=1)
+    assert "LAND must be the last item" in pushed["kite"]["error"]
+    assert [pushed[name]["error"] for name in NAMES[1:]] == ["not begun: kite had failed"] * 2
+    assert [fleet.daemons[name].held()["records"] for name in NAMES] == before
+    pushed = fleet.pushed(plan_file(tmp_path, plain_plan(5)), "--all", "--staged", code=0)
+    assert [pushed[name]["ok"] for name in NAMES] == [True] * 3
+
+
+def test_vehicles_are_chosen_by_their_state(fleet: Fleet, tmp_path: Path) -> None:
+    fleet.pushed(plan_file(tmp_path, plain_plan(8)), "--vehicle", "owl", code=0)
+    until(lambda: fleet.listed()["owl"]["mission_count"] == 8, "the news")
+
+    def listed(*options: str) -> list[str]:
+        return [each["name"] for each in json.loads(fleet.ask("list", "--json", *options).stdout)["vehicles"]]
+
+    assert listed("--where", "mission_count=8") == ["owl"]
+    assert listed("--where", "name=*i*", "--where", "armed=no") == ["kite", "swift"]
+    assert listed("--limit", "2") == ["kite", "owl"]
+    assert fleet.ask("list", "--limit", "2").stdout.endswith("\n1 more vehicles\n")
+    assert "None of 3 vehicles" in fleet.ask("list", "--where", "armed=true").stdout
+    pushed = fleet.pushed(plan_file(tmp_path, plain_plan(9)), "--all", "--where", "mission_count=8", code=0)
+    assert list(pushed) == ["owl"]
+    wrong = fleet.ask("list", "--where", "colour=red")
+    assert (wrong.returncode, "vehicles have no 'colour'" in wrong.stderr) == (2, True)
