@@ -12,6 +12,7 @@ from service.fleet.vehicle import Vehicle
 
 Condition = Callable[[Vehicle], bool]
 
+
 def _kind(hint: object) -> type:
     """The type of a value that is known."""
     kinds = get_args(hint) or (hint,)

@@ -11,7 +11,7 @@ from typing import Any
 from programs import Board, Daemon, run_naze_bridge, until
 from zenoh_router import Router, running_router
 
-_I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
+I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
 Vehicle = dict[str, Any]
 
 
@@ -26,7 +26,7 @@ class Fleet:
         self.boards: dict[str, Board] = {}
 
     def start(
-        self, folder: str, *, name: str = "", fc: str = "sim:", commands: str = _I_KNOW, encoding: str = "json"
+        self, folder: str, *, name: str = "", fc: str = "sim:", commands: str = I_KNOW, encoding: str = "json"
     ) -> Daemon:
         """Start a vehicle; `name`: another one than that of its folder."""
         own = self.folder / folder

@@ -127,7 +127,13 @@ def test_a_vehicle_vanishes_in_the_middle_of_a_push(fleet: Fleet) -> None:
 
 
 def test_ctrl_c_in_the_middle_of_a_push(fleet: Fleet) -> None:
+    def ends() -> int:
+        return sum(event["event"] == "mission.push_ended" for event in fleet.daemons["kite"].events())
+
+    before = ends()
     command = long_push(fleet)
+    until(lambda: ends() > before, "the end of the quick push")
+    fleet.listed()  # its replies come by the same router, after that of the push
     command.process.send_signal(signal.SIGINT)
     code, output, error = command.end()
     assert code == 130

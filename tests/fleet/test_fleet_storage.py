@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""With a storage on `fleet/**`, what is stored of a vehicle is never taken for the vehicle."""
+
+import json
+import signal
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import zenoh
+from fleet_bench import Fleet
+from plan import plain_plan
+from programs import until
+from zenoh_storage import client, storage
+
+from protocols.mission_file import write_qgc_wpl
+from service.fleet.watch import watching
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Fleet, zenoh.Session]]:
+    """`kite` lives, `owl` has died; the storage knows both."""
+    folder = tmp_path_factory.mktemp("fleet")
+    with ExitStack() as stack:
+        fleet = Fleet(folder, stack)
+        looking = stack.enter_context(storage(folder, fleet.router.endpoint))
+        for name in ("kite", "owl"):
+            fleet.start(name)
+        fleet.wait("kite", "owl")
+        until(lambda: {"kite", "owl"} <= stored_names(looking, "state"), "both in the storage")
+        fleet.daemons["owl"].end(signal.SIGKILL)
+        until(lambda: list(fleet.listed()) == ["kite"], "the end of one")
+        yield fleet, looking
+
+
+def stored_names(looking: zenoh.Session, suffix: str) -> set[str]:
+    replies = looking.get(f"fleet/*/v1/{suffix}", timeout=3.0)
+    return {str(reply.ok.key_expr).split("/")[1] for reply in replies if reply.ok}
+
+
+def test_the_dead_are_stored_but_not_listed(stored: tuple[Fleet, zenoh.Session]) -> None:
+    fleet, looking = stored
+    assert stored_names(looking, "state") == {"kite", "owl"}
+    listed = fleet.listed()
+    assert list(listed) == ["kite"]
+    assert (listed["kite"]["answers"], listed["kite"]["bridges"]) == (True, 1)
+
+
+def test_missions_are_pulled_and_pushed_as_ever(stored: tuple[Fleet, zenoh.Session], tmp_path: Path) -> None:
+    fleet, looking = stored
+    file = tmp_path / "plan.waypoints"
+    file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(7))]))
+    assert list(fleet.pushed(file, "--all", code=0)) == ["kite"]
+    until(lambda: "kite" in stored_names(looking, "mission/current"), "the mission in the storage")
+    pulled = json.loads(fleet.ask("pull", "--json").stdout)["vehicles"]
+    assert [(each["vehicle"], each["error"], each["count"]) for each in pulled] == [("kite", None, 7)]
+    dead = fleet.ask("push", file, "--vehicle", "owl")
+    assert (dead.returncode, "no vehicle 'owl' is alive" in dead.stderr) == (1, True)
+
+
+def test_a_silent_vehicle_is_not_spoken_for(stored: tuple[Fleet, zenoh.Session]) -> None:
+    """Its bridge hangs and its token is still there: the stored state is not shown as its own."""
+    fleet, _ = stored
+    kite = fleet.daemons["kite"].process
+    kite.send_signal(signal.SIGSTOP)
+    try:
+        until(lambda: not fleet.listed()["kite"]["answers"], "its silence")
+        with client(fleet.router.endpoint) as session, watching(session, "fleet") as seen:
+            until(lambda: seen.look()[0], "its token")
+            assert not seen.look()[0][0].answers
+    finally:
+        kite.send_signal(signal.SIGCONT)
+    until(lambda: fleet.listed()["kite"]["answers"], "its return")
