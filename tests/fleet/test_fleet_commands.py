@@ -103,7 +103,7 @@ def test_push_to_one_and_pull_it_into_a_file(fleet: Fleet, tmp_path: Path) -> No
 def test_changes_are_told(fleet: Fleet, tmp_path: Path) -> None:
     plan = [*plain_plan(4, start=90), PlanRow(178, p2=5.0)]
     pushed = fleet.ask("push", plan_file(tmp_path, plan), "--vehicle", "kite")
-    assert "Mission verified: 4 records; 2 corrections\n" in pushed.stdout, pushed
+    assert "4 of 5 stored: 1 dropped; 2 corrections\n" in pushed.stdout, pushed
 
 
 def test_a_list_against_the_rules(fleet: Fleet, tmp_path: Path) -> None:

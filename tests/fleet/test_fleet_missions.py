@@ -43,7 +43,7 @@ def test_a_trial_tells_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path
     assert [fleet.daemons[name].held() for name in NAMES] == before
     bad = fleet.ask("push", plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]), "--all", "--dry-run")
     assert bad.returncode == 1
-    assert "rejected: LAND must be the last item" in " ".join(bad.stdout.split())
+    assert "rejected: LAND must be last" in " ".join(bad.stdout.split())
 
 
 def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) 
     before = [fleet.daemons[name].held()["records"] for name in NAMES]
     bad = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
     pushed = fleet.pushed(bad, "--all", "--staged", code=1)
-    assert "LAND must be the last item" in pushed["kite"]["error"]
+    assert "LAND must be last" in pushed["kite"]["error"]
     assert [pushed[name]["error"] for name in NAMES[1:]] == ["not begun: kite had failed"] * 2
     assert [fleet.daemons[name].held()["records"] for name in NAMES] == before
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(5)), "--all", "--staged", code=0)
