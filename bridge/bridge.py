@@ -77,12 +77,13 @@ class BridgeConfig:
 class Bridge:
     """Puts the parts together and hands each what is its business."""
 
-    def __init__(self, config: BridgeConfig, log_event: EventLog, now: float, tap: Tap = lambda _frames: None) -> None:
+    def __init__(self, config: BridgeConfig, log_event: EventLog, now: float, tap: Tap | None = None) -> None:
         self._config = config
         self._log_event = log_event
         self._decoder = MavlinkDecoder()
         self._store_effects: list[StoreEffect] = []
         self._was_armed = False
+        self._logs_flights = tap is not None
         self._pass_through: PassThrough | None = None
         self._announcer = LinkAnnouncer()
         self._incidents = Incidents()
@@ -93,7 +94,9 @@ class Bridge:
             if access.signing is not None
         }
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
-        self.ground = Ground(config.sysid, config.compid, log_event, self._newcomer, tap, self.guard.standing, signers)
+        self.ground = Ground(
+            config.sysid, config.compid, log_event, self._newcomer, tap or _drop, self.guard.standing, signers
+        )
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(
             config.speeds,
@@ -160,6 +163,7 @@ class Bridge:
             return
         if armed:
             self._uploads.armed(now)
+        self.ground.record_flight(on=armed and self._logs_flights and self._pass_through is None)
         self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")
         self._was_armed = armed
 
@@ -376,3 +380,7 @@ class Bridge:
     def _banner(self) -> str:
         controller = self.session.controller
         return f"naze-bridge: {controller.name if controller else 'no flight controller'}"
+
+
+def _drop(_frames: Sequence[bytes]) -> None:
+    """The log of a bridge that keeps none."""

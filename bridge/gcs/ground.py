@@ -8,7 +8,7 @@ from bridge.gcs.budget import Budgets
 from bridge.gcs.cost import Cost
 from bridge.gcs.guard import Standing
 from bridge.gcs.recent_texts import RecentTexts
-from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.station import RECORDER, Peer, Severity, Station
 from bridge.gcs.stations import Stations
 from bridge.model.events import EventLog
 from protocols.mavlink.codec import FrameWriter, Packed, pack
@@ -172,6 +172,18 @@ class Ground:
         standing = self._standing(peer)
         return standing is Standing.PROVEN or (standing is Standing.OPEN and self._stations.is_senior(peer))
 
+    @property
+    def is_recording(self) -> bool:
+        """True while a flight is logged at the default rates, whatever ground stations ask for."""
+        return RECORDER in self._default_peers
+
+    def record_flight(self, *, on: bool) -> None:
+        """Log everything that a watching ground station would get, whether or not there is one."""
+        if on:
+            self.add_default_peer(RECORDER, until_answered=False)
+        else:
+            self.remove_default_peer(RECORDER)
+
     # What they are sent.
 
     def take_datagrams(self) -> list[tuple[Peer, bytes]]:
@@ -209,10 +221,14 @@ class Ground:
     def multicast(self, packed: Packed, peers: Iterable[Peer]) -> None:
         """Send a packed message to some."""
         frame = None
+        is_logged = not self.is_recording
         for peer in peers:
             frame = self._writer(peer).frame(packed, self._version(peer))
-            self._datagrams.append((peer, frame))
-        if frame is not None:
+            if peer is RECORDER:
+                is_logged = True
+            else:
+                self._datagrams.append((peer, frame))
+        if frame is not None and is_logged:
             self.tap([frame])
 
     def introduce(self, heartbeat: Message) -> None:
@@ -222,7 +238,7 @@ class Ground:
         until it has seen MAVLink 2, which it reads from the start. So where all is signed it needs no MAVLink 1.
         """
         for peer in self.everyone():
-            if peer.link in self._signers:
+            if peer.link in self._signers or peer is RECORDER:
                 continue
             other = 1 if self._stations.is_unknown(peer) else 2
             if self._stations.version(peer) != other:

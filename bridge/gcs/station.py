@@ -27,6 +27,10 @@ class Peer:
         return f"{self.link} {address}"
 
 
+#: The telemetry log as a reader of its own: it gets what a watching ground station gets, but no datagram is sent.
+RECORDER = Peer("log", "flight")
+
+
 @dataclass(frozen=True, slots=True)
 class Station:
     """A ground station: who speaks (sysid, compid), and from where."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a daemon records of itself: telemetry logs always, the UART if it is asked to."""
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 
 from bridge.gcs.ground import Tap
 from service.links.fc_device import Device
@@ -22,7 +22,7 @@ class Recording:
         self._tlog: TlogRecorder | None = None
         if settings.tlog is not None and settings.state_dir is not None:
             self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
-        self.tap: Tap = _nothing if self._tlog is None else self._tlog.tap
+        self.tap: Tap | None = None if self._tlog is None else self._tlog.tap
 
     def port(
         self,
@@ -47,7 +47,3 @@ class Recording:
             self._uart.close()
         if self._tlog is not None:
             self._tlog.close()
-
-
-def _nothing(_frames: Sequence[bytes]) -> None:
-    """Record nothing."""

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A flight is logged from arming to disarming, whether or not a ground station listens."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import pytest
+from world import GroundStation, World
+
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkSplitter
+from simulator.options import SimOptions, TelemetryProtocol
+
+
+class Log:
+    def __init__(self) -> None:
+        self.frames: list[bytes] = []
+
+    def __call__(self, frames: Sequence[bytes]) -> None:
+        self.frames += frames
+
+    def take(self) -> Counter[str]:
+        """How many of each message were logged since the last call."""
+        found = MavlinkSplitter().feed(b"".join(self.frames))
+        self.frames.clear()
+        return Counter(m.mavlink_map[frame.msgid].msgname for frame in found)
+
+
+def logged(protocol: TelemetryProtocol) -> tuple[World, Log]:
+    log = Log()
+    world = World(SimOptions(tele_prot=protocol), tap=log)
+    world.wait_ready(30)
+    world.run(3)
+    return world, log
+
+
+@pytest.mark.parametrize("protocol", [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK])
+def test_a_flight_without_a_ground_station_is_logged_at_the_rates_of_one(protocol: TelemetryProtocol) -> None:
+    world, log = logged(protocol)
+    assert log.take() == {}
+    world.faults.armed = True
+    world.run(5)
+    log.take()
+    world.run(10)
+    flown = log.take()
+    assert flown["ATTITUDE"] == pytest.approx(250, rel=0.1)
+    assert flown["GLOBAL_POSITION_INT"] >= 20
+    assert {"BATTERY_STATUS", "SYS_STATUS", "RC_CHANNELS", "VFR_HUD", "HEARTBEAT"} <= set(flown)
+    world.faults.armed = False
+    world.run(6)
+    log.take()
+    world.run(5)
+    assert log.take() == {}
+
+
+def test_a_ground_station_that_wants_less_does_not_thin_the_log_out() -> None:
+    world, log = logged(TelemetryProtocol.MSP)
+    station = GroundStation(world)
+    station.send(m.MAVLink_request_data_stream_message(1, 1, 0, 1, 1))
+    world.faults.armed = True
+    world.run(5)
+    log.take()
+    station.take()
+    world.run(10)
+    assert len(station.said("ATTITUDE")) == pytest.approx(10, abs=2)
+    assert log.take()["ATTITUDE"] == pytest.approx(250, rel=0.1)
