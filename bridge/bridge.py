@@ -58,7 +58,7 @@ _AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
 class BridgeConfig:
     """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed.
 
-    `unix_time_s`: the time of day at a monotonic time, None if unknown.
+    `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
     `links`: who may write over which link, by its name; over others everyone may. `passes_everything`: an autopilot
     that speaks MAVLink for itself gets commands over those others, too.
     """
@@ -70,6 +70,7 @@ class BridgeConfig:
     autopilot: Autopilot = Autopilot.AUTO
     profiles: Sequence[Profile] = PROFILES
     links: Mapping[str, LinkAccess] = field(default_factory=dict)
+    version: str = ""
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     passes_everything: bool = False
 
@@ -379,7 +380,8 @@ class Bridge:
 
     def _banner(self) -> str:
         controller = self.session.controller
-        return f"naze-bridge: {controller.name if controller else 'no flight controller'}"
+        name = "no flight controller" if controller is None else controller.name
+        return f"naze-bridge {self._config.version}: {name}"
 
 
 def _drop(_frames: Sequence[bytes]) -> None:

@@ -134,6 +134,9 @@ class MissionJobs:
             "mode": status.mode,
             "fix": gps.fix,
             "flight_controller": None if controller is None else controller.name,
+            "firmware_version": None
+            if session.vehicle.version is None
+            else ".".join(map(str, session.vehicle.version)),
             "state": session.state.name,
             "speed_baud": session.speed if controller else None,
             "armed": report.status.armed,

@@ -96,6 +96,7 @@ class Daemon:
                 takeoff_max_m=settings.takeoff_max_m,
                 autopilot=settings.autopilot,
                 links={**self._signing.links, **_ZENOH},
+                version=version(),
                 unix_time_s=lambda now: time.time() - self._loop.time() + now,
                 passes_everything=settings.pass_through is PassThroughRule.EVERYTHING,
             ),

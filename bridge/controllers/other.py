@@ -19,13 +19,15 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     if ident is not None:
         boxes = yield from board.box_names()
         name = (yield from board.variant()) or f"MultiWii {ident.version}"
-        return FlightController(OTHER_MSP, name, ident.mixer, boxes)
+        return FlightController(OTHER_MSP, name, ident.mixer, boxes, version=ident.release)
     name = (yield from board.variant()) or "unknown"
+    version = None
     if name == _BETAFLIGHT:
+        version = yield from board.version()
         boxes = yield from board.boxes_by_id(_BETAFLIGHT_BOXES)
     else:
         boxes = yield from board.box_names()
-    return FlightController(OTHER_MSP, name, boxes=boxes)
+    return FlightController(OTHER_MSP, name, boxes=boxes, version=version)
 
 
 OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise)

@@ -9,7 +9,7 @@ from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.telemetry import Ident, decode_box_names, decode_ident
 
 _IDENT_SIZE = 7
-_VARIANT_SIZE = 4
+_VARIANT_SIZE, _VERSION_SIZE = 4, 3
 _MAX_REPLY_PAYLOAD = 200
 
 
@@ -40,6 +40,14 @@ class Interview:
         """FC_VARIANT, four letters; None on boards older than it."""
         reply = yield from self.ask(Msp.FC_VARIANT, _VARIANT_SIZE)
         return reply.payload.decode("ascii", "replace") if reply.direction is Direction.REPLY else None
+
+    def version(self) -> Conversation[tuple[int, int, int] | None]:
+        """FC_VERSION: major, minor and patch level."""
+        reply = yield from self.ask(Msp.FC_VERSION, _VERSION_SIZE)
+        if reply.direction is not Direction.REPLY or len(reply.payload) < _VERSION_SIZE:
+            return None
+        major, minor, patch = reply.payload[:_VERSION_SIZE]
+        return major, minor, patch
 
     def box_names(self) -> Conversation[tuple[str, ...]]:
         """The box names, in the order of the status flags."""

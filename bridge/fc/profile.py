@@ -88,6 +88,7 @@ class FlightController:
     """The board on the line. `boxes` are in the order of the status flags; "" is a flag without a meaning here.
 
     mixer: IDENT's frame type. info: Harakiri's mission extension. capacity: mission records, if the board reported it.
+    version: the firmware's major, minor and patch level.
     """
 
     profile: Profile
@@ -96,6 +97,7 @@ class FlightController:
     boxes: tuple[str, ...] = ()
     info: Info | None = None
     capacity: int = 0
+    version: tuple[int, int, int] | None = None
 
     @property
     def arm_bit(self) -> int | None:

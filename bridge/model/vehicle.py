@@ -195,6 +195,8 @@ class Vehicle:
 
     def __init__(self, mixer: int | None = None) -> None:
         self.mixer = mixer
+        #: The firmware's: major, minor, patch level.
+        self.version: tuple[int, int, int] | None = None
         self.home: Home | None = None
         #: When any reading was heard last.
         self.heard_at: float | None = None

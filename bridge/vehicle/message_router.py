@@ -6,7 +6,6 @@ from math import inf
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.station import Post, Severity, Station
-from bridge.vehicle import vehicle_messages
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.mission_download import MissionDownloads
 from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION, MissionUploads
@@ -78,9 +77,7 @@ class MessageRouter:
             ),
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
             m.MAVLINK_MSG_ID_SET_MODE: lambda s, _msg, _now: commands.refuse_mode(s),
-            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, _now: post.to(
-                s, vehicle_messages.autopilot_version()
-            ),
+            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: self._autopilot_version,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _msg, _now: parameters.send_all(s),
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg, _: parameters.send_one(
                 s, msg.param_id, msg.param_index
@@ -129,6 +126,9 @@ class MessageRouter:
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
         self._vehicle.set_stream(station.peer, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
+
+    def _autopilot_version(self, station: Station, _message: Message, _now: float) -> None:
+        self._vehicle.send_once(station, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
 
     def _ftp(self, station: Station, message: Message, _now: float) -> None:
         answer = refuse(message.payload)

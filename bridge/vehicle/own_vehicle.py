@@ -197,7 +197,7 @@ class OwnVehicle:
 
     def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:
         if msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-            return [vehicle_messages.autopilot_version]
+            return [partial(vehicle_messages.autopilot_version, self._session.vehicle)]
         if msgid in self._ticked:
             return [self._ticked[msgid]]
         makers = (make for row in TELEMETRY if row.msgid == msgid for make in row.makers)

@@ -83,7 +83,9 @@ _CAPABILITIES = (
 )
 _NO_MISSION = 1
 _NO_TOTAL = 0xFFFF
-_VERSION = (0, 1, 0, 0)
+#: Of a firmware that reports none: below 1.0 Mission Planner hides the choice of altitude frames.
+_UNKNOWN_VERSION = (1, 0, 0)
+_OFFICIAL = 255
 _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_U8 = 0xFF
 _RAW_CHANNELS, _CHANNELS = 8, 18
@@ -145,9 +147,9 @@ def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
     )
 
 
-def autopilot_version() -> Message:
-    """AUTOPILOT_VERSION. No FTP capability: Mission Planner would wait 15 s for files."""
-    version = int.from_bytes(bytes(_VERSION), "big")
+def autopilot_version(vehicle: Vehicle) -> Message:
+    """AUTOPILOT_VERSION: the firmware's version. No FTP capability: Mission Planner would wait 15 s for files."""
+    version = int.from_bytes(bytes((*(vehicle.version or _UNKNOWN_VERSION), _OFFICIAL)), "big")
     no_hash = [0] * 8
     return messages.MAVLink_autopilot_version_message(
         _CAPABILITIES, version, 0, 0, 0, no_hash, no_hash, no_hash, 0, 0, 0

@@ -9,6 +9,7 @@ class Msp(IntEnum):
 
     API_VERSION = 1
     FC_VARIANT = 2
+    FC_VERSION = 3
     IDENT = 100
     STATUS = 101
     RAW_IMU = 102

@@ -42,6 +42,11 @@ class Ident:
     msp_version: int
     capability: int
 
+    @property
+    def release(self) -> tuple[int, int, int]:
+        """The version as MultiWii and its heirs count: 241 is 2.4.1."""
+        return self.version // 100, self.version // 10 % 10, self.version % 10
+
 
 @dataclass(frozen=True, slots=True)
 class StatusReport:

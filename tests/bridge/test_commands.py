@@ -158,6 +158,7 @@ def test_a_command_for_another_is_not_answered(flying: tuple[World, GroundStatio
 def test_the_version_says_what_is_there_and_no_ftp(flying: tuple[World, GroundStation]) -> None:
     (version,) = answers(flying, m.MAVLink_autopilot_version_request_message(1, 1))
     assert version.get_type() == "AUTOPILOT_VERSION"
+    assert version.flight_sw_version == 0x020101FF  # 2.1.1, official
     can = version.capabilities
     assert can & m.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     assert can & m.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT

@@ -4,6 +4,8 @@
 Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky telemetry (1) or MAVLink (2, 3).
 """
 
+from dataclasses import replace
+
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.mavlink_missions import HarakiriMavlinkMissions
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
@@ -37,7 +39,9 @@ def _recognise_patched(board: Interview) -> Conversation[FlightController | None
         return None
     # Asked last, and only of a Harakiri: to other boards this command number means something else.
     info = decode_info((yield from board.ask(MissionCommand.INFO, INFO_SIZE)).payload)
-    return None if info is None else FlightController(PATCHED, PATCHED.name, harakiri.mixer, harakiri.boxes, info)
+    if info is None:
+        return None
+    return replace(harakiri, profile=PATCHED, name=PATCHED.name, info=info)
 
 
 def _recognise_unpatched(board: Interview) -> Conversation[FlightController | None]:
@@ -45,7 +49,9 @@ def _recognise_unpatched(board: Interview) -> Conversation[FlightController | No
     if ident is None or (ident.version, ident.capability) != (_VERSION, _CAPABILITY):
         return None
     boxes = yield from board.box_names()
-    return FlightController(UNPATCHED, UNPATCHED.name, ident.mixer, boxes) if _OWN_BOX in boxes else None
+    if _OWN_BOX not in boxes:
+        return None
+    return FlightController(UNPATCHED, UNPATCHED.name, ident.mixer, boxes, version=ident.release)
 
 
 def _msp_store(controller: FlightController, _view: VehicleView, settings: RuleSettings) -> AnyFcMissionStore:

@@ -26,7 +26,8 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     if info is None or not info.capacity or controller.arm_bit is None:
         # Without an arm flag nothing would keep missions from being written in flight.
         return None
-    return FlightController(PROFILE, PROFILE.name, boxes=boxes, capacity=info.capacity)
+    version = yield from board.version()
+    return FlightController(PROFILE, PROFILE.name, boxes=boxes, capacity=info.capacity, version=version)
 
 
 def _rules(settings: RuleSettings) -> NavRules:

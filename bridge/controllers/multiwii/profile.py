@@ -25,7 +25,9 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     if FlightController(PROFILE, name, boxes=boxes).arm_bit is None:
         return None
     capacity = decode_nav_config((yield from board.ask(Nav.NAV_CONFIG, NAV_CONFIG_SIZE)).payload)
-    return FlightController(PROFILE, name, ident.mixer, boxes, capacity=capacity) if capacity else None
+    if not capacity:
+        return None
+    return FlightController(PROFILE, name, ident.mixer, boxes, capacity=capacity, version=ident.release)
 
 
 def _rules(settings: RuleSettings) -> NavRules:

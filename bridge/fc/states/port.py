@@ -44,3 +44,4 @@ class Port:
         if controller.profile.family != self.family:
             self.family, self.vehicle = controller.profile.family, Vehicle()
         self.vehicle.mixer = controller.mixer or self.vehicle.mixer
+        self.vehicle.version = controller.version or self.vehicle.version
