@@ -4,8 +4,9 @@
 import asyncio
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,57 +15,78 @@ import structlog
 from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission, PendingMission
 from protocols.mission_record import ListIdentity, identify, pack_records
-from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
+from service.disk_thread import DiskThread
+from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store, store_in_memory
 
 DATABASE_NAME = "missions.db"
+#: At the end: a disk that hangs must not keep the daemon from ending.
+_CLOSE_TIMEOUT_S = 2.0
 T = TypeVar("T")
 _log = structlog.get_logger()
 
 
 class StoreWorker:
-    """Carries out the bridge's store effects in order. Without a `directory` nothing is stored."""
+    """Carries out the bridge's store effects in order. Without a `directory` nothing is stored.
 
-    def __init__(self, directory: Path | None) -> None:
+    In a directory that cannot be used missions are kept in memory; `on_trouble` is told why, on the event loop.
+    """
+
+    def __init__(self, directory: Path | None, on_trouble: Callable[[str], None] = lambda _why: None) -> None:
         self._directory = directory
-        self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="store")
+        self._on_trouble = on_trouble
+        self._thread = DiskThread("store")
         self._loop = asyncio.get_running_loop()
         self._store: MissionStore | None = None
         if directory is not None:
-            self._executor.submit(self._open, directory)
+            self._thread.submit(partial(self._open, directory))
 
     def carry_out(self, effect: StoreEffect, answer: Callable[[object], None]) -> None:
         """Do it on the worker's thread; `answer` is called on the event loop."""
 
         def work() -> None:
-            result = self._do(effect)
-            self._loop.call_soon_threadsafe(answer, result)
+            self._tell(answer, self._do(effect))
 
-        self._executor.submit(work)
+        self._thread.submit(work)
 
     async def ask(self, question: Callable[[MissionStore], T]) -> T:
         """Ask the store something; StoreError if there is no store or it fails."""
+        answered: asyncio.Future[T] = self._loop.create_future()
 
-        def work() -> T:
-            if self._store is None:
-                raise StoreError("no missions are stored here: start the daemon with --state-dir DIR")
-            return question(self._store)
+        def work() -> None:
+            try:
+                if self._store is None:
+                    raise StoreError("no missions are stored here: start the daemon with --state-dir DIR")
+                answer = question(self._store)
+            except Exception as error:
+                self._tell(_fail, answered, error)
+            else:
+                self._tell(_answer, answered, answer)
 
-        return await self._loop.run_in_executor(self._executor, work)
+        self._thread.submit(work)
+        return await answered
 
     def close(self) -> None:
-        """Finish what was begun, then close."""
-        self._executor.submit(self._close)
-        self._executor.shutdown(wait=True)
+        """Finish what was begun, then close; a disk that hangs is not waited for."""
+        self._thread.submit(self._close)
+        if not self._thread.close(_CLOSE_TIMEOUT_S):
+            _log.error("store.hangs", what="the disk does not answer; the last outcome may be missing")
+
+    def _tell(self, answer: Callable[..., None], *arguments: object) -> None:
+        with suppress(RuntimeError):  # the loop is closed: a disk that hung answers too late
+            self._loop.call_soon_threadsafe(answer, *arguments)
 
     def _open(self, directory: Path) -> None:
         try:
             opened = open_store(directory / DATABASE_NAME, time.time())
         except StoreError as error:
-            _log.error("store.unavailable", why=str(error))
+            _log.error("store.unavailable", why=str(error), what="missions are kept in memory, until the end")
+            self._store = store_in_memory()
+            self._tell(self._on_trouble, str(error))
             return
         self._store = opened.store
         if opened.set_aside is not None:
-            _log.error("store.damaged", kept_as=str(opened.set_aside), what="a new mission store was made")
+            what = f"a new mission store was made with the {opened.salvaged} missions that could be read"
+            _log.error("store.damaged", kept_as=str(opened.set_aside), what=what)
 
     def _close(self) -> None:
         if self._store is not None:
@@ -98,6 +120,16 @@ class StoreWorker:
         except StoreError as error:
             _log.error("store.failed", why=str(error))
         return nothing
+
+
+def _answer(future: asyncio.Future[T], answer: T) -> None:
+    if not future.done():
+        future.set_result(answer)
+
+
+def _fail(future: asyncio.Future[Any], error: Exception) -> None:
+    if not future.done():
+        future.set_exception(error)
 
 
 def _received(mission: ArrivedMission) -> ReceivedMission:

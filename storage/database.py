@@ -60,7 +60,14 @@ def read_database(path: Path) -> sqlite3.Connection:
         return _configured(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.5))
 
 
-def _connect(path: Path) -> sqlite3.Connection:
+def memory_database() -> sqlite3.Connection:
+    """A database of this release's schema that ends with the process."""
+    connection = _connect(":memory:")
+    _apply_schema(connection, version=0)
+    return connection
+
+
+def _connect(path: Path | str) -> sqlite3.Connection:
     # Transactions are begun and ended in our own words (isolation_level). One thread at a time uses the
     # connection, which the caller promises; it need not be the one that opened it. Only a curious person's
     # program can hold a lock, and a ground station waits meanwhile: hence the short time-out (seconds).

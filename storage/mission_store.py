@@ -4,14 +4,14 @@
 import builtins
 import json
 import sqlite3
-import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from storage.database import open_database, read_database
+from storage.database import memory_database, open_database, read_database
+from storage.salvage import CONTENTS, contents_crc32, salvage
 from storage.store_error import StoreError, explained
 
 __all__ = [
@@ -24,12 +24,18 @@ __all__ = [
     "StoreError",
     "StoredMission",
     "open_store",
+    "store_in_memory",
 ]
 
 PENDING = "PENDING"  # the outcome until conclude(); for ever, if the daemon died in between
 VERIFIED = "VERIFIED"  # the outcome by which latest_verified() finds a mission
 
-_CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records")  # what crc32 is computed over
+#: Bytes of missions that are kept.
+BUDGET = 200 << 20
+#: So much is freed at once when the budget is reached, so that not every mission pays for the search.
+_FREED_AT_ONCE = 1 << 20
+_DELETED_AT_ONCE = 20
+_BUDGET_IN_MEMORY = 8 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +97,10 @@ class MissionStore:
     What add() and conclude() have returned from survives a kill and a power cut.
     """
 
-    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+    def __init__(self, connection: sqlite3.Connection, path: Path, budget: int = BUDGET) -> None:
         self._connection = connection
         self._path = path
+        self._budget = budget
 
     def __enter__(self) -> Self:
         return self
@@ -107,7 +114,10 @@ class MissionStore:
             self._connection.close()
 
     def add(self, received: ReceivedMission) -> int:
-        """Store a mission with the outcome PENDING and return its number, which grows with every mission."""
+        """Store a mission with the outcome PENDING and return its number, which grows with every mission.
+
+        A full store loses others for it: first those that were rejected or cancelled, last those that were verified.
+        """
         contents = (
             json.dumps(received.items),
             json.dumps(received.findings),
@@ -116,6 +126,7 @@ class MissionStore:
             received.records,
         )
         with self._transaction("cannot store the mission"):
+            self._make_room()
             number = self._connection.execute(
                 "INSERT INTO missions (received_at, source, verdict, ack, item_count, finding_count,"
                 " record_count, checksum, outcome, detail) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, '')",
@@ -135,7 +146,7 @@ class MissionStore:
             self._connection.execute(
                 "INSERT INTO mission_contents (number, items, findings, stored_items, roi_commands, records,"
                 " crc32) VALUES (?, ?, ?, ?, ?, ?, ?)",
-                (number, *contents, _crc32(contents)),
+                (number, *contents, contents_crc32(contents)),
             )
         return number
 
@@ -158,7 +169,7 @@ class MissionStore:
             ).fetchone()
         if row is None:
             return None
-        if _crc32(row[column] for column in _CONTENTS) != row["crc32"]:
+        if contents_crc32(row[column] for column in CONTENTS) != row["crc32"]:
             raise StoreError(f"mission {number} in {self._path} was damaged on the disk; the others can still be read")
         received = ReceivedMission(
             received_at=row["received_at"],
@@ -202,6 +213,29 @@ class MissionStore:
             ).fetchall()
         return [MissionSummary(*row) for row in rows]
 
+    def _make_room(self) -> None:
+        if self._size() <= self._budget:
+            return
+        while self._size() > self._budget - _FREED_AT_ONCE:
+            oldest = self._connection.execute(
+                "SELECT number FROM missions ORDER BY CASE WHEN outcome IN ('REJECTED', 'CANCELLED') THEN 0"
+                " WHEN outcome = ? THEN 2 ELSE 1 END, number LIMIT ?",
+                (VERIFIED, _DELETED_AT_ONCE),
+            ).fetchall()
+            if not oldest:
+                return
+            for (number,) in oldest:
+                self._connection.execute("DELETE FROM mission_contents WHERE number = ?", (number,))
+                self._connection.execute("DELETE FROM missions WHERE number = ?", (number,))
+
+    def _size(self) -> int:
+        """Bytes in use; pages that were freed are used again before the file grows."""
+        pages, free, page_size = (
+            self._connection.execute(f"PRAGMA {name}").fetchone()[0]
+            for name in ("page_count", "freelist_count", "page_size")
+        )
+        return int((pages - free) * page_size)
+
     @contextmanager
     def _transaction(self, failure: str) -> Iterator[None]:
         """All or nothing; when it returns, it is on the disk."""
@@ -218,20 +252,28 @@ class MissionStore:
 
 @dataclass(frozen=True, slots=True)
 class OpenedStore:
-    """A store ready for use; `set_aside` is where a damaged one was kept: to be said aloud."""
+    """A store ready for use. `set_aside`: where a damaged one was kept; `salvaged`: how many missions it still gave."""
 
     store: MissionStore
     set_aside: Path | None
+    salvaged: int
 
 
-def open_store(path: Path, now: float) -> OpenedStore:
+def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:
     """Open the store in file `path`, or make it and its directory.
 
-    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's StateLock.
+    `now`: unix seconds, for the name of a damaged file. `budget`: bytes of missions that are kept. The caller holds
+    the directory's StateLock.
     StoreError if it cannot be opened or written, or is of a newer release.
     """
     connection, set_aside = open_database(path, now)
-    return OpenedStore(MissionStore(connection, path), set_aside)
+    salvaged = 0 if set_aside is None else salvage(set_aside, connection)
+    return OpenedStore(MissionStore(connection, path, budget), set_aside, salvaged)
+
+
+def store_in_memory() -> MissionStore:
+    """A store that ends with the process, for a disk that cannot be written."""
+    return MissionStore(memory_database(), Path("memory"), _BUDGET_IN_MEMORY)
 
 
 def read_store(path: Path) -> MissionStore:
@@ -242,11 +284,3 @@ def read_store(path: Path) -> MissionStore:
 def _text(text: str) -> str:
     r"""What SQLite can hold: the lone surrogates of a file name that is no UTF-8 become \udcXX."""
     return text.encode(errors="backslashreplace").decode()
-
-
-def _crc32(contents: Iterable[str | bytes]) -> int:
-    """SQLite notices a damaged page structure, not a changed byte in a mission; this does."""
-    crc = 0
-    for part in contents:
-        crc = zlib.crc32(part if isinstance(part, bytes) else part.encode(), crc)
-    return crc

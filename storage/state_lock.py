@@ -12,6 +12,10 @@ from storage.store_error import StoreError
 _NAME = "lock"
 
 
+class StateUnusableError(StoreError):
+    """The directory cannot be made or written."""
+
+
 class StateLock:
     """Holds the directory while it is entered; the kernel lets go when the process dies, however it dies.
 
@@ -31,13 +35,16 @@ class StateLock:
         self.release()
 
     def acquire(self) -> None:
-        """Make the directory if need be and lock it at once; StoreError if another process holds it."""
+        """Make the directory if need be and lock it at once.
+
+        StoreError if another process holds it, its kind StateUnusableError if it cannot be made or written.
+        """
         path = self._directory / _NAME
         try:
             self._directory.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
-            raise StoreError(
+            raise StateUnusableError(
                 f"cannot use the state directory {self._directory}: {error.strerror}; name another with --state-dir"
             ) from error
         try:

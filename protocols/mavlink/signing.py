@@ -68,14 +68,19 @@ class Check(Enum):
     WRONG = "signed with another key"
     REPLAYED = "its timestamp was used before"
     LATE = "signed over a minute behind our clock"
+    UNSURE = "signed too soon after a power cut: wait 10 s"
 
 
 class Signing:
-    """One key and the timestamps used with it. Links with the same key share one instance."""
+    """One key and the timestamps used with it. Links with the same key share one instance.
 
-    def __init__(self, key: bytes, timestamps: Timestamps) -> None:
+    `refused_until`: up to this timestamp an earlier run may have heard a frame and not remember it.
+    """
+
+    def __init__(self, key: bytes, timestamps: Timestamps, refused_until: int = -1) -> None:
         self._key = key
         self._timestamps = timestamps
+        self._refused_until = refused_until
         self._heard: set[Stream] = set()
         #: The last timestamp of each stream. Those of an earlier run may be put in before the first frame.
         self.streams: dict[Stream, int] = {}
@@ -96,6 +101,8 @@ class Signing:
         timestamp = int.from_bytes(raw[-_SIGNATURE_SIZE + 1 : -_DIGEST_SIZE], "little")
         if timestamp <= self.streams.get(stream, -1):
             return Check.REPLAYED
+        if timestamp <= self._refused_until:
+            return Check.UNSURE
         # A stream of an earlier run is held to both rules: it may have been recorded while we were off.
         if stream not in self._heard and timestamp + TOLERANCE < self._timestamps.now():
             return Check.LATE

@@ -3,26 +3,30 @@
 
 A Pi has no clock that runs without power: after a reboot it may believe that it is yesterday. Signatures would begin
 anew with timestamps that were used before, and recorded ones would be taken for new. So the last timestamp is kept in
-a file, a minute ahead of the truth, so that it is seldom written; at the end it is written as it is.
+a file, 10 s ahead of the truth, so that it is seldom written; at the end it is written as it is. After a power cut what
+was heard since the last write is unknown, but it was signed before the file's time: until then nothing is taken.
 """
 
 import asyncio
 import json
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import structlog
 
 from bridge.gcs.guard import LinkAccess
-from protocols.mavlink.signing import TOLERANCE, Signing, Timestamps
+from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Signing, Timestamps
+from service.disk_thread import DiskThread
 from service.settings import Settings
 from storage.atomic_file import replace_file
 
 FILE_NAME = "signing.json"
-_AHEAD = TOLERANCE
+#: The file's lead over the truth, and so how long after a power cut signatures are refused. Shorter costs SD card life.
+_AHEAD = 10 * TICKS_PER_S
 _LOOK_S = 1.0
+_CLOSE_TIMEOUT_S = 1.0
 
 _log = structlog.get_logger()
 
@@ -35,10 +39,12 @@ class SigningState:
         keys = {name: access.key for name, access in settings.access.items() if access.key is not None}
         self._stored = 0
         streams: Mapping[str, list[list[int]]] = {}
+        was_ended = True
         if keys and self._path is not None:
-            self._stored, streams = _load(self._path)
+            self._stored, streams, was_ended = _load(self._path)
         self._timestamps = Timestamps(clock, self._stored)
-        by_key = {key: Signing(key, self._timestamps) for key in keys.values()}
+        refused_until = -1 if was_ended else self._stored + int(_LOOK_S * TICKS_PER_S)
+        by_key = {key: Signing(key, self._timestamps, refused_until) for key in keys.values()}
         self._signings = {name: by_key[key] for name, key in keys.items()}
         for name, signing in self._signings.items():
             for sysid, compid, link_id, timestamp in streams.get(name, ()):
@@ -53,7 +59,7 @@ class SigningState:
             for number, address in enumerate(settings.gcs)
             if (access := settings.access.get(str(address))) is not None
         }
-        self._executor = ThreadPoolExecutor(1, "signing")
+        self._thread = DiskThread("signing")
         self._timer: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
@@ -65,30 +71,31 @@ class SigningState:
         """Write the timestamp as it is."""
         if self._timer is not None and self._path is not None:
             self._timer.cancel()
-            self._executor.submit(_save, self._path, self._state(self._timestamps.now()))
-        self._executor.shutdown()
+            self._thread.submit(partial(_save, self._path, self._state(self._timestamps.now(), is_end=True)))
+        self._thread.close(_CLOSE_TIMEOUT_S)
 
     def _look(self, loop: asyncio.AbstractEventLoop, path: Path) -> None:
         """Write when what is stored was reached: by time, or because somebody's clock is far ahead of ours."""
         if self._timestamps.last >= self._stored:
             self._stored = self._timestamps.now() + _AHEAD
-            self._executor.submit(_save, path, self._state(self._stored))
+            self._thread.submit(partial(_save, path, self._state(self._stored, is_end=False)))
         self._timer = loop.call_later(_LOOK_S, self._look, loop, path)
 
-    def _state(self, timestamp: int) -> bytes:
+    def _state(self, timestamp: int, *, is_end: bool) -> bytes:
         """Put down what the next run must know. Streams that it would find too late anyway are left out."""
         late = timestamp - TOLERANCE
         streams = {
             name: [[*stream, last] for stream, last in signing.streams.items() if last >= late]
             for name, signing in self._signings.items()
         }
-        return json.dumps({"timestamp": timestamp, "streams": streams}).encode()
+        return json.dumps({"timestamp": timestamp, "is_end": is_end, "streams": streams}).encode()
 
 
-def _load(path: Path) -> tuple[int, Mapping[str, list[list[int]]]]:
+def _load(path: Path) -> tuple[int, Mapping[str, list[list[int]]], bool]:
     try:
         state = json.loads(path.read_bytes())
         timestamp = int(state["timestamp"])
+        was_ended = bool(state.get("is_end", True))
         streams = {
             str(name): [
                 [int(number) for number in (sysid, compid, link_id, last)] for sysid, compid, link_id, last in all_
@@ -96,11 +103,11 @@ def _load(path: Path) -> tuple[int, Mapping[str, list[list[int]]]]:
             for name, all_ in state["streams"].items()
         }
     except FileNotFoundError:
-        return 0, {}
+        return 0, {}, True
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         _log.warning("signing.state_lost", file=str(path), why=str(error), what="timestamps begin with the clock")
-        return 0, {}
-    return timestamp, streams
+        return 0, {}, True
+    return timestamp, streams, was_ended
 
 
 def _save(path: Path, state: bytes) -> None:

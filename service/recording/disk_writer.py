@@ -9,7 +9,7 @@ import structlog
 #: So much is lost if the process is killed.
 _FLUSH_S = 1.0
 #: At the end: a disk that hangs must not keep the daemon from ending.
-_PATIENCE_S = 5.0
+_PATIENCE_S = 2.0
 #: An SD card that stalls for so many bytes loses the rest: minutes of telemetry, 90 s of a full UART at 115200.
 _MAX_WAITING = 1 << 20
 
