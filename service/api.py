@@ -7,6 +7,7 @@ any number of {"progress": ...} lines and one last line with "result" or "error"
 
 import asyncio
 import json
+import os
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -33,6 +34,15 @@ from storage.mission_store import MissionStore, MissionSummary, ReceivedMission,
 #: The greatest number that a request may hold.
 MOST = 2**31 - 1
 _MAX_LINE = 1 << 20
+#: More clients at a time are hung up on.
+_MAX_CLIENTS = 16
+#: For a request to arrive whole, and for its answer to be read.
+_REQUEST_TIMEOUT_S = 5.0
+_ANSWER_TIMEOUT_S = 10.0
+#: Where a pushed list comes from, as every ground station is shown it.
+_MAX_SOURCE = 100
+#: Missions in one answer: a thousand are 300 kB.
+_MOST_LISTED = 1000
 _LAST_ANSWERS_S = 0.05
 _log = structlog.get_logger()
 T = TypeVar("T")
@@ -57,7 +67,8 @@ class MissionJobs:
         """Do what a request asks for; `tell` takes the progress. ControlError, StoreError or ValueError say why not."""
         match request.get("do"):
             case "push":
-                return await self.push(mission_items(request.get("items")), str(request.get("source")), tell)
+                source = str(request.get("source"))[:_MAX_SOURCE]
+                return await self.push(mission_items(request.get("items")), source, tell)
             case "pull":
                 return await self.pull()
             case "status":
@@ -148,6 +159,7 @@ class MissionJobs:
                 *(f"{count} x {why} (share)" for why, count in daemon.share_refused.items()),
             ],
             "recording": self._daemon.recording,
+            "store_trouble": self._daemon.store_trouble,
             "mission_records": None if held is None else held.identity.count,
             "mission_checksum": None if held is None else _hex(held.identity.checksum),
             "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),
@@ -172,7 +184,11 @@ class MissionJobs:
 
 def listed(store: MissionStore, limit: int) -> Json:
     """Answer the request "missions"."""
-    return {"missions": [_fields(mission) | {"checksum": _hex(mission.checksum)} for mission in store.list(limit)]}
+    return {
+        "missions": [
+            _fields(mission) | {"checksum": _hex(mission.checksum)} for mission in store.list(min(limit, _MOST_LISTED))
+        ]
+    }
 
 
 def shown(store: MissionStore, number: int) -> Json:
@@ -200,8 +216,15 @@ class ControlServer:
         A socket that a killed daemon left behind is replaced: the state lock says that it is dead.
         """
         try:
+            if not self._path.parent.exists():
+                self._path.parent.mkdir(0o700)
+            if self._path.parent.stat().st_uid not in (os.getuid(), 0):
+                raise PermissionError(f"{self._path.parent} belongs to another user")
             self._path.unlink(missing_ok=True)
-            self._server = await asyncio.start_unix_server(self._serve, self._path, limit=_MAX_LINE)
+            # The backlog is also how many connections asyncio takes in one turn of the loop.
+            self._server = await asyncio.start_unix_server(
+                self._serve, self._path, limit=_MAX_LINE, backlog=_MAX_CLIENTS
+            )
             self._path.chmod(0o660)
         except OSError as error:
             reason = error.strerror or str(error)
@@ -220,6 +243,10 @@ class ControlServer:
         await asyncio.gather(*self._clients)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if len(self._clients) >= _MAX_CLIENTS:
+            _log.warning("control.too_many_clients", limit=_MAX_CLIENTS)
+            writer.transport.abort()
+            return
         client = asyncio.current_task()
         assert client is not None
         self._clients.add(client)
@@ -227,6 +254,9 @@ class ControlServer:
             await self._answer(reader, writer)
         finally:
             self._clients.discard(client)
+            if writer.transport.get_write_buffer_size():
+                # An answer that nobody reads would stay in memory.
+                writer.transport.abort()
             writer.close()
 
     async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -234,8 +264,11 @@ class ControlServer:
             writer.write(to_json(answer).encode() + b"\n")
 
         try:
-            tell({"result": await self._jobs.do(_request(await _read_line(reader)), tell)})
-            await writer.drain()
+            line = await asyncio.wait_for(_read_line(reader), _REQUEST_TIMEOUT_S)
+            tell({"result": await self._jobs.do(_request(line), tell)})
+            await _send_all(writer)
+        except TimeoutError:
+            tell({"error": f"no whole request came within {_REQUEST_TIMEOUT_S:.0f} s"})
         except (ControlError, StoreError) as error:
             tell({"error": str(error)})
         except ValueError as error:
@@ -244,6 +277,13 @@ class ControlServer:
             pass
         except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
             tell({"error": "the daemon was stopped meanwhile; `pull` tells what the flight controller holds"})
+
+
+async def _send_all(writer: asyncio.StreamWriter) -> None:
+    """Wait until the client has read it all, but not for ever."""
+    writer.transport.set_write_buffer_limits(high=0)
+    with suppress(TimeoutError):
+        await asyncio.wait_for(writer.drain(), _ANSWER_TIMEOUT_S)
 
 
 async def _read_line(reader: asyncio.StreamReader) -> bytes:

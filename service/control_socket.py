@@ -3,6 +3,8 @@
 
 import os
 from pathlib import Path
+from tempfile import gettempdir
+from zlib import crc32
 
 from service.settings import SettingsError, default_state_dir
 
@@ -14,7 +16,9 @@ _SERVICE_FOLDER = "/run/naze-bridge"
 def socket_of_daemon(state_dir: Path) -> Path:
     """Return where the daemon of this process listens."""
     given = _runtime_directory()
-    return (state_dir if given is None else given) / SOCKET_NAME
+    if given is None:
+        given = state_dir if os.access(state_dir, os.W_OK) else _stand_in(state_dir)
+    return given / SOCKET_NAME
 
 
 def find_socket(state_dir: Path | None) -> Path:
@@ -23,7 +27,8 @@ def find_socket(state_dir: Path | None) -> Path:
     SettingsError if this is a user without a home, and there is no service.
     """
     if state_dir is not None:
-        return state_dir / SOCKET_NAME
+        own, stand_in = state_dir / SOCKET_NAME, _stand_in(state_dir) / SOCKET_NAME
+        return stand_in if stand_in.exists() and not own.exists() else own
     service = (_runtime_directory() or Path(_SERVICE_FOLDER)) / SOCKET_NAME
     try:
         own = default_state_dir() / SOCKET_NAME
@@ -32,6 +37,12 @@ def find_socket(state_dir: Path | None) -> Path:
             return service
         raise
     return service if service.exists() and not own.exists() else own
+
+
+def _stand_in(state_dir: Path) -> Path:
+    """The folder for the socket where the state directory cannot be written: this user's, and closed to others."""
+    base = os.environ.get("XDG_RUNTIME_DIR") or gettempdir()
+    return Path(base) / f"naze-bridge-{os.getuid()}-{crc32(bytes(state_dir.absolute())):08x}"
 
 
 def _runtime_directory() -> Path | None:

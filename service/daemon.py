@@ -46,6 +46,7 @@ _STORE_PATIENCE_S = 0.2
 _REST_INTERVAL_S = 0.02
 #: Frames come in over zenoh only if its transport is authenticated, or if the owner said that it need not be.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
+_FLIGHT = {"vehicle.armed": True, "vehicle.disarmed": False}
 _WHO_MAY_WRITE = f"anyone who reaches it may write missions and parameters; to restrict it: {page('docs/signing.md')}"
 
 _log = structlog.get_logger()
@@ -104,7 +105,10 @@ class Daemon:
             self._loop.time(),
             self._recording.tap,
         )
-        self.store = StoreWorker(settings.state_dir)
+        self._complained_of_accept = False
+        #: Why missions are kept in memory only; empty if they are stored.
+        self.store_trouble = ""
+        self.store = StoreWorker(settings.state_dir, self._cannot_store)
         #: Set when ground stations can connect.
         self.started = asyncio.Event()
         self._finder = PortFinder(host or Host(), settings.state_dir) if isinstance(settings.fc, AutoFc) else None
@@ -279,6 +283,10 @@ class Daemon:
         self.bridge.gcs_gone(peer, self._loop.time())
         self.flush()
 
+    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
+        """Choose which of a full link's connections makes room."""
+        return self.bridge.ground.displaced(peers)
+
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """Speak to `peer` unasked."""
         self.bridge.ground.add_default_peer(peer, until_answered=until_answered)
@@ -334,6 +342,8 @@ class Daemon:
 
     def _log_event(self, level: Level, event: str, /, **facts: object) -> None:
         getattr(_log, level)(event, **facts)
+        if event in _FLIGHT:
+            self._recording.flies(is_flying=_FLIGHT[event])
         if event == "fc.found":
             self.found_at = self._loop.time()
         elif event in ("fc.lost", "fc.port_lost"):
@@ -348,12 +358,23 @@ class Daemon:
             _log.info("fc.searching", fc=self.fc_where)
         self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)
 
+    def _cannot_store(self, why: str) -> None:
+        self.store_trouble = why
+        self.bridge.ground.notice = "Missions are kept in memory: state folder unusable"
+        self.flush()
+
     def _fault(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """A callback of the loop raised: log it, and set up the line to the flight controller again.
 
         asyncio would write to standard error, and block there if nobody reads it.
         """
         error = context.get("exception")
+        if isinstance(error, OSError) and "accept" in context["message"]:
+            # No file descriptor is left for a client; asyncio tries again every second.
+            if not self._complained_of_accept:
+                self._complained_of_accept = True
+                _log.warning("daemon.cannot_accept", why=error.strerror)
+            return
         _log.error("daemon.fault", what=context["message"], exc_info=error)
         if error is not None and "handle" in context:
             self.bridge.restart("internal error", self._loop.time())

@@ -4,6 +4,7 @@
 For journald each line has its priority in front (sd-daemon(3)).
 """
 
+import logging
 import os
 import select
 import sys
@@ -92,6 +93,14 @@ class _JournalLines:
 _least_level = _LeastLevel()
 
 
+class _FromLibraries(logging.Handler):
+    """Sends what libraries log (asyncio above all) the same way; by itself it would wait for a full pipe."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        level = _log.error if record.levelno >= logging.ERROR else _log.warning
+        level("library.log", logger=record.name, what=record.getMessage(), exc_info=record.exc_info)
+
+
 def set_log_level(level: str) -> None:
     """Show events from this level on: debug, info, warning or error."""
     _least_level.level = level
@@ -101,6 +110,7 @@ def set_up_logging(level: str) -> None:
     """Configure structlog for this process."""
     set_log_level(level)
     output = _StandardError()
+    logging.basicConfig(handlers=[_FromLibraries()], level=logging.WARNING, force=True)
     structlog.configure(
         processors=[
             _least_level,

@@ -32,8 +32,8 @@ VERIFIED = "VERIFIED"  # the outcome by which latest_verified() finds a mission
 
 #: Bytes of missions that are kept.
 BUDGET = 200 << 20
-#: So much is freed at once when the budget is reached, so that not every mission pays for the search.
-_FREED_AT_ONCE = 1 << 20
+#: This part of the budget is freed at once when it is reached, so that not every mission pays for the search.
+_FREED_PART = 50
 _DELETED_AT_ONCE = 20
 _BUDGET_IN_MEMORY = 8 << 20
 
@@ -216,7 +216,7 @@ class MissionStore:
     def _make_room(self) -> None:
         if self._size() <= self._budget:
             return
-        while self._size() > self._budget - _FREED_AT_ONCE:
+        while self._size() > self._budget - self._budget // _FREED_PART:
             oldest = self._connection.execute(
                 "SELECT number FROM missions ORDER BY CASE WHEN outcome IN ('REJECTED', 'CANCELLED') THEN 0"
                 " WHEN outcome = ? THEN 2 ELSE 1 END, number LIMIT ?",

@@ -9,7 +9,7 @@ from bridge.gcs.cost import Cost
 from bridge.gcs.guard import Standing
 from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
-from bridge.gcs.stations import Stations
+from bridge.gcs.stations import Stations, displaced
 from bridge.model.events import EventLog
 from protocols.mavlink.codec import FrameWriter, Packed, pack
 from protocols.mavlink.dialect import Message, messages
@@ -57,6 +57,8 @@ class Ground:
         self._datagrams: list[tuple[Peer, bytes]] = []
         self._texts = RecentTexts()
         self._now = 0.0
+        #: What each newcomer is told: a trouble that began before it came.
+        self.notice = ""
         #: Frames from ground stations whose checksum was wrong.
         self.bad_frames = 0
         #: Whole frames from ground stations, by link and message id.
@@ -162,11 +164,18 @@ class Ground:
             self._everyone = None
             self._log_event("info", "gcs.found", station=str(station))
             self._on_newcomer(peer)
+            if self.notice:
+                self.say(Severity.WARNING, self.notice, station)
 
     def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
         """Record a frame that is served."""
         if not self._stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
             self.tap([frame.raw])
+
+    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
+        """Which of a full link's connections makes room: none that has proven itself, if there are others."""
+        others = {peer: at for peer, at in peers.items() if self._standing(peer) is not Standing.PROVEN}
+        return displaced(others or peers)
 
     def _has_standing(self, peer: Peer) -> bool:
         standing = self._standing(peer)

@@ -3,6 +3,7 @@
 
 import asyncio
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,7 +23,7 @@ from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
-from storage.state_lock import StateLock
+from storage.state_lock import StateLock, StateUnusableError
 from storage.store_error import StoreError
 
 if TYPE_CHECKING:
@@ -70,7 +71,10 @@ def run(
 
 def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
     assert settings.state_dir is not None
-    with StateLock(settings.state_dir):
+    with ExitStack() as stack:
+        # A disk that cannot be written keeps nobody on the ground: the store says so, and keeps missions in memory.
+        with suppress(StateUnusableError):
+            stack.enter_context(StateLock(settings.state_dir))
         asyncio.run(_main(settings, load, socket_of_daemon(settings.state_dir)))
 
 

@@ -48,6 +48,8 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
         host, _, port = facts["page"].rpartition(":")
         own = addresses[:1] if host == "0.0.0.0" and addresses else [host]  # noqa: S104
         yield "Page", f"http://{own[0]}:{port}/"
+    if facts["store_trouble"]:
+        yield "Missions", f"kept in memory only: {facts['store_trouble']}"
     for text in facts["recording"]:
         yield "Recording", text
     for text in facts.get("ports_passed_over", ()):

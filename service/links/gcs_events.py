@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a link to ground stations tells the daemon."""
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from bridge.gcs.station import Peer
@@ -14,6 +15,9 @@ class GcsEvents(Protocol):
 
     def gcs_gone(self, peer: Peer) -> None:
         """A connection was closed."""
+
+    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
+        """Which of a full link's connections makes room. `peers`: when each last spoke, oldest first."""
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """`peer` is spoken to before it was heard; or only as long as nobody on its link was heard."""

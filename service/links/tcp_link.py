@@ -70,11 +70,12 @@ class TcpLink:
                 self._resting = self._loop.call_later(_REST_S, self._listen)
             return
         if len(self._clients) >= _MAX_CLIENTS:
-            connection.close()
+            displaced = self._events.displaced({peer: client.heard_at for peer, client in self._clients.items()})
             level = _log.debug if self._complained else _log.warning
-            level("gcs.too_many_clients", link=self.name, refused=str(sender), limit=_MAX_CLIENTS)
+            level("gcs.too_many_clients", link=self.name, displaced=str(displaced), limit=_MAX_CLIENTS)
             self._complained = True
-            return
+            self._clients[displaced].close()
+            self._forget(displaced)
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)
@@ -92,11 +93,14 @@ class TcpLink:
             self._events.gcs_data(peer, data, datagram=False)
 
         def gone() -> None:
-            del self._clients[peer]
-            self._events.remove_default_peer(peer)
-            self._events.gcs_gone(peer)
+            self._forget(peer)
 
         self._clients[peer] = _TcpClient(connection, self._loop, received, gone)
+
+    def _forget(self, peer: Peer) -> None:
+        del self._clients[peer]
+        self._events.remove_default_peer(peer)
+        self._events.gcs_gone(peer)
 
 
 class _TcpClient:
@@ -112,6 +116,8 @@ class _TcpClient:
         self._socket = connection
         self._loop = loop
         self._received = received
+        #: When it last spoke, on the loop's clock; at first when it came.
+        self.heard_at = loop.time()
         self._gone = gone
         self._unsent = SendQueue(_MAX_UNSENT)
         self._hanging_up: asyncio.Handle | None = None
@@ -172,6 +178,7 @@ class _TcpClient:
         except OSError:
             data = b""
         if data:
+            self.heard_at = self._loop.time()
             self._received(data)
         else:
             self._hang_up()

@@ -36,6 +36,11 @@ class Recording:
             return FcPort(open_device, on_open, on_data, on_close)
         return RecordedPort(open_device, on_open, on_data, on_close, self._uart)
 
+    def flies(self, *, is_flying: bool) -> None:
+        """The craft was armed, or disarmed: the log of a flight is kept longest."""
+        if self._tlog is not None:
+            self._tlog.flies(is_flying=is_flying)
+
     def describe(self) -> list[str]:
         """Tell what is recorded, and where; or why not any more."""
         told = [] if self._tlog is None else [f"telemetry log: {self._tlog.describe()}"]

@@ -16,9 +16,10 @@ import structlog
 from protocols.tlog import first_stamp_us
 from service.settings import TlogLimits
 
-#: As Mission Planner names them; ours are in UTC.
+#: As Mission Planner names them; ours are in UTC, and those in which the craft was armed say so.
 _NAME_FORMAT = "%Y-%m-%d %H-%M-%S.tlog"
-_NAME_PATTERN = re.compile(r"\d{4}-\d\d-\d\d \d\d-\d\d-\d\d\.tlog")
+_NAME_PATTERN = re.compile(r"\d{4}-\d\d-\d\d \d\d-\d\d-\d\d( flight)?\.tlog")
+_FLIGHT = " flight"
 #: A full or read-only disk seldom mends itself.
 _RETRY_S = 60.0
 #: What was written is on the disk after so long even if the power is cut; more often costs an SD card's life.
@@ -65,7 +66,7 @@ class TlogFolder:
             return str(file.path)
         return f"stopped, {trouble}" if trouble else f"nothing yet, in {self._folder}"
 
-    def write(self, records: bytes, now: float) -> None:
+    def write(self, records: bytes, now: float, *, is_flight: bool = False) -> None:
         """Append whole records to the open file, or to a new one. `now`: seconds of a monotonic clock."""
         if not records or now < self._retry_at:
             return
@@ -74,6 +75,8 @@ class TlogFolder:
                 self._file = self._create(datetime.fromtimestamp(first_stamp_us(records) / 1e6, UTC))
             if self._measure_free_space(self._folder) < LEFT_FREE + len(records):
                 raise _LittleSpaceError(f"less than {LEFT_FREE >> 20} MB of the disk are free")
+            if is_flight:
+                self._mark_flight(self._file)
             is_first = not self._file.size
             self._file.append(records)
             if is_first:
@@ -95,29 +98,35 @@ class TlogFolder:
         """Make a file named for `began`, or for the first second after it that has none: clocks may be set back."""
         self._folder.mkdir(parents=True, exist_ok=True)
         self._make_room(began)
-        while (path := self._folder / began.strftime(_NAME_FORMAT)).exists():
+        while (path := self._folder / began.strftime(_NAME_FORMAT)).exists() or _of_flight(path).exists():
             began += timedelta(seconds=1)
         self._own.append(path)
         return _OpenFile(path)
 
     def _make_room(self, now: datetime) -> None:
-        """Remove the oldest until another file fits. What is not named as ours are is left alone.
+        """Remove the oldest until another file fits, flights last. What is not named as ours are is left alone.
 
-        Our own of this run go last, in the order in which they were written, and not for their age: the clock may have
-        been weeks behind when we began.
+        Our own of this run go after earlier ones, in the order in which they were written, and not for their age: the
+        clock may have been weeks behind when we began.
         """
         too_old = (now - timedelta(days=self._limits.days)).strftime(_NAME_FORMAT)
         sizes = {path: path.stat().st_size for path in self._folder.iterdir() if _NAME_PATTERN.fullmatch(path.name)}
         total = sum(sizes.values())
         earlier = sorted(sizes.keys() - set(self._own))
         self._own = [path for path in self._own if path in sizes]
-        for path in (*earlier, *self._own):
-            is_too_old = path in earlier and path.name < too_old
-            if not is_too_old and total + self._limits.file_size <= self._limits.total_size:
+        outdated = {path for path in earlier if path.name < too_old}
+        for path in sorted((*earlier, *self._own), key=lambda path: (path not in outdated, _is_flight(path))):
+            if path not in outdated and total + self._limits.file_size <= self._limits.total_size:
                 return
             path.unlink()
             total -= sizes[path]
             _log.debug("tlog.removed", file=str(path))
+
+    def _mark_flight(self, file: "_OpenFile") -> None:
+        if not _is_flight(file.path):
+            self._own.remove(file.path)
+            file.path = file.path.rename(_of_flight(file.path))
+            self._own.append(file.path)
 
     def _give_up(self, error: OSError, now: float) -> None:
         self.close()
@@ -125,6 +134,14 @@ class TlogFolder:
         level = _log.debug if self._trouble else _log.warning
         self._trouble = error.strerror or str(error)
         level("tlog.stopped", folder=str(self._folder), why=self._trouble, tried_again_every_s=_RETRY_S)
+
+
+def _is_flight(path: Path) -> bool:
+    return path.stem.endswith(_FLIGHT)
+
+
+def _of_flight(path: Path) -> Path:
+    return path.with_stem(path.stem + _FLIGHT)
 
 
 class _LittleSpaceError(OSError):

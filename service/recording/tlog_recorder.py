@@ -29,6 +29,8 @@ class TlogRecorder:
         self._read_clock = read_clock
         self._epoch_us = self._present_epoch_us()
         self._file_is_over = False
+        self._is_flying = False
+        self._has_flown = False  # since what was written last
         self._awaits_vehicle = True
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
 
@@ -40,6 +42,12 @@ class TlogRecorder:
             if self._awaits_vehicle:
                 frames = self._vehicle_first(frames)
             self._writer.put(b"".join([tlog_record(frame, at_us) for frame in frames]))
+
+    def flies(self, *, is_flying: bool) -> None:
+        """What is recorded from now on is a flight, or no more."""
+        with self._writer.lock:
+            self._is_flying = is_flying
+            self._has_flown = self._has_flown or is_flying
 
     def describe(self) -> str:
         """Tell into which file it records, or why into none."""
@@ -71,7 +79,9 @@ class TlogRecorder:
             self._awaits_vehicle = True
 
     def _write(self, records: bytes) -> None:
-        self._folder.write(records, time.monotonic())
+        with self._writer.lock:
+            is_flight, self._has_flown = self._has_flown, self._is_flying
+        self._folder.write(records, time.monotonic(), is_flight=is_flight)
         if self._file_is_over:
             self._folder.close()
 

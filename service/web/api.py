@@ -64,7 +64,8 @@ class Api:
         daemon = self._daemon
         try:
             listed = (await self._jobs.list_missions(1))["missions"]
-            newest, store = {key: listed[0][key] for key in ("number", "outcome")} if listed else None, ""
+            newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
+            store = daemon.store_trouble
         except StoreError as error:
             newest, store = None, str(error)
         return _json(

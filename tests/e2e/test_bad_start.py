@@ -79,10 +79,21 @@ def test_two_daemons_on_one_state_directory(start: Starter) -> None:
     first.wait()
 
 
-def test_a_state_directory_that_cannot_be(tmp_path: Path) -> None:
+def test_a_state_directory_that_cannot_be(start: Starter, tmp_path: Path) -> None:
+    """It is a disk that died: the daemon flies on without, and says so everywhere."""
     file = tmp_path / "file"
     file.write_text("not a directory")
-    assert_refused(run_naze_bridge("run", "--fc", "sim:", "--state-dir", str(file / "state")), str(file))
+    daemon = start.daemon("sim:", state_dir=file / "state")
+    daemon.wait()
+    with udp_station(daemon.address) as station:
+        station.say_hello()
+        assert "memory" in station.wait_for("STATUSTEXT").text
+        assert station.upload(plain_plan(12)) == 0
+    assert [mission["outcome"] for mission in daemon.missions()] == ["VERIFIED"]
+    shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
+    assert "kept in memory only" in shown
+    assert daemon.has_logged("store.unavailable")
+    assert daemon.end() == 0
 
 
 def test_the_plain_simulator_takes_a_mission(start: Starter) -> None:

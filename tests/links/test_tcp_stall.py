@@ -5,10 +5,12 @@ import asyncio
 import os
 import resource
 import socket
+from collections.abc import Mapping
 
 import pytest
 
 from bridge.gcs.station import Peer
+from bridge.gcs.stations import displaced
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
@@ -29,6 +31,9 @@ class Listener:
 
     def gcs_gone(self, peer: Peer) -> None:
         """The connection is closed."""
+
+    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
+        return displaced(peers)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         self.peers.append(peer)

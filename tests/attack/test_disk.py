@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strangers that want the disk or the control socket for themselves, and a disk that is not there."""
+
+import os
+import socket
+from contextlib import ExitStack
+from pathlib import Path
+
+from attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m
+from benches import Starter
+from plain_station import udp_station
+from plan import plain_plan
+from programs import comes, free_port, until
+
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mission_item import MissionResult
+
+
+def logs(state_dir: Path) -> list[Path]:
+    return sorted((state_dir / "logs").glob("*.tlog"))
+
+
+def test_the_log_of_a_flight_outlives_a_flood(start: Starter, stack: ExitStack) -> None:
+    config = start.directory / "naze-bridge.toml"
+    config.write_text("tlog_file_mb = 1\ntlog_total_mb = 3\n")
+    bench = start.bench(daemon_options=("--config", str(config)))
+    state = bench.daemon.state_dir
+    pilot = Stranger(bench.daemon.address, sysid=255)
+    stack.callback(pilot.close)
+    pilot.send(HELLO)
+    bench.board.set("armed 1")
+    until(lambda: any("flight" in path.name for path in logs(state)), "the log of a flight")
+    (flight,) = [path for path in logs(state) if "flight" in path.name]
+    bench.board.set("armed 0")
+    stranger = Stranger(bench.daemon.address)
+    stack.callback(stranger.close)
+    text = m.MAVLink_statustext_message(6, b"x" * 50)
+    with Watch(bench.daemon.address), Attack(lambda: stranger.send(*[text] * 50), per_s=40) as attack:
+        assert comes(lambda: attack.count > 300)
+    assert flight in logs(state)
+    # 1.2 MB were sent; what floods is left out.
+    assert sum(path.stat().st_size for path in logs(state)) < 600_000
+
+
+def test_what_is_refused_is_not_recorded(start: Starter, stack: ExitStack, tmp_path: Path) -> None:
+    key_file = tmp_path / "gcs.key"
+    key_file.write_text("loop the loop\n")
+    key_file.chmod(0o600)
+    link = f"udpin:127.0.0.1:{free_port()}"
+    config = tmp_path / "naze-bridge.toml"
+    config.write_text(f'gcs = [{{address = "{link}", key_file = "{key_file}"}}]\n')
+    bench = start.bench(gcs=[link], daemon_options=("--config", str(config)))
+    stranger = Stranger(("127.0.0.1", int(link.rpartition(":")[2])), sysid=77)
+    stack.callback(stranger.close)
+    for _ in range(20):
+        stranger.send(HELLO, m.MAVLink_param_request_list_message(1, 1), m.MAVLink_mission_clear_all_message(1, 1))
+    until(lambda: "20 x" in str(bench.daemon.ask({"do": "status"})["refused"]), "the refusals")
+    assert bench.daemon.end() == 0
+    recorded = b"".join(path.read_bytes() for path in logs(bench.daemon.state_dir))
+    assert 77 not in {frame.sysid for frame in MavlinkSplitter().feed(recorded)}
+
+
+def test_lists_without_end(start: Starter, stack: ExitStack) -> None:
+    """39 GB a day of rejected lists: few of one sender are stored."""
+    bench = start.bench()
+    stranger = stack.enter_context(udp_station(bench.daemon.address, sysid=77))
+
+    def reject() -> None:
+        plan = plain_plan(3)
+        stranger.announce(3)
+        stranger.wait_for("MISSION_REQUEST", "MISSION_ACK")
+        stranger.give([plan[0]], 0)
+        stranger.send(m.MAVLink_mission_item_int_message(1, 1, 1, 3, 22, 0, 1, 0, 0, 0, 0, 2**31 - 1, 0, 9.0))
+        stranger.send(m.MAVLink_mission_ack_message(1, 1, 15))
+
+    with Watch(bench.daemon.address) as witness, Attack(reject, per_s=100) as attack:
+        assert comes(lambda: attack.count > 60)
+        until(lambda: len(witness.gaps_s) >= 3, "heartbeats")
+    assert len(bench.daemon.missions()) <= 25
+    with udp_station(bench.daemon.address) as pilot:
+        until(lambda: pilot.upload(plain_plan(20)) is MissionResult.ACCEPTED, "the pilot's upload")
+
+
+def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path: Path) -> None:
+    blocked = tmp_path / "blocked"
+    blocked.write_text("a file where the folder should be")
+    board = start.board()
+    daemon = start.daemon(str(board.link), state_dir=blocked / "state")
+    daemon.wait()
+    with Watch(daemon.address) as witness, udp_station(daemon.address) as pilot:
+        pilot.send(HELLO)
+        assert "memory" in pilot.wait_for("STATUSTEXT").text
+        assert_uploads(pilot, board, plain_plan(20))
+        until(lambda: len(witness.gaps_s) >= 3, "heartbeats")
+    assert [kept["outcome"] for kept in daemon.missions()] == ["VERIFIED"]
+    status = daemon.status()
+    assert status is not None
+    assert "cannot" in status["store_trouble"]
+
+
+def test_connections_that_ask_nothing(start: Starter) -> None:
+    bench = start.bench()
+    path = str(bench.daemon.state_dir / "control.sock")
+    with Watch(bench.daemon.address) as witness, ExitStack() as clients:
+        for _ in range(300):
+            client = socket.socket(socket.AF_UNIX)
+            clients.callback(client.close)
+            client.setblocking(False)
+            try:
+                client.connect(path)
+            except BlockingIOError:
+                break
+        until(lambda: len(witness.gaps_s) >= 5, "heartbeats")
+        assert len(os.listdir(f"/proc/{bench.daemon.process.pid}/fd")) < 80
+    assert "Traceback" not in bench.daemon.printed
+    assert comes(lambda: bench.daemon.status() is not None)
+
+
+def test_a_source_of_a_megabyte_is_cut(start: Starter) -> None:
+    bench = start.bench()
+    with Watch(bench.daemon.address) as witness:
+        until(lambda: len(witness.gaps_s) >= 1, "a heartbeat")
+        for _ in range(5):
+            bench.daemon.ask({"do": "push", "source": "y" * 900_000, "items": []})
+        until(lambda: len(witness.gaps_s) >= 4, "heartbeats")
+    assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] < 60
+
+
+def test_answers_that_nobody_reads(start: Starter) -> None:
+    bench = start.bench()
+    bench.daemon.push(plain_plan(140))
+    number = bench.daemon.missions()[0]["number"]
+    before = _memory_kb(bench.daemon.process.pid)
+    with Watch(bench.daemon.address) as witness, ExitStack() as clients:
+        for _ in range(400):
+            client = socket.socket(socket.AF_UNIX)
+            client.settimeout(1)
+            clients.callback(client.close)
+            try:
+                client.connect(str(bench.daemon.state_dir / "control.sock"))
+                client.sendall(b'{"do": "mission", "number": %d}\n' % number)
+            except OSError:
+                continue
+        until(lambda: len(witness.gaps_s) >= 5, "heartbeats")
+        assert _memory_kb(bench.daemon.process.pid) - before < 30_000
+    assert comes(lambda: bench.daemon.status() is not None)
+
+
+def _memory_kb(pid: int) -> int:
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))

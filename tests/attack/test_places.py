@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strangers that take every place on a link, and speak in the pilot's name."""
+
+import itertools
+import socket
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m, sign
+from benches import Bench, Starter
+from plain_station import PlainStation, tcp_station, udp_station
+from plan import plain_plan
+from programs import comes, free_port, until
+
+from protocols.mission_item import MissionResult
+
+PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
+#: More than there are places on a link.
+CROWD = 48
+
+
+@pytest.fixture
+def key_file(tmp_path: Path) -> Path:
+    path = tmp_path / "gcs.key"
+    path.write_text(PASSPHRASE + "\n")
+    path.chmod(0o600)
+    return path
+
+
+def guarded(start: Starter, key_file: Path) -> Bench:
+    link = f"udpin:127.0.0.1:{free_port()}"
+    config = start.directory / "naze-bridge.toml"
+    config.write_text(f'gcs = [{{address = "{link}", key_file = "{key_file}"}}]\n')
+    bench = start.bench(gcs=[link], daemon_options=("--config", str(config)))
+    bench.daemon.port = int(link.rpartition(":")[2])
+    return bench
+
+
+def crowd(bench: Bench, stack: ExitStack, count: int = CROWD) -> Attack:
+    """Strangers from several machines that each say hello now and then, seven a second in all and more."""
+    strangers = [Stranger(bench.daemon.address, f"127.0.1.{1 + number % 9}") for number in range(count)]
+    for stranger in strangers:
+        stack.callback(stranger.close)
+    turns = itertools.cycle(strangers)
+    return Attack(lambda: next(turns).send(HELLO), per_s=30)
+
+
+def hears_heartbeats(station: PlainStation, count: int) -> bool:
+    """Say hello every second, as ground stations do, until so many heartbeats came."""
+    for _ in range(20):
+        station.send(HELLO)
+        count -= len([heard for heard in station._messages(1.0) if heard.get_type() == "HEARTBEAT"])
+        if count <= 0:
+            return True
+    return False
+
+
+def test_a_crowd_locks_no_newcomer_out_of_an_open_link(start: Starter, stack: ExitStack) -> None:
+    bench = start.bench()
+    with crowd(bench, stack) as attack:
+        assert comes(lambda: attack.count > 2 * CROWD)
+        with udp_station(bench.daemon.address) as pilot:
+            assert hears_heartbeats(pilot, 4)
+            assert_uploads(pilot, bench.board, plain_plan(30))
+
+
+def test_a_crowd_does_not_take_the_place_of_a_pilot_that_was_there(start: Starter, stack: ExitStack) -> None:
+    bench = start.bench()
+    with udp_station(bench.daemon.address) as pilot:
+        pilot.send(HELLO)
+        pilot.wait_for("HEARTBEAT")
+        with crowd(bench, stack) as attack:
+            # Longer than the 5 s of silence after which a place was given away: the pilot's radio fades.
+            assert comes(lambda: attack.count > 240)
+            places = bench.daemon.ask({"do": "status"})["ground_stations"]
+            assert any(str(pilot.own_address[1]) in place for place in places)
+            assert_uploads(pilot, bench.board, plain_plan(20))
+
+
+def test_strangers_on_a_keyed_link_take_nothing_from_who_has_the_key(
+    start: Starter, stack: ExitStack, key_file: Path
+) -> None:
+    bench = guarded(start, key_file)
+    with crowd(bench, stack) as attack:
+        assert comes(lambda: attack.count > 2 * CROWD)
+        with udp_station(bench.daemon.address) as pilot:
+            # As Mission Planner: it signs once it has seen a signed heartbeat.
+            assert hears_heartbeats(pilot, 2)
+            sign(pilot._codec, PASSPHRASE)
+            assert_uploads(pilot, bench.board, plain_plan(30))
+            listener = stack.enter_context(udp_station(bench.daemon.address))
+            assert hears_heartbeats(listener, 2)
+            assert listener.upload(plain_plan(3)) is MissionResult.DENIED
+            listener.send(m.MAVLink_command_long_message(1, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
+            assert listener.wait_for("COMMAND_ACK").result == m.MAV_RESULT_DENIED
+            # What the pilot is told is not for strangers.
+            listener.heard.clear()
+            assert_uploads(pilot, bench.board, plain_plan(10))
+            hears_heartbeats(listener, 2)
+            assert "STATUSTEXT" not in {message.get_type() for message in listener.heard}
+
+
+def test_nobody_sets_the_rates_of_who_has_the_key(start: Starter, stack: ExitStack, key_file: Path) -> None:
+    """Unsigned, from the pilot's own address: as a forged UDP packet is."""
+    bench = guarded(start, key_file)
+    with udp_station(bench.daemon.address) as pilot:
+        sign(pilot._codec, PASSPHRASE)
+        pilot.send(HELLO)
+        pilot.wait_for("ATTITUDE")
+        forger = m.MAVLink(None, srcSystem=250, srcComponent=191)
+        for message in (
+            m.MAVLink_request_data_stream_message(1, 1, 0, 4, 0),
+            m.MAVLink_command_long_message(1, 1, 511, 0, 30, -1, 0, 0, 0, 0, 0),
+            m.MAVLink_param_request_list_message(1, 1),
+        ):
+            pilot._socket.send(bytes(message.pack(forger)))
+        until(lambda: "3 x not signed" in str(bench.daemon.ask({"do": "status"})["refused"]), "the refusals")
+        pilot.heard.clear()
+        for _ in range(20):
+            pilot.wait_for("ATTITUDE")
+        assert "PARAM_VALUE" not in {message.get_type() for message in pilot.heard}
+
+
+def test_idle_connections_lock_no_newcomer_out(start: Starter, stack: ExitStack) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
+    with tcp_station(port) as first:
+        first.send(HELLO)
+        first.wait_for("HEARTBEAT")
+        for _ in range(CROWD):
+            idle = stack.enter_context(socket.create_connection(("127.0.0.1", port)))
+            idle.settimeout(5)
+        with tcp_station(port) as pilot:
+            pilot.send(HELLO)
+            pilot.wait_for("HEARTBEAT")
+            assert_uploads(pilot, bench.board, plain_plan(15))
+        # The one that came first is still there.
+        assert_uploads(first, bench.board, plain_plan(9))
+
+
+def test_the_pilots_heartbeats_come_through_the_crowd(start: Starter, stack: ExitStack) -> None:
+    bench = start.bench()
+    with Watch(bench.daemon.address) as witness, crowd(bench, stack) as attack:
+        assert comes(lambda: attack.count > 150)
+        assert comes(lambda: len(witness.gaps_s) >= 5)
