@@ -24,16 +24,18 @@ class Line:
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def requests(self) -> int:
-        return self._written().count(b"$M<")
+    def most_requests(self, seconds: float) -> int:
+        """The requests of the busiest time of that length."""
+        times = [at for at, data in self._lines() for _ in range(data.count(b"$M<"))]
+        return max(len([at for at in times if began <= at < began + seconds]) for began in times)
 
     def flash_writes(self) -> int:
-        written = self._written()
+        written = b"".join(data for _, data in self._lines())
         return sum(written.count(request) for request in _WRITES)
 
-    def _written(self) -> bytes:
+    def _lines(self) -> list[tuple[float, bytes]]:
         lines = [json.loads(line) for line in self._path.read_text().splitlines() if line.endswith("}")]
-        return b"".join(bytes.fromhex(line["write"]) for line in lines if "write" in line)
+        return [(line["t"], bytes.fromhex(line["write"])) for line in lines if "write" in line]
 
 
 @pytest.fixture
@@ -106,14 +108,12 @@ def test_questions_to_an_armed_board(bench: Bench, line: Line, stack: ExitStack)
     )
     with Watch(bench.daemon.address) as witness:
         until(lambda: len(witness.gaps_s) >= 2, "heartbeats")
-        before, beats = line.requests(), len(witness.gaps_s)
-        until(lambda: len(witness.gaps_s) >= beats + 4, "four seconds of peace")
-        in_peace = line.requests() - before
         with Attack(lambda: stranger.send(*asked), per_s=100):
-            before, beats = line.requests(), len(witness.gaps_s)
+            beats = len(witness.gaps_s)
             until(lambda: len(witness.gaps_s) >= beats + 4, "four seconds of attack")
-            attacked = line.requests() - before
-    assert attacked <= 1.5 * in_peace + 40, (in_peace, attacked)
+    assert bench.daemon.end() == 0
+    # It was 342 a second, and is 44 without an attack; finding the board takes more in its first second.
+    assert line.most_requests(4.0) <= 4 * 100
 
 
 def test_flash_writes(bench: Bench, line: Line, stack: ExitStack) -> None:
