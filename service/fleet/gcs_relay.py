@@ -2,11 +2,12 @@
 """`fleet mavlink`: one vehicle's MAVLink between zenoh and local ground stations."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import zenoh
 
 from bridge.gcs.station import Peer
+from bridge.gcs.stations import displaced
 from service.links.connection import GcsAddress
 from service.links.gcs_links import GcsLink, open_link
 from service.zenoh_link.keys import MAVLINK_IN, MAVLINK_OUT, full
@@ -47,6 +48,10 @@ class GcsRelay:
     def gcs_gone(self, peer: Peer) -> None:
         """Forget a station."""
         self._peers.pop(peer, None)
+
+    def displaced(self, peers: Mapping[Peer, float]) -> Peer:
+        """Which of a full link's connections makes room."""
+        return displaced(peers)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """Speak to a station before it was heard."""
