@@ -25,7 +25,8 @@ from pathlib import Path
 from benchmarks.figure import Figure
 from benchmarks.idle import cpu_percent, listener, udpout
 from benchmarks.processes import BenchmarkError, daemon, simulated_naze
-from bridge.bridge import Bridge, BridgeConfig
+from bridge.bridge import Bridge
+from bridge.config import BridgeConfig
 from bridge.gcs.station import Peer
 from bridge.model.events import Level
 from protocols.mavlink.codec import FrameWriter, pack

@@ -11,24 +11,20 @@ An autopilot that speaks MAVLink for itself is not represented but passed throug
     FcSession <-> PassThrough <-> Ground
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import partial
 from math import inf
 
-from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
-from bridge.controllers.table import PROFILES
+from bridge.config import BridgeConfig
 from bridge.fc.actions import FcActions
 from bridge.fc.msp_sharing import MspSharing
-from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
+from bridge.fc.profile import FlightController, RuleSettings, VehicleView
 from bridge.fc.session import FcSession
 from bridge.fc.states.mavlink import Mavlink
-from bridge.fc.states.port import Autopilot
-from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground, Tap
-from bridge.gcs.guard import Guard, GuardRefusal, LinkAccess, Standing, denial
+from bridge.gcs.guard import Guard
 from bridge.gcs.pass_through import PassThrough
-from bridge.gcs.station import Peer, Severity, Station
+from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import AnyFcMissionStore
@@ -37,6 +33,7 @@ from bridge.model.events import EventLog, Incidents
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.vehicle.commands import CommandService
+from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
 from bridge.vehicle.message_router import MessageRouter
@@ -46,46 +43,18 @@ from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.vehicle_report import VehicleReporter
-from protocols.mavlink.codec import MavlinkDecoder
-from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.target import target_of
-
-_AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
-
-
-@dataclass(frozen=True, slots=True)
-class BridgeConfig:
-    """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed.
-
-    `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
-    `links`: who may write over which link, by its name; over others everyone may. `passes_everything`: an autopilot
-    that speaks MAVLink for itself gets commands over those others, too.
-    """
-
-    speeds: Sequence[int | None]
-    sysid: int = 1
-    compid: int = 1
-    takeoff_max_m: int = TAKEOFF_MAX_M
-    autopilot: Autopilot = Autopilot.AUTO
-    profiles: Sequence[Profile] = PROFILES
-    links: Mapping[str, LinkAccess] = field(default_factory=dict)
-    version: str = ""
-    unix_time_s: Callable[[float], float | None] = lambda _now: None
-    passes_everything: bool = False
 
 
 class Bridge:
-    """Puts the parts together and hands each what is its business."""
+    """Wires the parts and routes events between them."""
 
     def __init__(self, config: BridgeConfig, log_event: EventLog, now: float, tap: Tap | None = None) -> None:
         self._config = config
         self._log_event = log_event
-        self._decoder = MavlinkDecoder()
         self._store_effects: list[StoreEffect] = []
         self._was_armed = False
         self._logs_flights = tap is not None
-        self._pass_through: PassThrough | None = None
         self._announcer = LinkAnnouncer()
         self._incidents = Incidents()
 
@@ -126,12 +95,13 @@ class Bridge:
         self._downloads = MissionDownloads(
             self.missions, self.runner, self.ground, self._is_armed, lambda: self.session.vehicle.home_or_position()
         )
-        self._parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
+        parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
         self.sharing = MspSharing(self.session, self.runner)
         commands = CommandService(self.ground, self._vehicle, actions, self._banner)
-        self._router = MessageRouter(
-            self.ground, self._uploads, self._downloads, self._parameters, commands, self._vehicle
+        router = MessageRouter(self.ground, self._uploads, self._downloads, parameters, commands, self._vehicle)
+        self._incoming = Incoming(
+            self.guard, self.ground, router, parameters, self.session.send_mavlink, config.sysid, config.compid
         )
 
     # The flight controller's side.
@@ -144,7 +114,7 @@ class Bridge:
     @property
     def is_passing_through(self) -> bool:
         """Tell whether an autopilot speaks MAVLink for itself, so that nobody here waits for the next byte."""
-        return self._pass_through is not None and isinstance(self.session.state, Mavlink)
+        return self._incoming.routes is not None and isinstance(self.session.state, Mavlink)
 
     def fc_opened(self, now: float) -> None:
         """Take note that the port is open."""
@@ -164,7 +134,7 @@ class Bridge:
             return
         if armed:
             self._uploads.armed(now)
-        self.ground.record_flight(on=armed and self._logs_flights and self._pass_through is None)
+        self.ground.record_flight(on=armed and self._logs_flights and self._incoming.routes is None)
         self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")
         self._was_armed = armed
 
@@ -176,38 +146,7 @@ class Bridge:
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Take bytes from a ground station. A datagram holds whole frames only."""
-        for frame in self.ground.received(peer, data, now, datagram=datagram):
-            refused = self.guard.refusal(peer, frame)
-            if refused is not None and refused.is_forged:
-                continue
-            self.ground.heard(peer, frame, now)
-            station = Station(peer, frame.sysid, frame.compid)
-            if refused is not None:
-                self._answer_refused(refused, station, frame)
-            elif self._pass_through is not None:
-                self._pass_on(self._pass_through, station, frame, now)
-            else:
-                self.ground.record(peer, frame, now)
-                if self._router.understands(frame.msgid):
-                    message = self._decoder.decode(frame)
-                    if message is not None and self._is_for_us(message):
-                        self._router.take(station, message, now)
-
-    def _pass_on(self, routes: PassThrough, station: Station, frame: MavlinkFrame, now: float) -> None:
-        """Send a frame on to those it is meant for, as far as its sender may."""
-        peer = station.peer
-        if not self.ground.budgets.allows(Cost.PASSED, peer, now):
-            return
-        may_speak_to_others = self.guard.standing(peer) is not Standing.LISTENER
-        if not routes.from_station(peer, frame, to_stations=may_speak_to_others):
-            self.ground.record(peer, frame, now)
-            return
-        refused = self.guard.command_refusal(peer, frame)
-        if refused is None:
-            self.ground.record(peer, frame, now)
-            self.session.send_mavlink(frame.raw)
-        else:
-            self._answer_refused(refused, station, frame)
+        self._incoming.received(peer, data, now, datagram=datagram)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""
@@ -271,7 +210,7 @@ class Bridge:
         for peer in self.ground.expire(now):
             self._left(peer)
         self._say(self._announcer.tick(now))
-        if self._pass_through is None:
+        if self._incoming.routes is None:
             self._vehicle.tick(now)
 
     def next_deadline(self) -> float:
@@ -283,53 +222,24 @@ class Bridge:
             self.ground.next_deadline(),
             self._announcer.next_deadline(),
             self._watch.next_deadline(),
-            self._vehicle.next_deadline() if self._pass_through is None else None,
+            self._vehicle.next_deadline() if self._incoming.routes is None else None,
         )
         return min((deadline for deadline in deadlines if deadline is not None), default=inf)
 
     def _say(self, news: tuple[Severity, str] | None) -> None:
         # An autopilot that speaks for itself is not spoken for.
-        if news is not None and self._pass_through is None:
+        if news is not None and self._incoming.routes is None:
             self.ground.say(*news)
-
-    def _answer_refused(self, refused: GuardRefusal, station: Station, frame: MavlinkFrame) -> None:
-        """Answer what the guard did not let in, in the name of who was asked, if that is the vehicle."""
-        system, component = target_of(frame)
-        if self._pass_through is None:
-            answers, is_vehicle = partial(self.ground.to, station), self._is_ours(system, component)
-        else:
-            asked = self._pass_through.addressed(system)
-            answers = partial(self.ground.to_as, asked or system, component or _AUTOPILOT, station)
-            is_vehicle = asked is not None
-        if not (is_vehicle and self.ground.allows(station, Cost.ANSWER)):
-            return
-        message = self._decoder.decode(frame)
-        answer = None if message is None else denial(message, station)
-        if answer is not None:
-            answers(answer)
-        elif message is not None and frame.msgid == messages.MAVLINK_MSG_ID_PARAM_SET and self._pass_through is None:
-            # The protocol's answer is the value that is in force.
-            self._parameters.send_one(station, message.param_id, -1)
-        if refused.is_first:
-            answers(messages.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))
 
     def _newcomer(self, peer: Peer) -> None:
         # An autopilot that speaks for itself is not spoken for.
-        if self._pass_through is None:
+        if self._incoming.routes is None:
             self._vehicle.newcomer(peer)
 
     def _left(self, peer: Peer) -> None:
         self.guard.forget(peer)
-        if self._pass_through is not None:
-            self._pass_through.forget(peer)
-
-    def _is_for_us(self, message: Message) -> bool:
-        system = getattr(message, "target_system", 0)
-        component = getattr(message, "target_component", 0)
-        return self._is_ours(system, component)
-
-    def _is_ours(self, system: int, component: int) -> bool:
-        return system in (0, self._config.sysid) and component in (0, self._config.compid)
+        if self._incoming.routes is not None:
+            self._incoming.routes.forget(peer)
 
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         store = self._open_store(controller)
@@ -340,7 +250,7 @@ class Bridge:
             self._announcer.lost(now if self.session.vehicle.heard_at is None else self.session.vehicle.heard_at)
             return
         is_passed_through = controller.profile.is_passed_through
-        self._pass_through = PassThrough(self.ground) if is_passed_through else None
+        self._incoming.routes = PassThrough(self.ground) if is_passed_through else None
         self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
             # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
@@ -363,12 +273,12 @@ class Bridge:
         news = self.session.vehicle.take_news()
         if news:
             self.report.heard(news)
-            if self._pass_through is None:
+            if self._incoming.routes is None:
                 self._vehicle.heard(news, now)
 
     def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
-        if self._pass_through is not None:
-            self._pass_through.from_autopilot(frames)
+        if self._incoming.routes is not None:
+            self._incoming.routes.from_autopilot(frames)
 
     def _is_armed(self) -> bool | None:
         return self.session.vehicle.armed

@@ -11,7 +11,8 @@ from typing import Any, Protocol
 
 import structlog
 
-from bridge.bridge import Bridge, BridgeConfig
+from bridge.bridge import Bridge
+from bridge.config import BridgeConfig
 from bridge.fc.autosense import SPEEDS
 from bridge.fc.msp_sharing import refused
 from bridge.gcs.guard import LinkAccess

@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bridge.bridge import Bridge, BridgeConfig
+from bridge.bridge import Bridge
+from bridge.config import BridgeConfig
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
