@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from protocols.mission_file.error import MissionFileError
+from protocols.mission_file.error import MissionFileError, Note, no_note
 from protocols.mission_file.qgc_plan import read_qgc_plan, write_qgc_plan
 from protocols.mission_file.qgc_wpl import read_qgc_wpl, write_qgc_wpl
 from protocols.mission_item import MissionItem
@@ -16,8 +16,10 @@ def write_mission_file(items: Sequence[MissionItem], name: str) -> str:
     return write_qgc_plan(items) if _is_plan(name) else write_qgc_wpl(items)
 
 
-def read_mission_file(data: bytes, name: str) -> list[MissionItem]:
-    """Read a QGC WPL 110 or a QGroundControl plan, recognised by content; home is item 0.
+def read_mission_file(data: bytes, name: str, note: Note = no_note) -> list[MissionItem]:
+    """Read a QGC WPL 110, a QGroundControl plan or Mission Planner's JSON, recognised by content; home is item 0.
+
+    `note` is told what was mended.
 
     Raises MissionFileError, one sentence: what is wrong, where in the file `name`, and what to do.
     """
@@ -28,7 +30,7 @@ def read_mission_file(data: bytes, name: str) -> list[MissionItem]:
         remedy = "give a QGC WPL 110 (.waypoints) or a QGroundControl plan (.plan)"
         raise MissionFileError(name, f"line {line}", "this is not text", remedy) from None
     read = read_qgc_plan if text.lstrip().startswith("{") or _is_plan(name) else read_qgc_wpl
-    return read(text, name)
+    return read(text, name, note)
 
 
 def _is_plan(name: str) -> bool:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The error for an unreadable mission file, worded for the user."""
 
+from collections.abc import Callable, Iterable
+
 _LONGEST_QUOTE = 24
 
 
@@ -18,3 +20,24 @@ def shown(found: object) -> str:
         return "a list" if isinstance(found, list) else "an object"
     text = ascii(found)
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
+
+
+#: Is told in one sentence of what was mended in a file on reading it.
+Note = Callable[[str], None]
+
+
+def no_note(_text: str) -> None:
+    """Tell nobody."""
+
+
+def refuse_other_plans(commands: Iterable[int], name: str) -> None:
+    """Refuse a list that is no mission: Mission Planner and QGroundControl keep fences and rally points like one."""
+    kinds = {_OTHER_PLANS.get(command, "") for command in commands}
+    if kinds and "" not in kinds:
+        raise MissionFileError(
+            name, "", f"this file holds {' and '.join(sorted(kinds))}", "give the mission's own file"
+        )
+
+
+#: MAV_CMD_NAV_FENCE_... and MAV_CMD_NAV_RALLY_POINT.
+_OTHER_PLANS = dict.fromkeys(range(5000, 5005), "a fence") | {5100: "rally points"}

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""QGroundControl's .plan (JSON; docs.qgroundcontrol.com, "Plan File Format"). Fence and rally points are passed over.
+"""QGroundControl's .plan and Mission Planner's .mission (JSON; docs.qgroundcontrol.com, "Plan File Format").
 
+Fence and rally points beside a mission are passed over.
 An item's frame and params are what QGroundControl would send; its AltitudeMode only says how it arrived at them.
 Surveys and corridor scans carry the plain items they are flown as, and become those. The planned home position becomes
 item 0, as QGroundControl sends it to an ArduPilot vehicle.
@@ -12,31 +13,58 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from protocols.mission_file.coordinate import file_degrees_to_e7
-from protocols.mission_file.error import MissionFileError, shown
+from protocols.mission_file.error import MissionFileError, Note, no_note, refuse_other_plans, shown
 from protocols.mission_item import Command, Frame, MissionItem
 
 _PARAM_COUNT = 7
+_VERSIONS = (1,)
+#: Mission Planner leaves it at 0.
+_MISSION_VERSIONS = (2, 1, 0)
 #: MAV_AUTOPILOT_ARDUPILOTMEGA and MAV_TYPE_QUADROTOR, as which QGroundControl meets the bridge.
 _ARDUPILOT, _QUADROTOR = 3, 2
 _SAVE_AGAIN = "save it again from QGroundControl"
 
 
-def read_qgc_plan(text: str, name: str) -> list[MissionItem]:
+def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
     """Return the items, home first; MissionFileError names the file and the entry of mission.items, from 1."""
     plan = _parse(text, name)
-    if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
+    if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None):
         what = 'this is no QGroundControl plan, its fileType is not "Plan"'
         raise MissionFileError(name, "", what, _SAVE_AGAIN)
+    _refuse_unknown_version(plan.get("version", _VERSIONS[0]), _VERSIONS, "the plan", name)
     mission = plan.get("mission")
     entries = mission.get("items") if isinstance(mission, dict) else None
     if not isinstance(mission, dict) or not isinstance(entries, list):
         raise MissionFileError(name, "", "the plan has no mission.items", _SAVE_AGAIN)
+    _refuse_unknown_version(mission.get("version", _MISSION_VERSIONS[0]), _MISSION_VERSIONS, "its mission", name)
+    if not entries and (other := _other_part(plan)):
+        raise MissionFileError(name, "", f"the plan holds {other} and no mission", "give the mission's own file")
+    if plan.get("fileType") is None:
+        note("read as Mission Planner's own JSON: it has no fileType")
     items = [_home(mission.get("plannedHomePosition"), name)]
     for number, entry in enumerate(entries, start=1):
         where = f"item {number}"
         for simple in _simple_items(entry, name, where):
             items.append(_item(simple, len(items), name, where))
+    refuse_other_plans([item.command for item in items[1:]], name)
     return items
+
+
+def _refuse_unknown_version(version: Any, known: tuple[int, ...], what: str, name: str) -> None:
+    if version not in known:
+        known_ones = " and ".join(map(str, known))
+        text = f"{what} is of version {shown(version)}, and only {known_ones} can be read here"
+        raise MissionFileError(name, "", text, "save it as a QGC WPL 110 file (.waypoints)")
+
+
+def _other_part(plan: dict[str, Any]) -> str | None:
+    """The part of a plan that holds something, besides the mission."""
+    parts = {"a fence": ("geoFence", "circles", "polygons", "polygon"), "rally points": ("rallyPoints", "points")}
+    for what, (part, *lists) in parts.items():
+        held = plan.get(part)
+        if isinstance(held, dict) and any(held.get(each) for each in lists):
+            return what
+    return None
 
 
 def write_qgc_plan(items: Sequence[MissionItem]) -> str:
@@ -108,7 +136,7 @@ def _home(position: Any, name: str) -> MissionItem:
 
 def _simple_items(entry: Any, name: str, where: str) -> Iterator[dict[str, Any]]:
     kind = entry.get("type") if isinstance(entry, dict) else None
-    if kind == "SimpleItem":
+    if kind == "SimpleItem" or (kind is None and isinstance(entry, dict) and "coordinate" in entry):
         yield entry
     elif kind == "ComplexItem":
         transects = entry.get("TransectStyleComplexItem")
@@ -124,6 +152,10 @@ def _simple_items(entry: Any, name: str, where: str) -> Iterator[dict[str, Any]]
 
 def _item(entry: dict[str, Any], seq: int, name: str, where: str) -> MissionItem:
     params = entry.get("params")
+    coordinate = entry.get("coordinate")
+    if isinstance(params, list) and isinstance(coordinate, list):
+        # Mission Planner's .mission has the place apart.
+        params = params[:4] + coordinate
     if not isinstance(params, list) or len(params) != _PARAM_COUNT:
         raise MissionFileError(name, where, f"it has no list of {_PARAM_COUNT} params", _SAVE_AGAIN)
     command = _integer(entry, "command", 65535, name, where)

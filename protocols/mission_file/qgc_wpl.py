@@ -3,18 +3,22 @@
 
 A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and
 autocontinue. Tabs by custom; any white space is taken. Empty lines and lines that start with # are passed over.
+What Mission Planner's own reader takes besides is taken too, and noted: commas, items that are not numbered 0, 1, 2...,
+no home, home with command 0, no autocontinue.
 """
 
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NoReturn
 
 from protocols.mission_file.coordinate import file_degrees_to_e7
-from protocols.mission_file.error import MissionFileError, shown
-from protocols.mission_item import MissionItem
+from protocols.mission_file.error import MissionFileError, Note, no_note, refuse_other_plans, shown
+from protocols.mission_item import Command, Frame, MissionItem
 
 _HEADER = ["QGC", "WPL", "110"]
-_INTEGER_FIELDS = {"seq": 65535, "current": 1, "frame": 255, "command": 65535}
+_INTEGER_FIELDS = {"seq": 65535, "current": 255, "frame": 255, "command": 65535}
 _NUMBER_FIELDS = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude", "autocontinue")
 _FIELD_COUNT = len(_INTEGER_FIELDS) + len(_NUMBER_FIELDS)
 # float() and int() also take underscores and the digits of every script: not what a ground station writes.
@@ -23,29 +27,65 @@ _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?|nan|inf|inf
 _SAVE_AGAIN = "save the file again from the ground station"
 
 
-def read_qgc_wpl(text: str, name: str) -> list[MissionItem]:
+def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
     """Return the items, home first; MissionFileError names the file and the line.
 
     A file without items is an error: it is cut off more likely than meant to erase a mission.
     """
     items: list[MissionItem] = []
     header_seen = False
-    for number, line in enumerate(text.split("\n"), start=1):
-        fields = line.split()
+    lines = text.split("\n")
+    for number, line in enumerate(lines, start=1):
+        fields = _fields(line)
         if not fields or line.startswith("#"):
             continue
         where = f"line {number}"
         if header_seen:
-            items.append(_item(fields, len(items), name, where))
+            if len(fields) == _FIELD_COUNT - 1 and number < len(lines):
+                # In the last line, without an end, it would be a line cut off.
+                note(f"{where}: autocontinue is missing")
+                fields.append("1")
+            items.append(_item(fields, name, where))
         elif fields == _HEADER:
             header_seen = True
         else:
-            what = f"the header is {shown(line)}, not 'QGC WPL 110'"
-            raise MissionFileError(name, where, what, "save it as a QGC WPL 110 file (.waypoints)")
+            _refuse_header(fields, line, name, where)
     if not items:
         what = "the file has no items" if header_seen else "the file is empty"
         raise MissionFileError(name, "", what, _SAVE_AGAIN)
-    return items
+    refuse_other_plans([item.command for item in items[1:]], name)
+    return _numbered(items, note)
+
+
+def _fields(line: str) -> list[str]:
+    """The fields of a line; a few commas are decimal commas, which no ground station writes."""
+    if line.count(",") >= _FIELD_COUNT - 2:
+        return [field.strip() for field in line.split(",")]
+    return line.split()
+
+
+def _refuse_header(fields: list[str], line: str, name: str, where: str) -> NoReturn:
+    is_rally = fields[0] == "RALLY"
+    if is_rally or (len(fields) == 2 and all(map(_NUMBER.fullmatch, fields))):
+        what = "this file holds rally points" if is_rally else "this file holds a fence"
+        raise MissionFileError(name, where, what, "give the mission's own file")
+    what = f"the header is {shown(line)}, not 'QGC WPL 110'"
+    raise MissionFileError(name, where, what, "save it as a QGC WPL 110 file (.waypoints)")
+
+
+def _numbered(items: list[MissionItem], note: Note) -> list[MissionItem]:
+    """Number the items by their order, as Mission Planner does."""
+    if items[0].seq != 0:
+        note("there is no item 0: home is missing")
+        items = [replace(items[0], seq=0, command=0, lat_e7=None, lon_e7=None, alt_m=0.0), *items]
+    elif items[0].command == 0:
+        note("home has command 0, taken for a WAYPOINT")
+    if items[0].command == 0:
+        items[0] = replace(items[0], command=int(Command.NAV_WAYPOINT), frame=int(Frame.GLOBAL))
+    odd = next((place for place, item in enumerate(items) if item.seq != place), None)
+    if odd is not None:
+        note(f"item {items[odd].seq} where item {odd} must be: numbered by their order")
+    return [replace(item, seq=place) for place, item in enumerate(items)]
 
 
 def write_qgc_wpl(items: Sequence[MissionItem]) -> str:
@@ -53,7 +93,7 @@ def write_qgc_wpl(items: Sequence[MissionItem]) -> str:
     return "".join(f"{line}\n" for line in ["QGC WPL 110", *map(_line, items)])
 
 
-def _item(fields: list[str], seq: int, name: str, where: str) -> MissionItem:
+def _item(fields: list[str], name: str, where: str) -> MissionItem:
     if len(fields) != _FIELD_COUNT:
         what = f"{len(fields)} fields where an item has {_FIELD_COUNT}, the line is cut off or damaged"
         raise MissionFileError(name, where, what, _SAVE_AGAIN)
@@ -67,10 +107,7 @@ def _item(fields: list[str], seq: int, name: str, where: str) -> MissionItem:
         if not _NUMBER.fullmatch(token):
             what = f"{field} is {shown(token)}, not a number"
             raise MissionFileError(name, where, what, _SAVE_AGAIN)
-    found, _, frame, command = integers
-    if found != seq:
-        what = f"item {found} where item {seq} must be"
-        raise MissionFileError(name, where, what, "number the items from 0 (home) without gaps")
+    seq, _, frame, command = integers
     p1, p2, p3, p4, lat, lon, alt_m, _ = map(float, fields[len(integers) :])
     lat_e7 = file_degrees_to_e7(lat, "latitude", name, where)
     lon_e7 = file_degrees_to_e7(lon, "longitude", name, where)

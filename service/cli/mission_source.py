@@ -14,8 +14,13 @@ MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are abou
 
 
 def load_mission(path: Path) -> list[MissionItem]:
-    """Read the mission file at `path`; MissionFileError also where the disk says no."""
-    return read_mission_file(mission_bytes(path), click.format_filename(path))
+    """Read the mission file at `path`; MissionFileError also where the disk says no. Notes go to standard error."""
+    name = click.format_filename(path)
+
+    def note(text: str) -> None:
+        click.echo(f"naze-bridge: {name}, {text}", err=True)
+
+    return read_mission_file(mission_bytes(path), name, note)
 
 
 def mission_bytes(path: Path) -> bytes:

@@ -84,6 +84,21 @@ def test_what_is_missing_of_home_is_left_to_the_rules(
     assert (item.lat_e7, item.lon_e7, item.alt_m) == (lat_e7, lon_e7, alt_m)
 
 
+def test_mission_planners_own_json_is_read() -> None:
+    """Its .mission has no fileType, versions of its own, and an item's place apart from its params."""
+    point = {"command": 16, "coordinate": [45.3840141, 8.4741389, 13], "frame": 3, "params": [0, 3, 0, 0]}
+    document = {
+        "groundStation": "MissionPlanner",
+        "version": 1,
+        "mission": {"items": [point], "plannedHomePosition": [45.3838, 8.4733, 131], "version": 0},
+    }
+    notes: list[str] = []
+    home, item = read_mission_file(json.dumps(document).encode(), "field.mission", notes.append)
+    assert (home.lat_e7, home.alt_m) == (453838000, 131.0)
+    assert (item.command, item.frame, item.p2, item.lat_e7, item.alt_m) == (16, 3, 3.0, 453840141, 13.0)
+    assert notes == ["read as Mission Planner's own JSON: it has no fileType"]
+
+
 def test_a_survey_becomes_the_items_it_is_flown_as() -> None:
     survey = {
         "type": "ComplexItem",
@@ -130,6 +145,11 @@ def test_a_plan_is_known_by_what_is_in_it() -> None:
         (plan(home="here"), ["plannedHomePosition", "'here'"]),
         (plan(home=[1, "2", 3]), ["plannedHomePosition", "'2'"]),
         (plan(home=[1, 2, 3, 4]), ["plannedHomePosition"]),
+        (plan(simple()) | {"version": 2}, ["the plan is of version 2", "only 1 can be read"]),
+        (plan(simple(), version=3), ["its mission is of version 3"]),
+        (plan() | {"geoFence": {"polygons": [{"polygon": [[1, 2]]}]}}, ["holds a fence and no mission"]),
+        (plan() | {"rallyPoints": {"points": [[1, 2, 3]]}}, ["holds rally points and no mission"]),
+        (plan(simple(5001)), ["holds a fence"]),
     ],
 )
 def test_a_damaged_plan_is_refused_with_the_place(document: Any, words: list[str]) -> None:

@@ -64,6 +64,41 @@ def test_other_hands_write_it_differently(lines: list[str]) -> None:
     assert same(read(*lines), ITEMS)
 
 
+def noted(*lines: str) -> tuple[list[MissionItem], list[str]]:
+    notes: list[str] = []
+    return read_mission_file("\n".join([*lines, ""]).encode(), "field.waypoints", notes.append), notes
+
+
+@pytest.mark.parametrize(
+    ("lines", "note"),
+    [
+        ([HOME, "2" + POINT[1:]], "item 2 where item 1 must be: numbered by their order"),
+        ([HOME, "0" + POINT[1:]], "item 0 where item 1 must be: numbered by their order"),
+        ([HOME.replace("\t0\t16\t", "\t3\t0\t"), POINT], "home has command 0, taken for a WAYPOINT"),
+        ([HOME, POINT.removesuffix("\t1")], "line 3: autocontinue is missing"),
+        ([HOME.replace("\t", ","), POINT.replace("\t", ", ")], None),
+        ([HOME.replace("0\t1\t", "0\t2\t"), POINT], None),
+    ],
+    ids=["a gap", "a repeat", "home with command 0", "11 fields", "commas", "current = 2"],
+)
+def test_what_mission_planners_own_reader_takes_is_read_and_noted(lines: list[str], note: str | None) -> None:
+    items, notes = noted(HEADER, *lines)
+    assert same(items, ITEMS)
+    assert notes == ([note] if note else [])
+
+
+def test_a_file_without_home_gets_one_without_a_place() -> None:
+    items, notes = noted(HEADER, POINT)
+    assert notes == ["there is no item 0: home is missing"]
+    assert (items[0].seq, items[0].command, items[0].lat_e7) == (0, 16, None)
+    assert same(items[1:], ITEMS[1:])
+
+
+def test_a_last_line_that_lacks_its_end_and_autocontinue_is_cut_off() -> None:
+    with pytest.raises(MissionFileError, match="11 fields"):
+        read_mission_file("\n".join([HEADER, HOME, POINT.removesuffix("\t1")]).encode(), "x")
+
+
 def test_the_last_line_needs_no_end() -> None:
     assert same(read_mission_file("\n".join([HEADER, HOME, POINT]).encode(), "x"), ITEMS)
 
@@ -107,10 +142,11 @@ def test_degrees_are_rounded_to_1e_7(degrees: str, e7: int | None) -> None:
         ([HEADER, HOME, POINT.replace("\t16\t", "\t65536\t")], ["line 3", "command", "65535"]),
         ([HEADER, HOME, POINT.replace("\t3\t", "\t-1\t")], ["line 3", "frame", "'-1'"]),
         ([HEADER, HOME, POINT.replace("\t3\t", "\t256\t")], ["line 3", "frame", "255"]),
-        ([HEADER, HOME, "2" + POINT[1:]], ["line 3", "item 2 where item 1 must be"]),
-        ([HEADER, HOME, HOME], ["line 3", "item 0 where item 1 must be"]),
-        ([HEADER, POINT], ["line 2", "item 1 where item 0 must be"]),
-        ([HEADER, "", HOME, "# x", "2" + POINT[1:]], ["line 5"]),
+        ([HEADER, "", HOME, "# x", POINT + "\t1"], ["line 5"]),
+        ([HEADER, HOME, POINT.replace("\t16\t", "\t5001\t")], ["holds a fence", "the mission's own file"]),
+        ([HEADER, HOME, POINT.replace("\t16\t", "\t5100\t")], ["holds rally points"]),
+        (["#saved by Mission Planner", "45.383\t8.473", "45.384\t8.474"], ["line 2", "holds a fence"]),
+        (["RALLY\t45.383\t8.473\t100\t0\t0\t0"], ["line 1", "holds rally points"]),
     ],
 )
 def test_a_damaged_file_is_refused_with_its_line(lines: list[str], words: list[str]) -> None:
@@ -138,7 +174,7 @@ any_items = st.lists(
     st.builds(
         MissionItem,
         seq=st.just(0),
-        command=st.integers(0, 65535),
+        command=st.integers(1, 4999) | st.integers(5200, 65535),
         frame=st.integers(0, 255),
         p1=numbers,
         p2=numbers,
