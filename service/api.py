@@ -68,7 +68,8 @@ class MissionJobs:
         match request.get("do"):
             case "push":
                 source = str(request.get("source"))[:_MAX_SOURCE]
-                return await self.push(mission_items(request.get("items")), source, tell)
+                may_erase = request.get("may_erase") is not False
+                return await self.push(mission_items(request.get("items")), source, tell, may_erase=may_erase)
             case "pull":
                 return await self.pull()
             case "status":
@@ -82,8 +83,10 @@ class MissionJobs:
             case other:
                 raise ControlError(f"{other!r} is no request")
 
-    async def push(self, items: list[MissionItem], source: str, progress: Callable[[Json], None]) -> Json:
-        """Check, push and verify a list; no items clear what is there."""
+    async def push(
+        self, items: list[MissionItem], source: str, progress: Callable[[Json], None], *, may_erase: bool = True
+    ) -> Json:
+        """Check, push and verify a list; no items clear what is there. `may_erase`: see LocalMissions.push."""
         future: asyncio.Future[Json] = self._loop.create_future()
 
         def done(outcome: Delivery | Refusal, arrived: ArrivedMission | None) -> None:
@@ -98,8 +101,10 @@ class MissionJobs:
                 }
             _resolve(future, answer)
 
-        bridge = self._daemon.bridge
-        bridge.local.push(items, source, lambda records: progress({"progress": records}), done, self._loop.time())
+        def tell(records: int) -> None:
+            progress({"progress": records})
+
+        self._daemon.bridge.local.push(items, source, tell, done, self._loop.time(), may_erase=may_erase)
         self._daemon.flush()
         return await future
 

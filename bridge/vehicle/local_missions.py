@@ -13,8 +13,10 @@ from bridge.missions.mission_service import NO_LINK, Delivery, HeldMission, Miss
 from bridge.model.events import EventLog, Incidents
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
-from bridge.model.verdict import Verdict
+from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
+
+_WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the mission that is there")
 
 
 class LocalMissions:
@@ -43,8 +45,13 @@ class LocalMissions:
         on_progress: Callable[[int], None],
         on_done: Callable[[Delivery | Refusal, ArrivedMission | None], None],
         now: float,
+        *,
+        may_erase: bool = True,
     ) -> None:
-        """Write a list; without items, clear the flight controller's. `on_progress` gets the records written so far."""
+        """Write a list; without items, clear the flight controller's. `on_progress` gets the records written so far.
+
+        `may_erase` False: a list of which no item can be stored is refused.
+        """
         owner = object()
         incident = self._incidents.begin("push")
         arrived: list[ArrivedMission] = []
@@ -55,6 +62,8 @@ class LocalMissions:
                 return report
             verdict = check_list(items, report.rules, self._fallback_home())
             arrived.append(ArrivedMission(source, tuple(items), verdict))
+            if verdict.result is Result.CLEARED and not may_erase:
+                return _WOULD_ERASE
             return (yield from self._missions.deliver(arrived[0], on_progress))
 
         def done(result: Delivery | Refusal | LinkLost, _at: float) -> None:

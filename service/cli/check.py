@@ -12,16 +12,17 @@ from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USU
 from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
-from bridge.missions.list_check import MissionRules, check_list
+from bridge.missions.list_check import MAX_LAT_E7, MAX_LON_E7, MissionRules, check_list
 from bridge.model.finding import DROPPED
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
-from protocols.mission_item import MissionItem
+from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7
 from protocols.mission_record import identify
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_json, print_table
 from service.mission_data import verdict_data
+from service.settings import SettingsError, takeoff_limit_m
 
 #: The rules of each flight controller that stores missions.
 _RULES: Mapping[str, Callable[[RuleSettings], MissionRules]] = {
@@ -35,6 +36,24 @@ class ExitCode(IntEnum):
     ACCEPTED = 0
     REJECTED = 1
     UNREADABLE = 2
+    CLEARED = 3
+
+
+#: From the best to the worst.
+_RANKS = (ExitCode.ACCEPTED, ExitCode.CLEARED, ExitCode.REJECTED, ExitCode.UNREADABLE)
+
+
+def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tuple[int, int] | None:
+    """Read LAT,LON in degrees as (lat_e7, lon_e7)."""
+    if text is None:
+        return None
+    try:
+        lat, lon = (degrees_to_e7(float(each)) for each in text.split(","))
+    except ValueError:
+        lat = lon = None
+    if lat is None or lon is None or abs(lat) > MAX_LAT_E7 or abs(lon) > MAX_LON_E7:
+        raise click.BadParameter(f"{text!r} is no place: write it like 45.3838,8.4733")
+    return lat, lon
 
 
 @click.command()
@@ -54,6 +73,15 @@ class ExitCode(IntEnum):
     help=f"Records that it holds; without: Harakiri {USUAL_CAPACITY}, home included, INAV {INAV_CAPACITY}, "
     f"MultiWii {MULTIWII_CAPACITY}.",
 )
+@click.option(
+    "--takeoff-max-m",
+    type=click.IntRange(2, 255),
+    show_default=f"of this machine's daemon, else {TAKEOFF_MAX_M}",
+    help="Harakiri's greatest take-off height.",
+)
+@click.option(
+    "--home", metavar="LAT,LON", callback=_place, help="Where the craft is, for files whose home has no coordinates."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each file.")
 @click.pass_context
 def check(
@@ -63,17 +91,27 @@ def check(
     kind: str,
     wp_radius_cm: int,
     capacity: int | None,
+    takeoff_max_m: int | None,
+    home: tuple[int, int] | None,
     as_json: bool,
 ) -> None:
-    """Show what would become of mission files (QGC WPL 110, QGroundControl .plan) on the flight controller.
+    """Show what would become of mission files on the flight controller.
 
-    Nothing is sent anywhere. Exit code 0: every file would be accepted, 1: one would be rejected, 2: one is unreadable.
+    Files: QGC WPL 110 (.waypoints), QGroundControl .plan, Mission Planner .mission.
+
+    Nothing is sent anywhere. Exit code 0: every file would be accepted, 3: one would erase the mission, 1: one would be
+    rejected, 2: one is unreadable.
     """
-    rules = _RULES[kind](RuleSettings(TAKEOFF_MAX_M, wp_radius_cm, capacity))
-    ctx.exit(max(_check_file(path, rules, strict, as_json) for path in files))
+    try:
+        limit_m = takeoff_limit_m() if takeoff_max_m is None else takeoff_max_m
+    except SettingsError as error:
+        raise click.UsageError(f"{error}, or give --takeoff-max-m") from error
+    rules = _RULES[kind](RuleSettings(limit_m, wp_radius_cm, capacity))
+    codes = [_check_file(path, rules, home, strict, as_json) for path in files]
+    ctx.exit(max(codes, key=_RANKS.index))
 
 
-def _check_file(path: Path, rules: MissionRules, strict: bool, as_json: bool) -> ExitCode:
+def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, strict: bool, as_json: bool) -> ExitCode:
     name = click.format_filename(path)
     try:
         sent = load_mission(path)
@@ -83,24 +121,29 @@ def _check_file(path: Path, rules: MissionRules, strict: bool, as_json: bool) ->
         else:
             click.echo(f"naze-bridge: {error}", err=True)
         return ExitCode.UNREADABLE
-    verdict = check_list(sent, rules)
+    verdict = check_list(sent, rules, home)
     if as_json:
         print_json({"file": name, **verdict_data(verdict)})
     else:
         _print_verdict(name, sent, verdict)
     rejected = verdict.result is Result.REJECTED or (strict and bool(verdict.findings))
-    return ExitCode.REJECTED if rejected else ExitCode.ACCEPTED
+    if rejected:
+        return ExitCode.REJECTED
+    return ExitCode.CLEARED if verdict.result is Result.CLEARED else ExitCode.ACCEPTED
 
 
 def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]) -> None:
     click.secho(name, bold=True)
-    print_table(mission_table(sent, verdict.items, verdict.findings))
+    if verdict.ack is not MissionResult.NO_SPACE:
+        print_table(mission_table(sent, verdict.items, verdict.findings))
     click.echo(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n")
 
 
 def _summary(sent: int, verdict: Verdict[Any]) -> str:
     if verdict.result is not Result.ACCEPTED:
-        return f"MAV_MISSION_{verdict.ack.name}, {verdict.findings[-1].text()}"
+        # One item of zeros, by which MAVSDK clears, has no findings.
+        why = verdict.findings[-1].text() if verdict.findings else "Mission erased: one item of zeros"
+        return f"MAV_MISSION_{verdict.ack.name}, {why}"
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
     changed = len(verdict.findings) - dropped
     stored = f"{len(verdict.items)} of {sent} items stored, {dropped} dropped, values changed: {changed}"

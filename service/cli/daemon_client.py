@@ -17,7 +17,7 @@ from service.daemon import Daemon
 from service.links.connection import AddressError, AutoFc, FcAddress, parse_fc
 from service.log_setup import set_up_logging
 from service.mission_data import Json
-from service.settings import Settings, SettingsError, default_state_dir
+from service.settings import Settings, SettingsError, default_state_dir, takeoff_limit_m
 from service.store_worker import DATABASE_NAME
 from storage.mission_store import read_store
 from storage.store_error import StoreError
@@ -112,7 +112,7 @@ def _read_store(state_dir: Path | None, request: Json) -> Json:
 async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
     """Ask a bridge of our own on this port; ControlError or StoreError say why there is no answer."""
     set_up_logging("error")
-    daemon = Daemon(Settings(fc))
+    daemon = Daemon(Settings(fc, takeoff_max_m=takeoff_limit_m()))
     jobs = MissionJobs(daemon)
     running = asyncio.create_task(daemon.run())
     try:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge push`, `pull` and `clear`."""
 
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,25 +16,37 @@ from service.cli.printing import fail, print_json, print_table
 from service.mission_data import Json, mission_items
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
+_NO_SPACE = "MAV_MISSION_NO_SPACE"
 _UNREADABLE = 2
+_WOULD_ERASE = 3
 _STANDARD_OUTPUT = Path("-")
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
+@click.option("--erase", is_flag=True, help="Do not ask before a file of which no item can be stored erases.")
 @bridge_options
-def push(file: Path, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
+def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Write a mission file to the flight controller and verify it there.
 
-    Exit code 0: verified, 1: refused or failed (the old mission is kept), 2: the file is unreadable.
+    Exit code 0: verified, 1: refused or failed (the old mission is kept), 2: the file is unreadable, 3: no item of it
+    can be stored, and the mission was not erased.
     """
     try:
         items = load_mission(file)
     except MissionFileError as error:
         click.echo(f"naze-bridge: {error}", err=True)
         raise SystemExit(_UNREADABLE) from error
-    request = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}
-    show_delivery(ask_with_progress(state_dir, fc, request, len(items)), as_json=as_json)
+    request: Json = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}
+    delivery = ask_with_progress(state_dir, fc, request | {"may_erase": erase}, len(items))
+    if _would_erase(delivery) and not as_json and sys.stdin.isatty():
+        click.confirm(f"{delivery['text']}. Erase it?", abort=True, err=True)
+        delivery = ask_with_progress(state_dir, fc, request, len(items))
+    show_delivery(delivery, as_json=as_json)
+
+
+def _would_erase(delivery: Json) -> bool:
+    return delivery.get("verdict") == "CLEARED" and delivery["ack"] != _ACCEPTED
 
 
 @click.command()
@@ -92,14 +105,16 @@ def clear(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
 
 
 def show_delivery(delivery: Json, *, as_json: bool) -> None:
-    """Print what was sent beside what is held now; end the program with status 1 if it was not accepted."""
+    """Print what was sent beside what is held now; end the program with status 1 or 3 if it was not accepted."""
     if as_json:
         print_json(delivery)
     else:
-        if delivery.get("sent"):
+        if delivery.get("sent") and delivery["ack"] != _NO_SPACE:
             sent, stored = (mission_items(delivery[key]) for key in ("sent", "stored"))
             findings = [Finding(**finding) for finding in delivery["findings"]]
             print_table(mission_table(sent, stored, findings))
         click.echo(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
+    if _would_erase(delivery):
+        raise SystemExit(_WOULD_ERASE)
     if delivery["ack"] != _ACCEPTED:
         raise SystemExit(1)

@@ -17,11 +17,10 @@ from service.doctor.examination import examine
 from service.host import Host
 from service.mission_data import Json
 from service.settings import Settings, SettingsError, load_settings
-from service.settings.load import CONFIG_VARIABLE
+from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG
 from storage.store_error import StoreError
 
 #: What the service is started with, and where it keeps its missions.
-_SERVICE_CONFIG = Path("/etc/naze-bridge/config.toml")
 _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 
 
@@ -31,7 +30,7 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
     "--config",
     type=click.Path(path_type=Path),
     envvar=CONFIG_VARIABLE,
-    help=f"The daemon's configuration. Default: {_SERVICE_CONFIG}, if it is there.",
+    help=f"The daemon's configuration. Default: {SERVICE_CONFIG}, if it is there.",
 )
 @click.option("--state-dir", type=click.Path(path_type=Path), help="The daemon's folder for missions.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each check.")
@@ -50,8 +49,8 @@ def diagnose(
     """Print what each check finds; False if there is a problem."""
     # A service's control socket is not in its state directory: only what was named is asked there.
     asked = partial(ask_daemon, state_dir, STATUS)
-    if config is None and fc is None and _SERVICE_CONFIG.exists():
-        config = _SERVICE_CONFIG
+    if config is None and fc is None and SERVICE_CONFIG.exists():
+        config = SERVICE_CONFIG
         state_dir = state_dir or (SERVICE_STATE if SERVICE_STATE.is_symlink() else None)
     is_well = True
     for checked in _examine(config, fc, state_dir, asked):

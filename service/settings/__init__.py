@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where settings come from: flags over environment over the configuration files over defaults."""
 
-from service.settings.load import default_state_dir, load_settings
+from service.settings.load import default_state_dir, load_settings, takeoff_limit_m
 from service.settings.problem import SettingsError
 from service.settings.settings import DEFAULT_GCS, PassThroughRule, Settings, TlogLimits
 
@@ -13,4 +13,5 @@ __all__ = [
     "TlogLimits",
     "default_state_dir",
     "load_settings",
+    "takeoff_limit_m",
 ]

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from service.links.connection import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.links.write_access import WriteAccess
 from service.settings.config_files import Given, nearest, read_files
@@ -19,6 +20,8 @@ from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 
 #: Names the configuration file itself.
 CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"
+#: The service's, as its unit names it.
+SERVICE_CONFIG = Path("/etc/naze-bridge/config.toml")
 _PREFIX = "NAZE_BRIDGE_"
 
 
@@ -80,6 +83,18 @@ def load_settings(
         web=web,
         **{name: values[name] for name in _AS_THEY_ARE if name in values},
     )
+
+
+def takeoff_limit_m() -> int:
+    """takeoff_max_m as a daemon on this machine has it, for commands that do without one; SettingsError if unusable."""
+    config = Path(os.environ.get(CONFIG_VARIABLE) or SERVICE_CONFIG)
+    problems: list[Problem] = []
+    is_there = CONFIG_VARIABLE in os.environ or config.exists()
+    given = (read_files(config, problems) if is_there else {}) | _read_environment(os.environ, problems)
+    limit: int = _read_values(given, problems).get("takeoff_max_m", TAKEOFF_MAX_M)
+    if problems:
+        raise SettingsError(problems)
+    return limit
 
 
 _AS_THEY_ARE = ("fc", "sysid", "takeoff_max_m", "autopilot", "pass_through", "record_uart", "log_level", "share")

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import MissionItem
 from protocols.wp_record import unpack_record
-from service.cli.check import check
+from service.cli.main import main
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FIELD, PLAN, LONG = (EXAMPLES / name for name in ("naze-field.waypoints", "naze-field.plan", "long-146.waypoints"))
@@ -24,7 +24,7 @@ SPEED = MissionItem(1, 178, 3, 1.0, 4.0, 0.0, 0.0, 0, 0, 0.0)
 
 
 def run(*arguments: object) -> Result:
-    return CliRunner().invoke(check, [str(argument) for argument in arguments])
+    return CliRunner().invoke(main, ["check", *map(str, arguments)])
 
 
 def objects(result: Result) -> list[dict[str, Any]]:
@@ -51,11 +51,12 @@ def files(tmp_path: Path) -> dict[str, Path]:
     ("names", "code"),
     [
         (["clean"], 0),
-        (["cleared"], 0),
+        (["cleared"], 3),
         (["rejected"], 1),
         (["damaged"], 2),
         (["missing"], 2),
-        (["clean", "cleared"], 0),
+        (["clean", "cleared"], 3),
+        (["cleared", "rejected"], 1),
         (["rejected", "clean"], 1),
         (["clean", "damaged", "rejected"], 2),
     ],
@@ -176,3 +177,36 @@ def test_each_kind_of_flight_controller_has_its_rules(tmp_path: Path, kind: str,
     assert len(found["records"][0]) == 2 * (16 if kind == "harakiri" else 20)
     assert run("--kind", kind, "--capacity", "1000", LONG).exit_code == 0
     assert run("--kind", kind, LONG).exit_code == (1 if kind == "inav" else 0)
+
+
+def test_home_and_the_take_off_limit_may_be_given(tmp_path: Path) -> None:
+    path = tmp_path / "nowhere.waypoints"
+    climb = replace(POINT, command=22, lat_e7=0, lon_e7=0, alt_m=25.0)
+    path.write_text(write_qgc_wpl([replace(HOME, lat_e7=0, lon_e7=0), climb, replace(POINT, seq=2)]))
+    assert run(path).exit_code == 1
+    placed = run("--json", "--home", "45.5,8.25", "--takeoff-max-m", "30", path)
+    (document,) = objects(placed)
+    assert (document["items"][0]["lat_e7"], document["items"][0]["lon_e7"]) == (455000000, 82500000)
+    assert document["items"][1]["alt_m"] == 25
+    assert run("--home", "45.5", path).exit_code == 2
+    assert run("--home", "91,0", path).exit_code == 2
+
+
+def test_the_take_off_limit_is_the_daemons(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, config = tmp_path / "high.waypoints", tmp_path / "config.toml"
+    climb = replace(POINT, command=22, lat_e7=0, lon_e7=0, alt_m=25.0)
+    path.write_text(write_qgc_wpl([HOME, climb, replace(POINT, seq=2)]))
+    config.write_text("takeoff_max_m = 25")
+    monkeypatch.setenv("NAZE_BRIDGE_CONFIG", str(config))
+    assert objects(run("--json", path))[0]["items"][1]["alt_m"] == 25
+    config.write_text("takeoff_max_m = 999")
+    assert run(path).exit_code == 2
+    assert "takeoff_max_m" in run(path).stderr
+
+
+def test_a_list_that_is_too_long_is_refused_before_its_rows_are_drawn(tmp_path: Path) -> None:
+    path = tmp_path / "long.waypoints"
+    path.write_text(write_qgc_wpl([HOME, *(replace(POINT, seq=seq) for seq in range(1, 60000))]))
+    output = run(path).stdout
+    assert len(output.splitlines()) < 5
+    assert "60000 items, but only 146 fit" in output

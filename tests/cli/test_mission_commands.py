@@ -89,6 +89,18 @@ def test_a_refusal_is_told_and_ends_with_1(daemon: Daemon, tmp_path: Path) -> No
     assert refused.stdout.splitlines()[-1] == "INVALID: Rejected, WP 1: LAND must be last"
 
 
+def test_a_list_that_would_erase_the_mission_is_asked_for(daemon: Daemon, tmp_path: Path) -> None:
+    ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
+    held = daemon.held()["records"]
+    nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
+    refused = ask(daemon, "push", nothing)
+    assert refused.returncode == 3
+    assert "would erase the mission" in refused.stdout
+    assert daemon.held()["records"] == held
+    assert ask(daemon, "push", "--erase", nothing).returncode == 0
+    assert daemon.held()["records"] == []
+
+
 def test_an_unreadable_file_ends_with_2(daemon: Daemon, tmp_path: Path) -> None:
     assert_one_sentence(ask(daemon, "push", tmp_path / "none"), 2, "none", "no such file")
 
