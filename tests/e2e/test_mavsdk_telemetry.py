@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/ground-stations.md lists which of MAVSDK's telemetry streams have values; the real MAVSDK says the same."""
+
+import asyncio
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+from benches import Bench
+from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
+from test_mavsdk import vehicle_at
+
+PAGE = (Path(__file__).parents[2] / "docs" / "ground-stations.md").read_text()
+_PREFIX = "subscribe_"
+_LISTEN_S = 12.0
+
+
+def is_value(sample: Any) -> bool:
+    """True unless every number in a sample is NaN."""
+    numbers = [value for value in getattr(sample, "__dict__", {}).values() if isinstance(value, float)]
+    return not numbers or any(map(math.isfinite, numbers))
+
+
+async def streams_with_values(vehicle: Any) -> set[str]:
+    telemetry = TelemetryAsync(vehicle)
+    found: set[str] = set()
+
+    async def listen(name: str) -> None:
+        async for sample in getattr(telemetry, _PREFIX + name)():
+            if is_value(sample):
+                found.add(name)
+                return
+
+    names = [name.removeprefix(_PREFIX) for name in dir(TelemetryAsync) if name.startswith(_PREFIX)]
+    listeners = [asyncio.ensure_future(listen(name)) for name in names]
+    await asyncio.wait(listeners, timeout=_LISTEN_S)
+    for listener in listeners:
+        listener.cancel()
+    await asyncio.gather(*listeners, return_exceptions=True)
+    return found
+
+
+async def test_the_table_of_telemetry_streams(shared: Bench) -> None:
+    table = dict(re.findall(r"^\| `([a-z_0-9]+)` \| ([a-z]+)", PAGE.split("## Telemetry streams")[1], re.MULTILINE))
+    async with vehicle_at(shared.daemon.port) as vehicle:
+        found = await streams_with_values(vehicle)
+    assert found == {name for name, has_values in table.items() if has_values == "yes"}
+    assert set(table) == {name.removeprefix(_PREFIX) for name in dir(TelemetryAsync) if name.startswith(_PREFIX)}
