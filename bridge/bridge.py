@@ -31,6 +31,7 @@ from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.mission_service import NO_LINK, Delivery, MissionService
 from bridge.model.events import EventLog, Incidents
 from bridge.model.mission_log import ArrivedMission
+from bridge.model.mission_transfer import MissionTransfer
 from bridge.model.refusal import Refusal
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
@@ -176,6 +177,11 @@ class Bridge:
         """Return the missions that were dealt with to their end, and how."""
         endings, self._mission_endings = self._mission_endings, []
         return endings
+
+    @property
+    def transfer(self) -> MissionTransfer | None:
+        """The mission that is received or written at this moment."""
+        return self.missions.writing or self._uploads.receiving
 
     # The end.
 

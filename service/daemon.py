@@ -86,9 +86,10 @@ class Daemon:
         self._loop = asyncio.get_running_loop()
         self._loop.set_exception_handler(self._fault)
         self.settings = settings
-        #: On the loop's clock; `found_at` None: no flight controller is there.
+        #: On the loop's clock; `found_at` None: no flight controller is there; `lost_at` None: none was lost since.
         self.started_at = self._loop.time()
         self.found_at: float | None = None
+        self.lost_at: float | None = None
         self._recording = Recording(settings)
         self._signing = SigningState(settings)
         self.bridge = Bridge(
@@ -346,9 +347,9 @@ class Daemon:
         if event in _FLIGHT:
             self._recording.flies(is_flying=_FLIGHT[event])
         if event == "fc.found":
-            self.found_at = self._loop.time()
-        elif event in ("fc.lost", "fc.port_lost"):
-            self.found_at = None
+            self.found_at, self.lost_at = self._loop.time(), None
+        elif event in ("fc.lost", "fc.port_lost") and self.found_at is not None:
+            self.found_at, self.lost_at = None, self._loop.time()
         for follower in self._followers:
             follower.event(level, event, facts)
 

@@ -9,10 +9,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from bridge.line.conversation import Conversation, LinkLost, Stopped, conclude, find_pending, pause, recall, save
-from bridge.missions.fc_mission_store import LIST_IS_GONE, AnyFcMissionStore, PushFailure, StoreReport, StoreState
+from bridge.missions.fc_mission_store import (
+    LIST_IS_GONE,
+    AnyFcMissionStore,
+    PushFailure,
+    PushResult,
+    StoreReport,
+    StoreState,
+)
 from bridge.missions.list_check import MissionRules
 from bridge.missions.mission_texts import summary
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome, PendingMission
+from bridge.model.mission_transfer import MissionTransfer, TransferStep
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
@@ -89,6 +97,8 @@ class MissionService:
         self.held: HeldMission | None = None
         #: Item 0 of the last list that was known: arming may change the protocol, and the list is unknown then.
         self.former_home: MissionItem | None = None
+        #: Set while records are written and verified.
+        self.writing: MissionTransfer | None = None
 
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
         """Work with another flight controller from now on; with a Refusal, every attempt gets it as the reply."""
@@ -212,7 +222,7 @@ class MissionService:
         if not (yield from self._copy_erased(dialect, verdict.records)):
             return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
         before = None if self.held is None else self.held.identity
-        result = yield from dialect.push(verdict.records, progress)
+        result = yield from self._push(dialect, arrived, progress)
         if result.failure is PushFailure.UNCERTAIN:
             wanted = identify(verdict.records if result.held is None else result.held)
             self._pending.append(PendingMission(number, wanted, before))
@@ -257,6 +267,21 @@ class MissionService:
         if result.unchanged:
             return replace(delivery, is_lossy=lossy is not None)
         return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
+
+    def _push(
+        self, dialect: AnyFcMissionStore, arrived: ArrivedMission, progress: Callable[[int], None]
+    ) -> Conversation[PushResult[Any]]:
+        records = arrived.verdict.records
+
+        def written(count: int) -> None:
+            self.writing = MissionTransfer(arrived.source, TransferStep.WRITING, count, len(records))
+            progress(count)
+
+        self.writing = MissionTransfer(arrived.source, TransferStep.WRITING, 0, len(records))
+        try:
+            return (yield from dialect.push(records, written))
+        finally:
+            self.writing = None
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
         """Return what the flight controller holds; a copy answers only while it has the same checksum."""

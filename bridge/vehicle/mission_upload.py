@@ -21,6 +21,7 @@ from bridge.missions.mission_texts import finding_lines
 from bridge.model.events import EventLog, Incidents, Level
 from bridge.model.finding import Finding, News
 from bridge.model.mission_log import ArrivedMission
+from bridge.model.mission_transfer import MissionTransfer, TransferStep
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from bridge.vehicle.recent_answers import RecentAnswers
@@ -88,6 +89,15 @@ class MissionUploads:
     def state(self) -> type[State] | None:
         """The state of the first upload; None if there is none."""
         return type(self._uploads[0].state) if self._uploads else None
+
+    @property
+    def receiving(self) -> MissionTransfer | None:
+        """The upload whose items are coming in."""
+        for upload in self._uploads:
+            if isinstance(upload.state, Receiving):
+                source, received = str(upload.station), len(upload.state.items)
+                return MissionTransfer(source, TransferStep.RECEIVING, received, upload.count)
+        return None
 
     def is_writing(self, station: Station) -> bool:
         """True if an upload of this ground station runs or waits."""

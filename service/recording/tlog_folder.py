@@ -30,6 +30,11 @@ LEFT_FREE = 32 << 20
 _log = structlog.get_logger()
 
 
+def is_log_name(name: str) -> bool:
+    """True for the names that this folder's logs have, and so never for a path out of it."""
+    return _NAME_PATTERN.fullmatch(name) is not None
+
+
 def free_space(folder: Path) -> int:
     """Return how many bytes still fit on the folder's disk."""
     found = os.statvfs(folder)

@@ -33,6 +33,8 @@ _HEADERS = {
     b"cache-control": b"no-store",
     b"connection": b"close",
 }
+#: The largest mission file accepted: 500 items of a .plan are about 200 KiB.
+MAX_FILE = 256 << 10
 #: Names below these are given in a local network; nobody can buy one.
 _LOCAL = (".local", ".lan", ".home.arpa", ".internal", ".localhost")
 _HOST = re.compile(r"(?P<name>\[[^\]]*\]|[^:\[\]]+)(:[0-9]*)?")
@@ -65,22 +67,23 @@ def is_local_name(host: str) -> bool:
 def check_token(request: Request, token: Token | None) -> None:
     """Refuse who does not show the token."""
     if token is None:
-        raise Refused(HTTPStatus.FORBIDDEN, "There is no token, so nothing can be changed from here; the log says why.")
+        raise Refused(
+            HTTPStatus.FORBIDDEN, "The Pi has no token, so this page is read-only; its log says why."
+        )
     if not token.is_shown_by(request.headers.get("authorization")):
         peer = None if request.client is None else request.client.host
         _log.warning("web.wrong_token", peer=peer, path=request.url.path)
-        raise Refused(HTTPStatus.FORBIDDEN, f"This needs the token that stands in {token.path} on the Pi.")
+        raise Refused(HTTPStatus.FORBIDDEN, f"Wrong token. It is in {token.path} on the Pi.")
 
 
-def guarded(handler: Handler) -> Handler:
-    """Let a request through to its handler, and make an answer of whatever comes of it."""
+def guarded(handler: Handler, max_body: int = 0) -> Handler:
+    """Check a request before its handler gets it, and turn every outcome into an answer. `max_body`: bytes."""
 
     async def answer(request: Request) -> Response:
         try:
             if not is_local_name(request.headers.get("host", "")):
                 raise Refused(HTTPStatus.MISDIRECTED_REQUEST, _WRONG_NAME)
-            if request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers:
-                raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "This takes no body.")
+            _check_body(request, max_body)
             return await handler(request)
         except Refused as refusal:
             return error_answer(refusal.status, str(refusal))
@@ -89,6 +92,14 @@ def guarded(handler: Handler) -> Handler:
             return error_answer(HTTPStatus.INTERNAL_SERVER_ERROR, _FAILED)
 
     return answer
+
+
+def _check_body(request: Request, max_body: int) -> None:
+    length = request.headers.get("content-length", "0")
+    # h11 has checked that it is a number. Its digits are counted first: int() of a very long one is slow.
+    if "transfer-encoding" in request.headers or len(length) > len(str(MAX_FILE)) or int(length) > max_body:
+        limit = f"at most {max_body >> 10} KiB" if max_body else "no data"
+        raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"This request may carry {limit}.")
 
 
 async def not_found(_request: Request, error: Exception) -> Response:

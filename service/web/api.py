@@ -1,35 +1,51 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the page asks for: JSON over GET; and the one thing that it does, a restore.
+"""The page's requests: JSON over GET; writing a mission and fetching logs need the token.
 
-GET  /api/state                          how everything is now; asked once a second by an open page
-GET  /api/held                           the list that the flight controller holds
-GET  /api/missions                       the missions that came in lately, newest first
-GET  /api/missions/N                     one of them, as sent beside as stored
+GET  /api/state                          the present state; an open page asks once a second
+GET  /api/held                           the mission that the flight controller holds
+GET  /api/link                           the serial line over the last minutes
+GET  /api/connect                        where ground stations and other browsers connect
+GET  /connect.svg                        the page's address as a QR code
+GET  /api/missions                       the latest missions received, newest first
+GET  /api/missions/N                     one of them, as sent and as stored
 GET  /api/missions/N/difference/M        two of them as sent
-POST /api/missions/N/restore             write it again; needs the token; its progress is in the state
+POST /api/missions/N/restore             write it again; its progress is in the state (token)
+POST /api/check?name=NAME                the body is a mission file: what would be stored of it
+POST /api/write?name=NAME                the body is a mission file: write it (token)
+GET  /api/logs                           the telemetry logs (token)
+GET  /api/logs/NAME?start=N              one piece of a log (token)
 GET  /metrics                            for Prometheus
 """
 
 import asyncio
 from collections.abc import Awaitable
 from dataclasses import asdict
+from functools import partial
 from http import HTTPStatus
 
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.routing import Route
 
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionItem
 from service.api import MOST, ControlError, MissionJobs
 from service.daemon import Daemon
+from service.host import Host
 from service.metrics import CONTENT_TYPE, Metrics
 from service.mission_data import Json, mission_items, to_json
+from service.recording.recorder import TLOG_FOLDER
 from service.version import version
-from service.web.access import Handler, Refused, check_token
+from service.web.access import MAX_FILE, Refused, check_token, guarded
 from service.web.comparison import difference, shown, stored_mission
+from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.kept_answers import KeptAnswers
-from service.web.restoring import Restoring
+from service.web.link_history import LinkHistory
+from service.web.mission_files import MissionFiles
+from service.web.mission_writer import MissionWriter
+from service.web.settings import WebSettings
+from service.web.telemetry_logs import TelemetryLogs
 from service.web.token import Token
 from storage.store_error import StoreError
 
@@ -37,31 +53,58 @@ _LISTED = 50
 
 
 class Api:
-    """Answers with what MissionJobs and the bridge's report tell. `token` None: nothing can be changed."""
+    """Answers from MissionJobs and the bridge's report. `token` None: nothing that needs it is possible."""
 
-    def __init__(self, daemon: Daemon, token: Token | None) -> None:
+    def __init__(self, daemon: Daemon, settings: WebSettings, token: Token | None) -> None:
         self._daemon = daemon
+        self._listen = settings.listen
         self._jobs = MissionJobs(daemon)
         self._token = token
         self._metrics = Metrics(daemon)
         self._kept = KeptAnswers()
         self._held_text: tuple[HeldMission, str] | None = None
-        self.restoring = Restoring(self._jobs)
+        self._writer = MissionWriter()
+        self._files = MissionFiles(self._jobs, self._writer)
+        self._history = LinkHistory(daemon)
+        state_dir = daemon.settings.state_dir
+        self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
+        self._host = Host()
 
-    def handlers(self) -> dict[tuple[str, str], Handler]:
-        """Return the table above: method, path, and who answers."""
-        return {
-            ("GET", "/api/state"): self._state,
-            ("GET", "/api/held"): self._held,
-            ("GET", "/api/missions"): self._missions,
-            ("GET", "/api/missions/{number}"): self._mission,
-            ("GET", "/api/missions/{number}/difference/{other}"): self._difference,
-            ("POST", "/api/missions/{number}/restore"): self._restore,
-            ("GET", "/metrics"): self._render_metrics,
+    def start(self) -> None:
+        """Begin the history of the serial line."""
+        self._history.start()
+
+    async def close(self) -> None:
+        """End what runs in the background."""
+        self._history.close()
+        await self._writer.close()
+
+    def routes(self) -> list[Route]:
+        """The table above."""
+        get = {
+            "/api/state": self._state,
+            "/api/held": self._held,
+            "/api/link": self._link,
+            "/api/connect": self._connect,
+            "/connect.svg": self._connect_code,
+            "/api/missions": self._missions,
+            "/api/missions/{number}": self._mission,
+            "/api/missions/{number}/difference/{other}": self._difference,
+            "/api/logs": self._list_logs,
+            "/api/logs/{name}": self._read_log,
+            "/metrics": self._render_metrics,
         }
+        return [
+            *(Route(path, guarded(handler), methods=["GET"]) for path, handler in get.items()),
+            Route("/api/missions/{number}/restore", guarded(self._restore), methods=["POST"]),
+            Route("/api/check", guarded(self._check_file, MAX_FILE), methods=["POST"]),
+            Route("/api/write", guarded(self._write_file, MAX_FILE), methods=["POST"]),
+        ]
 
     async def _state(self, _request: Request) -> Response:
         daemon = self._daemon
+        now = asyncio.get_running_loop().time()
+        transfer = daemon.bridge.transfer
         try:
             listed = (await self._jobs.list_missions(1))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
@@ -73,12 +116,14 @@ class Api:
                 "version": version(),
                 **asdict(daemon.bridge.report.whole()),
                 "traffic": {name: asdict(traffic) for name, traffic in daemon.traffic.items()},
-                "port": {"address": str(daemon.settings.fc), "trouble": daemon.fc_trouble},
+                "port": {"address": daemon.fc_where, "trouble": daemon.fc_trouble},
                 "refused": [f"{count} x {why} ({link})" for (link, why), count in daemon.bridge.guard.refused.items()],
                 "recording": daemon.recording,
                 "newest_mission": newest,
                 "store_trouble": store,
-                "restore": self.restoring.state,
+                "lost_s": None if daemon.lost_at is None else round(now - daemon.lost_at, 1),
+                "transfer": None if transfer is None else asdict(transfer) | {"step": transfer.step.value},
+                "write": self._writer.state,
             }
         )
 
@@ -90,6 +135,18 @@ class Api:
         if self._held_text is None or self._held_text[0] is not held:
             self._held_text = held, _held_text(held)
         return _text(self._held_text[1])
+
+    async def _link(self, _request: Request) -> Response:
+        return _json(self._history.to_json())
+
+    async def _connect(self, _request: Request) -> Response:
+        return _json(connect_help(self._listen, self._daemon.settings.gcs, self._host.ipv4_addresses()))
+
+    async def _connect_code(self, _request: Request) -> Response:
+        urls = page_urls(self._listen, self._host.ipv4_addresses())
+        if not urls:
+            raise Refused(HTTPStatus.NOT_FOUND, "Only this machine can open the page: see [web] in the configuration.")
+        return Response(qr_code(urls[0]), media_type="image/svg+xml")
 
     async def _missions(self, _request: Request) -> Response:
         return _json(await _told(self._jobs.list_missions(_LISTED)))
@@ -115,8 +172,32 @@ class Api:
 
     async def _restore(self, request: Request) -> Response:
         check_token(request, self._token)
-        self.restoring.begin(_number(request, "number"))
-        return _json({"begun": True}, HTTPStatus.ACCEPTED)
+        number = _number(request, "number")
+        return _begun(self._writer.begin(f"mission {number}", partial(self._jobs.restore, number)))
+
+    async def _check_file(self, request: Request) -> Response:
+        answer = await self._files.check(request)
+        return _text(await asyncio.to_thread(to_json, answer))
+
+    async def _write_file(self, request: Request) -> Response:
+        check_token(request, self._token)
+        return _begun(await self._files.write(request))
+
+    async def _list_logs(self, request: Request) -> Response:
+        check_token(request, self._token)
+        try:
+            return _json(await asyncio.to_thread(self._logs.list))
+        except OSError as error:
+            raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {error.strerror}.") from error
+
+    async def _read_log(self, request: Request) -> Response:
+        check_token(request, self._token)
+        start = request.query_params.get("start", "0")
+        try:
+            piece = await asyncio.to_thread(self._logs.read, request.path_params["name"], _whole(start))
+        except OSError as error:
+            raise Refused(HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed meanwhile.") from error
+        return Response(piece, media_type="application/octet-stream")
 
     async def _render_metrics(self, _request: Request) -> Response:
         return Response(self._metrics.render(), media_type=CONTENT_TYPE)
@@ -126,10 +207,17 @@ class Api:
 
 
 def _number(request: Request, name: str) -> int:
-    text = request.path_params[name]
+    return _whole(request.path_params[name])
+
+
+def _whole(text: str) -> int:
     if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
-        raise Refused(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is no mission's number.")
+        raise Refused(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is not a valid number.")
     return int(text)
+
+
+def _begun(write_id: str) -> Response:
+    return _json({"id": write_id}, HTTPStatus.ACCEPTED)
 
 
 def _sent(mission: Json) -> list[MissionItem]:

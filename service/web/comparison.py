@@ -37,6 +37,19 @@ def stored_mission(mission: Json) -> Json:
     }
 
 
+def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
+    """What would become of a list, with rows like those of `stored_mission`. verdict: of MissionJobs.check."""
+    findings = [Finding(**finding) for finding in verdict["findings"]]
+    stored = mission_items(verdict["items"])
+    return {
+        "verdict": verdict["result"],
+        "findings": [finding.text() for finding in findings],
+        "rows": sent_and_stored(items, stored, findings),
+        "rows_left_out": 0,
+        "items": [shown(item) for item in (stored or items)],
+    }
+
+
 def sent_and_stored(
     sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]
 ) -> list[Json]:

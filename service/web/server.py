@@ -36,7 +36,7 @@ class WebServer:
 
     def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
         self._address = settings.listen
-        self._api = Api(daemon, _token(daemon, settings))
+        self._api = Api(daemon, settings, _token(daemon, settings))
         self._config = _config(self._api)
         self._state = ServerState()
         self._door = Door()
@@ -45,6 +45,7 @@ class WebServer:
 
     def start(self) -> None:
         """Begin to listen."""
+        self._api.start()
         self._listening = asyncio.get_running_loop().create_task(self._listen())
 
     async def close(self) -> None:
@@ -55,7 +56,7 @@ class WebServer:
                 await self._listening
         if self._server is not None:
             self._server.close()
-        await self._api.restoring.close()
+        await self._api.close()
         self._door.close()
         answers = list(self._state.tasks)
         for answer in answers:
@@ -86,8 +87,7 @@ class WebServer:
 
 
 def _config(api: Api) -> Config:
-    routes = [Route(path, guarded(handler), methods=[method]) for (method, path), handler in api.handlers().items()]
-    routes += [Route(path, guarded(handler)) for path, handler in static_files()]
+    routes = [*api.routes(), *(Route(path, guarded(handler)) for path, handler in static_files())]
     app = SafeHeaders(Starlette(routes=routes, exception_handlers={HTTPException: not_found}))
     # What uvicorn itself would log are the mistakes of browsers; ours are logged by `guarded`.
     return Config(
@@ -110,5 +110,5 @@ def _token(daemon: Daemon, settings: WebSettings) -> Token | None:
     try:
         return Token(path)
     except TokenError as error:
-        _log.error("web.no_token", why=str(error), what="nothing can be restored from the page")
+        _log.error("web.no_token", why=str(error), what="the page is read-only")
         return None

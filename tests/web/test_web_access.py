@@ -59,10 +59,8 @@ def test_a_stranger_restores_nothing(lasting_web: WebBench, name: str) -> None:
     headers = {key: value.format(token=token, half=token[:8]) for key, value in STRANGERS[name].items()}
     answer = lasting_web.ask(f"{RESTORE}?token={token}", "POST", **headers)
     assert answer.status == 403
-    assert answer.data == {
-        "error": f"This needs the token that stands in {lasting_web.daemon.state_dir}/web-token on the Pi."
-    }
-    assert lasting_web.state()["restore"] is None
+    assert answer.data == {"error": f"Wrong token. It is in {lasting_web.daemon.state_dir}/web-token on the Pi."}
+    assert lasting_web.state()["write"] is None
     assert lasting_web.daemon.missions() == before
     assert token not in lasting_web.daemon.printed
 
@@ -71,7 +69,7 @@ def test_a_link_alone_restores_nothing(lasting_web: WebBench) -> None:
     answer = lasting_web.ask(RESTORE, Authorization=f"Bearer {lasting_web.token}")
     assert (answer.status, answer.headers["Allow"]) == (405, "POST")
     assert lasting_web.ask(RESTORE, "OPTIONS", Origin="http://evil.example").status == 405
-    assert lasting_web.state()["restore"] is None
+    assert lasting_web.state()["write"] is None
 
 
 @pytest.mark.parametrize(
@@ -163,7 +161,7 @@ def test_a_huge_body_is_refused_unread(lasting_web: WebBench, head: bytes) -> No
     start = b"POST %b HTTP/1.1\r\nHost: a\r\nAuthorization: Bearer %b\r\n%b\r\n\r\n"
     answer = raw(lasting_web, start % (RESTORE.encode(), lasting_web.token.encode(), head), *[chunk] * 64)
     assert answer.startswith((b"HTTP/1.1 413", b""))
-    assert lasting_web.state()["restore"] is None
+    assert lasting_web.state()["write"] is None
     assert resident_kb(lasting_web.daemon.process.pid) - before < 8 << 10
 
 
@@ -215,7 +213,7 @@ def test_without_a_token_the_page_can_be_read_and_nothing_more(start: Starter) -
     event = until(lambda: web.daemon.has_logged("web.no_token"), "a word about the token")
     assert event["why"].startswith(f"the token in {token_file} is shorter than 12 letters")
     answer = web.ask(RESTORE, "POST", Authorization="Bearer short")
-    assert (answer.status, answer.data["error"][:17]) == (403, "There is no token")
+    assert (answer.status, answer.data["error"][:19]) == (403, "The Pi has no token")
     assert web.ask("/api/state").status == 200
 
 

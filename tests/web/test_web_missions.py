@@ -56,7 +56,7 @@ def test_an_earlier_mission_is_restored(web: WebBench) -> None:
     first = web.board.records()
     web.push_example()
     ended = web.restore(1)
-    assert (ended["ok"], ended["text"], ended["mission"]) == (True, "Mission verified: 9 records", 1)
+    assert (ended["ok"], ended["text"], ended["what"]) == (True, "Mission verified: 9 records", "mission 1")
     assert web.board.records() == first
     newest = web.daemon.missions()[0]
     assert (newest["number"], newest["source"], newest["outcome"]) == (3, "restore of mission 1", "VERIFIED")
@@ -100,9 +100,12 @@ def test_one_restore_at_a_time(web: WebBench) -> None:
     headers = {"Authorization": f"Bearer {web.token}"}
     assert web.ask(*begin, **headers).status == 202
     second = web.ask(*begin, **headers)
-    assert (second.status, second.data["error"]) == (409, "A mission is being restored already.")
+    assert (second.status, second.data["error"]) == (
+        409,
+        "Another mission is being written: wait until it has finished.",
+    )
     web.board.set("hang 0")
-    until(lambda: web.state()["restore"]["done"], "the end of the first")
+    until(lambda: web.state()["write"]["done"], "the end of the first")
 
 
 def test_a_restore_of_nothing(lasting_web: WebBench) -> None:

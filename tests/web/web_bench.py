@@ -67,7 +67,7 @@ class WebBench:
         answer = self.ask(f"/api/missions/{number}/restore", "POST", Authorization=f"Bearer {self.token}")
         assert answer.status == 202, answer
         ended: dict[str, Any]
-        ended = until(lambda: (state := self.state()["restore"])["done"] and state, "the end of the restore")
+        ended = until(lambda: (state := self.state()["write"])["done"] and state, "the end of the restore")
         return ended
 
     def connect(self) -> socket.socket:

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asking the daemon. An answer that does not come in time is an error with a sentence.
+// Requests to the daemon. A missing reply is an error with one sentence, like every refusal.
 
-const PATIENCE_MS = 8000;
+const TIMEOUT_MS = 8000;
 
-export const ask = (path) => request(path, {});
+export const ask = async (path, token) => (await request(path, { headers: bearer(token) })).json();
 
-export const tell = (path, token) => request(path, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
+export const tell = async (path, token, body = null) =>
+  (await request(path, { method: "POST", body, headers: { ...bearer(token), ...(body && { "Content-Type": "application/octet-stream" }) } })).json();
+
+export const fetchBytes = async (path, token) => (await request(path, { headers: bearer(token) })).blob();
+
+const bearer = (token) => (token ? { Authorization: `Bearer ${token}` } : {});
 
 async function request(path, options) {
   let response;
   try {
-    response = await fetch(path, { ...options, signal: AbortSignal.timeout(PATIENCE_MS) });
+    response = await fetch(path, { ...options, signal: AbortSignal.timeout(TIMEOUT_MS) });
   } catch {
     throw new Error("The Pi does not answer.");
   }
-  const answer = await response.json();
-  if (!response.ok) throw new Error(answer.error);
-  return answer;
+  if (!response.ok) throw new Error((await response.json()).error);
+  return response;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Making elements. What comes from outside becomes text, never markup.
+// Making and updating elements. Data from outside becomes text, never markup.
 
 export const byId = (id) => document.getElementById(id);
 
@@ -9,6 +9,24 @@ export function make(name, attributes = {}, ...children) {
 
 export function draw(name, attributes = {}, ...children) {
   return fill(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
+}
+
+// Equal text is left alone: replacing it would clear the reader's selection.
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+export function setClass(element, name) {
+  if (element.className !== name) element.className = name;
+}
+
+// The same for a parent of simple elements: only those are touched whose text has changed.
+export function setList(parent, name, texts) {
+  while (parent.children.length > texts.length) parent.lastElementChild.remove();
+  texts.forEach((text, index) => {
+    if (index >= parent.children.length) parent.append(make(name));
+    setText(parent.children[index], text);
+  });
 }
 
 function fill(element, attributes, children) {

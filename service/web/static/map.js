@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The list and the craft on a map without a map server: metres around the middle, north up.
+// The mission and the craft on a map without a map server: metres around the middle, north up.
 import { draw } from "./dom.js";
 
 const METRES_PER_DEGREE = 111320;
 const WAYPOINT = 16, LOITERS = [17, 18, 19], RETURN = 20, ROIS = [80, 195, 201];
+export const isFlown = (item) => item.seq > 0 && isPlaced(item) && (item.command === WAYPOINT || LOITERS.includes(item.command));
 const MARGIN = 40, LEAST_SPAN_M = 40, FARTHEST_M = 50000;
 
-const isPlaced = (item) => Boolean(item.lat_e7 && item.lon_e7);
-const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1e7 });
+export const isPlaced = (item) => Boolean(item.lat_e7 && item.lon_e7);
+export const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1e7 });
 
-// items: of /api/held. position, attitude: of /api/state. trail: where the craft was, [{lat, lon}].
-export function drawMap(items, position, attitude, trail, width) {
+// items: of /api/held. position, attitude: of /api/state. trail: the craft's earlier positions, [{lat, lon}].
+// camera: zoom (1: everything fits) and dx, dy in pixels.
+export function drawMap(items, position, attitude, trail, width, camera) {
   const placed = items.filter(isPlaced);
   const craft = position.lat_deg === null ? null : { lat: position.lat_deg, lon: position.lon_deg };
   const home = craftHome(position) ?? (items.length && isPlaced(items[0]) ? placeOf(items[0]) : null);
@@ -18,7 +20,7 @@ export function drawMap(items, position, attitude, trail, width) {
   if (middle === null) return null;
   const height = Math.round(Math.min(Math.max(width * 0.6, 260), 520));
   const near = (place) => place !== null && distance(middle, place) < FARTHEST_M;
-  const view = projection([...placed.map(placeOf), home, craft].filter(near), middle, width, height);
+  const view = projection([...placed.map(placeOf), home, craft].filter(near), middle, width, height, camera);
   const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": inWords(items, home, craft) });
   svg.append(...tracks(items, home, view));
   if (trail.length > 1) svg.append(draw("polyline", { class: "trail", points: line(trail, view) }));
@@ -39,25 +41,25 @@ function metres(middle, place) {
   return { east: turn * METRES_PER_DEGREE * shrink, north: (place.lat - middle.lat) * METRES_PER_DEGREE };
 }
 
-function distance(from, to) {
+export function distance(from, to) {
   const { east, north } = metres(from, to);
   return Math.hypot(east, north);
 }
 
-function projection(places, middle, width, height) {
+function projection(places, middle, width, height, camera) {
   const points = places.map((place) => metres(middle, place));
   const range = (values) => [Math.min(...values), Math.max(...values)];
   const [west, east] = range(points.map((point) => point.east));
   const [south, north] = range(points.map((point) => point.north));
-  const scale = Math.min(
+  const scale = camera.zoom * Math.min(
     (width - 2 * MARGIN) / Math.max(east - west, LEAST_SPAN_M),
     (height - 2 * MARGIN) / Math.max(north - south, LEAST_SPAN_M),
   );
   const view = (place) => {
     const point = metres(middle, place);
     return [
-      round(width / 2 + (point.east - (west + east) / 2) * scale),
-      round(height / 2 - (point.north - (south + north) / 2) * scale),
+      round(width / 2 + camera.dx + (point.east - (west + east) / 2) * scale),
+      round(height / 2 + camera.dy - (point.north - (south + north) / 2) * scale),
     ];
   };
   view.pixelsPerMetre = scale;
@@ -68,7 +70,7 @@ const round = (value) => Math.round(value * 10) / 10;
 const line = (places, view) => places.map((place) => view(place).join(",")).join(" ");
 
 function tracks(items, home, view) {
-  const flown = items.filter((item) => item.seq > 0 && isPlaced(item) && (item.command === WAYPOINT || LOITERS.includes(item.command)));
+  const flown = items.filter(isFlown);
   const places = flown.map(placeOf);
   const lines = [];
   if (places.length) lines.push(draw("polyline", { class: "track", points: line(home ? [home, ...places] : places, view) }));
@@ -117,7 +119,7 @@ function northArrow(width) {
 }
 
 function inWords(items, home, craft) {
-  const told = [`Map with ${items.filter((item) => item.seq > 0 && isPlaced(item)).length} places of the list`];
+  const told = [`Map with ${items.filter((item) => item.seq > 0 && isPlaced(item)).length} positions of the mission`];
   if (home && craft) told.push(`the craft is ${Math.round(distance(home, craft))} m from home`);
   return told.join("; ");
 }

@@ -1,94 +1,85 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The missions that came in: the last one, the list, one that is looked at, two compared, one restored.
-import { byId, make } from "./dom.js";
+// The stored missions: the latest upload, and a list in which each mission opens below its own row.
+import "./compare.js";
+import { byId, make, setClass, setText } from "./dom.js";
 import { ask, tell } from "./daemon.js";
-import { pairKey, pairTable } from "./tables.js";
+import { missionDetail, outcomeClass, when } from "./mission_detail.js";
+import { writeForm } from "./write_form.js";
 
-const SENT_STORED = ["As sent", "As stored"];
-let token = ""; // kept no longer than the page
+const list = byId("missions");
+const body = make("tbody");
+const rows = new Map(); // by mission number; a row that is known stays, with all that is open or selected in it
 
 export async function showMissions(newest) {
   const { missions } = await ask("/api/missions");
-  byId("missions").replaceChildren(missions.length ? missionTable(missions) : "No mission has come in yet.");
-  byId("upload").replaceChildren(...(newest === null ? ["No mission has come in yet."] : asSentAndStored(await ask(`/api/missions/${newest.number}`))));
-}
-
-export function showRestore(restore, armed) {
-  for (const button of document.querySelectorAll("button.restore")) {
-    button.disabled = armed === true;
-    button.title = armed === true ? "Armed: disarm to change the mission" : "";
+  const upload = newest === null ? null : await ask(`/api/missions/${newest.number}`);
+  if (upload === null) {
+    for (const id of ["missions", "upload"]) byId(id).replaceChildren("No mission has been received yet.");
+    return;
   }
-  if (restore === null) return;
-  const text = restore.done ? restore.text : `${restore.records} records written …`;
-  const line = byId("restore-state"), whole = `Restore of mission ${restore.mission}: ${text}`;
-  if (line.textContent !== whole) line.textContent = whole;
-  line.className = restore.done ? (restore.ok ? "good" : "bad") : "";
-}
-
-byId("compare-form").addEventListener("submit", (event) => {
-  event.preventDefault();
-  const [first, second] = [byId("first").value, byId("second").value].map((text) => encodeURIComponent(text.trim()));
-  choose(async () => {
-    const { rows } = await ask(`/api/missions/${first}/difference/${second}`);
-    const equal = rows.every((row) => row.kind === "same");
-    return [make("h3", {}, `Mission ${first} and mission ${second}, as sent`), equal ? "No difference." : pairKey(["changed", "added", "removed"]),
-      pairTable(rows, [`Mission ${first}`, `Mission ${second}`])];
-  });
-});
-
-async function choose(contents) {
-  let children;
-  try {
-    children = await contents();
-  } catch (error) {
-    children = [make("p", { class: "bad" }, error.message)];
+  byId("upload").replaceChildren(...missionDetail(upload));
+  if (body.parentElement === null) list.replaceChildren(table());
+  const numbers = new Set(missions.map((mission) => mission.number));
+  for (const [number, row] of rows) {
+    if (numbers.has(number)) continue;
+    rows.delete(number);
+    row.close();
+    row.element.remove();
   }
-  byId("chosen").replaceChildren(...children);
-  byId("chosen").focus({ preventScroll: true });
-  byId("chosen").scrollIntoView({ block: "nearest" });
-}
-
-function missionTable(missions) {
-  const rows = missions.map((mission) => make("tr", {},
-    make("td", { class: "number" }, String(mission.number)),
-    make("td", {}, when(mission.received_at), make("span", { class: "why" }, mission.source)),
-    make("td", {}, make("span", { class: mission.outcome === "VERIFIED" ? "good" : "bad" }, mission.outcome),
-      make("span", { class: "why" }, `${mission.item_count} items, ${mission.finding_count} notes. ${mission.detail}`)),
-    make("td", {}, make("button", { type: "button", "aria-label": `Show mission ${mission.number}`, onclick: () => choose(() => oneMission(mission.number)) }, "Show"))));
-  const head = make("tr", {}, ...["No.", "Received", "Outcome", ""].map((title) => make("th", { scope: "col" }, title)));
-  return make("table", {}, make("thead", {}, head), make("tbody", {}, ...rows));
-}
-
-async function oneMission(number) {
-  const mission = await ask(`/api/missions/${number}`);
-  return [make("h3", {}, `Mission ${number}`), restoreForm(number), ...asSentAndStored(mission)];
-}
-
-function asSentAndStored(mission) {
-  const head = make("p", {}, make("b", { class: mission.outcome === "VERIFIED" ? "good" : "bad" }, mission.outcome),
-    ` Mission ${mission.number}, ${when(mission.received_at)}, from ${mission.source}. ${mission.detail}`);
-  const more = mission.rows_left_out ? [make("p", {}, `${mission.rows_left_out} more items are not shown.`)] : [];
-  const notes = mission.findings.length ? [make("details", {}, make("summary", {}, `${mission.findings.length} notes`),
-    make("ul", {}, ...mission.findings.map((text) => make("li", {}, text))))] : [make("p", {}, "Stored as it was sent.")];
-  const isStored = mission.verdict === "ACCEPTED";
-  return [head, ...notes, pairKey(isStored ? ["changed", "dropped"] : ["dropped"]), pairTable(mission.rows, SENT_STORED), ...more];
-}
-
-function restoreForm(number) {
-  const input = make("input", { type: "password", autocomplete: "off", required: "", value: token });
-  const button = make("button", { class: "restore" }, `Write mission ${number} to the flight controller`);
-  return make("form", { class: "row", onsubmit: async (event) => {
-    event.preventDefault();
-    try {
-      token = input.value.trim();
-      await tell(`/api/missions/${number}/restore`, token);
-    } catch (error) {
-      byId("restore-state").className = "bad";
-      byId("restore-state").textContent = error.message;
+  for (const mission of [...missions].reverse()) { // oldest first: new ones go on top
+    if (!rows.has(mission.number)) {
+      rows.set(mission.number, makeRow(mission.number));
+      body.prepend(rows.get(mission.number).element);
     }
-  } }, make("label", {}, "Token (it stands in a file on the Pi) ", input), button);
+    rows.get(mission.number).update(mission);
+  }
 }
 
-function when(seconds) {
-  return new Date(seconds * 1000).toLocaleString();
+function table() {
+  const head = make("tr", {}, ...["No.", "Received", "Outcome", "Details"].map((title) => make("th", { scope: "col" }, title)));
+  return make("table", { class: "missions" }, make("thead", {}, head), body);
+}
+
+function makeRow(number) {
+  const received = make("span"), source = make("span", { class: "why" }), outcome = make("span"), detail = make("span", { class: "why" });
+  const button = make("button", { type: "button", "aria-expanded": "false", "aria-label": `Show mission ${number}`, onclick: () => (open ? close() : show()) }, "Show");
+  const element = make("tr", {}, make("td", { class: "number" }, String(number)), make("td", {}, received, source),
+    make("td", {}, outcome, detail), make("td", {}, button));
+  let open = null;
+
+  async function show() {
+    const cell = make("td", { colspan: 4, tabindex: -1, "aria-label": `Mission ${number}` });
+    open = make("tr", { class: "detail" }, cell);
+    mark("Hide", "true");
+    element.after(open);
+    try {
+      const mission = await ask(`/api/missions/${number}`);
+      cell.append(make("h3", {}, `Mission ${number}`), writeForm(`Write mission ${number} to the flight controller`, (token) => tell(`/api/missions/${number}/restore`, token)), ...missionDetail(mission));
+    } catch (error) {
+      cell.append(make("p", { class: "bad" }, error.message));
+    }
+    cell.focus({ preventScroll: true });
+  }
+
+  function close() {
+    open?.remove();
+    open = null;
+    mark("Show", "false");
+  }
+
+  function mark(text, isExpanded) {
+    button.textContent = text;
+    button.setAttribute("aria-label", `${text} mission ${number}`);
+    button.setAttribute("aria-expanded", isExpanded);
+  }
+
+  function update(mission) {
+    setText(received, when(mission.received_at));
+    setText(source, mission.source);
+    setText(outcome, mission.outcome);
+    setClass(outcome, outcomeClass(mission.outcome));
+    setText(detail, `${mission.item_count} items, ${mission.finding_count} notes. ${mission.detail}`);
+  }
+
+  return { element, update, close };
 }

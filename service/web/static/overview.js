@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How everything is now: what /api/state tells, as words.
-import { byId, make } from "./dom.js";
+// The present values of /api/state, as words.
+import { byId, make, setClass, setList, setText } from "./dom.js";
+import { STALE_S, age } from "./state_bar.js";
 
 const known = (value, unit = "", digits = 0) => (value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit}`);
-let before = null; // the last count of bytes, and when it came
+let before = null; // the byte counts of the state before, and when it was asked for
 
 export function showOverview(state) {
-  byId("version").textContent = state.version;
+  setText(byId("version"), state.version);
   const armed = state.status.armed;
   const rates = ratesOf(state.traffic);
-  byId("headline").textContent = headline(state, armed);
-  byId("headline").className = state.link.flight_controller === null ? "bad" : "good";
-  const stale = state.status.age_s > 1.5;
-  byId("vehicle").classList.toggle("stale", stale);
+  const isOld = state.status.age_s > STALE_S;
+  byId("vehicle-age").hidden = !isOld;
+  if (isOld) setText(byId("vehicle-age"), `Last heard ${age(state.status.age_s)} ago.`);
+  setClass(byId("vehicle"), isOld ? "old" : "");
   pairs("vehicle", [
-    ...(stale ? [["Last heard", `${Math.round(state.status.age_s)} s ago`, "bad"]] : []),
     ["State", armed === null ? "unknown" : armed ? "ARMED" : "disarmed", armed ? "bad" : ""],
     ["Mode", state.status.mode ?? "–"],
     ["Battery", battery(state.battery), ""],
@@ -28,7 +28,7 @@ export function showOverview(state) {
     ["Sensor errors", known(state.status.i2c_errors), state.status.i2c_errors ? "bad" : ""],
   ]);
   pairs("link", [
-    ["Who", state.link.flight_controller ?? "nobody yet"],
+    ["Firmware", state.link.flight_controller ?? "not found yet"],
     ["Protocol", state.link.state],
     ["Port", state.port.address + (state.link.speed_baud ? `, ${state.link.speed_baud} baud` : "")],
     ["Line", rates.get("fc") ?? "–"],
@@ -39,15 +39,9 @@ export function showOverview(state) {
   ]);
   const refused = state.refused.map((text) => `refused: ${text}`);
   const links = [...rates].filter(([name]) => name !== "fc").map(([name, rate]) => `${name}: ${rate}`);
-  list("ground", [...state.link.ground_stations, ...refused], "Nobody is connected.");
-  list("links", links, "Nothing was sent yet.");
-  list("recording", state.recording, "Nothing is recorded.");
-}
-
-function headline(state, armed) {
-  if (state.port.trouble) return state.port.trouble;
-  if (state.link.flight_controller === null) return `Looking for a flight controller on ${state.port.address}`;
-  return `${state.link.flight_controller}, ${armed === null ? state.link.state : armed ? "ARMED" : "disarmed"}`;
+  list("ground", [...state.link.ground_stations, ...refused], "None connected.");
+  list("links", links, "Nothing sent yet.");
+  list("recording", state.recording, "Off.");
 }
 
 function battery({ voltage_v: volts, current_a: amperes, drawn_mah: drawn, remaining_percent: percent }) {
@@ -55,7 +49,7 @@ function battery({ voltage_v: volts, current_a: amperes, drawn_mah: drawn, remai
   return [known(volts, " V", 1), ...more.filter(Boolean)].join(", ");
 }
 
-// Bytes a second in and out, by link, between the last look and this one.
+// Bytes a second in and out, by link, between the state before and this one.
 function ratesOf(traffic) {
   const last = before;
   before = { traffic, at: performance.now() };
@@ -68,9 +62,13 @@ function ratesOf(traffic) {
 const size = (bytes) => (bytes < 1000 ? `${Math.round(bytes)} B/s` : `${(bytes / 1000).toFixed(1)} kB/s`);
 
 function pairs(id, rows) {
-  byId(id).replaceChildren(...rows.flatMap(([name, value, kind]) => [make("dt", {}, name), make("dd", { class: kind || null }, value)]));
+  const all = byId(id);
+  if (!all.children.length) all.append(...rows.flatMap(([name]) => [make("dt", {}, name), make("dd")]));
+  rows.forEach(([, value, kind], index) => {
+    const shown = all.children[2 * index + 1];
+    setText(shown, value);
+    setClass(shown, kind ?? "");
+  });
 }
 
-function list(id, texts, otherwise) {
-  byId(id).replaceChildren(...(texts.length ? texts : [otherwise]).map((text) => make("li", {}, text)));
-}
+const list = (id, texts, otherwise) => setList(byId(id), "li", texts.length ? texts : [otherwise]);

@@ -1,32 +1,49 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asks for the state once a second while somebody looks, and for the rest when the state says that it has changed.
+// Asks for the state once a second while the page is visible, and for the rest when the state shows a change.
+import { showConnect } from "./connect.js";
 import { ask } from "./daemon.js";
-import { byId } from "./dom.js";
-import { drawMap } from "./map.js";
-import { showMissions, showRestore } from "./missions.js";
+import { byId, setText } from "./dom.js";
+import { showLinkPlot } from "./link_plot.js";
+import "./logs.js";
+import { MapView } from "./map_view.js";
+import { followFile } from "./mission_file.js";
+import { showMissions } from "./missions.js";
 import { showOverview } from "./overview.js";
+import { showProfile } from "./profile.js";
+import { showStateBar } from "./state_bar.js";
 import { listTable } from "./tables.js";
+import { followWrites } from "./write_form.js";
 
-const INTERVAL_MS = 1000, TRAIL_LENGTH = 600;
-let held = { count: null, items: [] };
-let shown = { mission: undefined, newest: undefined };
+const INTERVAL_MS = 1000, TRANSFER_INTERVAL_MS = 250, TRAIL_LENGTH = 600;
+const map = new MapView(byId("map"));
+const shown = { mission: undefined, newest: undefined };
 const trail = [];
+let held = { count: null, items: [] };
+let last = null, lastAt = performance.now();
 
 async function look() {
+  const askedAt = performance.now();
   try {
     const state = await ask("/api/state");
+    last = state;
+    lastAt = performance.now();
+    showStateBar(state, null);
     showOverview(state);
+    followWrites(state, askedAt);
+    followFile(state);
     await showHeld(state);
     await showNewest(state);
-    showRestore(state.restore, state.status.armed);
-    tellTrouble(state.store_trouble);
+    await showLinkPlot();
+    await showConnect();
+    showTrouble(state.store_trouble);
     document.body.classList.remove("stale");
   } catch (error) {
     document.body.classList.add("stale");
-    tellTrouble(`${error.message} What is shown may be old.`);
+    showStateBar(last, (performance.now() - lastAt) / 1000);
+    showTrouble(`${error.message} The values below may be old.`);
   }
   document.body.dataset.looks = Number(document.body.dataset.looks ?? 0) + 1;
-  setTimeout(onceVisible, INTERVAL_MS);
+  setTimeout(onceVisible, last?.transfer ? TRANSFER_INTERVAL_MS : INTERVAL_MS);
 }
 
 function onceVisible() {
@@ -39,13 +56,12 @@ async function showHeld(state) {
   if (mission !== shown.mission) {
     held = await ask("/api/held");
     shown.mission = mission;
-    byId("held-text").textContent = held.count === null ? "The list has not been read." : held.count ? `${held.count} records, checksum ${held.checksum}` : "No mission.";
+    setText(byId("held-text"), held.count === null ? "The mission has not been read yet." : held.count ? `${held.count} records, checksum ${held.checksum}` : "No mission.");
     byId("held-list").replaceChildren(listTable(held.items));
+    showProfile(byId("profile"), held.items);
   }
   follow(state.position);
-  const map = byId("map");
-  const drawn = drawMap(held.items, state.position, state.attitude, trail, Math.max(map.clientWidth, 200));
-  map.replaceChildren(drawn ?? "Neither a list nor a position is known yet.");
+  map.show({ items: held.items, position: state.position, attitude: state.attitude, trail });
 }
 
 async function showNewest(state) {
@@ -57,16 +73,15 @@ async function showNewest(state) {
 
 function follow(position) {
   if (position.lat_deg === null) return;
-  const last = trail[trail.length - 1];
-  if (last && last.lat === position.lat_deg && last.lon === position.lon_deg) return;
+  const latest = trail[trail.length - 1];
+  if (latest && latest.lat === position.lat_deg && latest.lon === position.lon_deg) return;
   trail.push({ lat: position.lat_deg, lon: position.lon_deg });
   if (trail.length > TRAIL_LENGTH) trail.shift();
 }
 
-function tellTrouble(text) {
-  const line = byId("trouble");
-  line.hidden = !text;
-  if (line.textContent !== text) line.textContent = text;
+function showTrouble(text) {
+  byId("trouble").hidden = !text;
+  setText(byId("trouble"), text);
 }
 
 look();

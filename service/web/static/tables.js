@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mission lists as tables: one list, as sent beside as stored, or two lists compared.
+// Mission lists as tables: one list, as sent and as stored, or two lists compared.
 import { make } from "./dom.js";
 
-const NAMES = { p1: "p1", p2: "p2", p3: "p3", p4: "p4", alt_m: "height", frame: "frame", lat_e7: "lat", lon_e7: "lon" };
+const NAMES = { p1: "p1", p2: "p2", p3: "p3", p4: "p4", alt_m: "altitude", frame: "frame", lat_e7: "lat", lon_e7: "lon" };
 const KINDS = {
-  changed: "changed", dropped: "dropped: not stored", rejected: "this is why the list was refused",
-  added: "new", removed: "gone",
+  changed: "changed", dropped: "dropped: not stored", rejected: "the list was rejected because of this item",
+  added: "added", removed: "removed",
 };
 
 export function listTable(items) {
@@ -13,14 +13,26 @@ export function listTable(items) {
   return table(["No.", "Command"], rows);
 }
 
-// rows: of /api/missions/N or of a difference; titles: what stands left and right.
+// rows: of /api/missions/N or of a difference; titles: of the left and the right column. Equal rows are shown on request.
 export function pairTable(rows, titles) {
   const whole = table(["No.", ...titles], rows.map((row) => pairRow(row, titles)));
   whole.className = "pairs";
-  return whole;
+  const equal = rows.filter((row) => row.kind === "same").length;
+  if (!equal) return [whole];
+  const isShort = equal === rows.length;
+  const show = (all) => {
+    whole.classList.toggle("only-changes", !all);
+    whole.hidden = isShort && !all;
+    button.textContent = all ? "Show only changes" : `Show all ${rows.length} items`;
+    button.setAttribute("aria-expanded", String(all));
+  };
+  const button = make("button", { type: "button", class: "show-all", onclick: () => show(button.getAttribute("aria-expanded") !== "true") });
+  show(false);
+  return [whole, make("p", {}, button)];
 }
 
-export function pairKey(kinds) {
+export function pairKey(rows) {
+  const kinds = Object.keys(KINDS).filter((kind) => rows.some((row) => row.kind === kind));
   return make("p", {}, ...kinds.flatMap((kind) => [make("span", { class: `key ${kind}` }, KINDS[kind]), " "]));
 }
 

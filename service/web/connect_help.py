@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where ground stations and other browsers connect, and the page's address as a QR code."""
+
+import ipaddress
+from collections.abc import Iterable, Sequence
+from io import BytesIO
+
+import segno
+
+from service.links.connection import GcsAddress
+from service.mission_data import Json
+from service.web.settings import ListenAddress
+
+#: How Mission Planner calls the connection that it must open.
+_CONNECTIONS = {"udpin": "UDPCl", "tcpin": "TCP"}
+
+
+def page_urls(listen: ListenAddress, own: Iterable[str]) -> list[str]:
+    """The page's addresses for other devices; none if only this machine can open it. own: this machine's addresses."""
+    hosts = own if _is_any(listen.host) else [] if _is_loopback(listen.host) else [listen.host]
+    return [f"http://{ListenAddress(host, listen.port)}/" for host in hosts]
+
+
+def connect_help(listen: ListenAddress, links: Sequence[GcsAddress], own: list[str]) -> Json:
+    """Lines for a ground station: the connection in Mission Planner's words, hosts and port."""
+    stations = [
+        {
+            "connection": _CONNECTIONS[link.kind],
+            "hosts": (own or ["127.0.0.1"]) if _is_any(link.host) else [link.host],
+            "port": link.port,
+        }
+        for link in links
+        if link.kind in _CONNECTIONS
+    ]
+    called = [str(link) for link in links if link.kind not in _CONNECTIONS]
+    return {"pages": page_urls(listen, own), "stations": stations, "called": called}
+
+
+def qr_code(text: str) -> bytes:
+    """An SVG image, dark on white as scanners expect it, whatever the page's colours are."""
+    image = BytesIO()
+    segno.make(text, error="m").save(image, kind="svg", scale=4, border=4, dark="#000", light="#fff")
+    return image.getvalue()
+
+
+def _is_any(host: str) -> bool:
+    return host in ("", "0.0.0.0", "::")  # noqa: S104
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The serial line to the flight controller over the last minutes, for the page's plot."""
+
+import asyncio
+from collections import deque
+from dataclasses import asdict, dataclass
+
+from service.daemon import Daemon
+from service.mission_data import Json
+
+INTERVAL_S = 2.0
+_SAMPLES = 150  # five minutes
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One interval. round_trip_ms: None without MSP. lost, damaged: unanswered requests and bad checksums in it."""
+
+    round_trip_ms: float | None
+    lost: int
+    damaged: int
+
+
+class LinkHistory:
+    """Takes a sample every INTERVAL_S from `start` on."""
+
+    def __init__(self, daemon: Daemon) -> None:
+        self._daemon = daemon
+        self._loop = asyncio.get_running_loop()
+        self._samples: deque[Sample] = deque(maxlen=_SAMPLES)
+        self._before = (0, 0)
+        self._timer: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        """Take the first sample; more follow until `close`."""
+        link = self._daemon.bridge.session.link
+        damaged = self._daemon.bridge.session.bad_checksums or 0
+        lost = 0 if link is None else link.requests_lost
+        lost_before, damaged_before = self._before
+        self._before = lost, damaged
+        # Both counters begin at 0 again with another flight controller.
+        self._samples.append(
+            Sample(
+                None if link is None else round(link.round_trip_s * 1000, 1),
+                max(lost - lost_before, 0),
+                max(damaged - damaged_before, 0),
+            )
+        )
+        self._timer = self._loop.call_later(INTERVAL_S, self.start)
+
+    def close(self) -> None:
+        """Take no more."""
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def to_json(self) -> Json:
+        """The samples, oldest first."""
+        return {"interval_s": INTERVAL_S, "samples": [asdict(sample) for sample in self._samples]}

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mission file that the browser sends: checked by the rules of the present flight controller, or written to it.
+
+The check needs no token, because it changes nothing. It costs the flight controller one request and this machine some
+milliseconds, so checks run one at a time with a pause after each.
+"""
+
+import asyncio
+from functools import partial
+from http import HTTPStatus
+
+from starlette.requests import ClientDisconnect, Request
+
+from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.mission_item import MissionItem
+from service.api import ControlError, MissionJobs
+from service.mission_data import Json
+from service.web.access import Refused
+from service.web.comparison import MAX_ROWS, checked_mission
+from service.web.mission_writer import MissionWriter
+
+_PAUSE_S = 0.25
+_MAX_NAME = 80
+#: A page of another site cannot send this type without asking first, and it is not allowed to.
+_CONTENT_TYPE = "application/octet-stream"
+
+
+class MissionFiles:
+    """The body of a request is the file; the query has its name."""
+
+    def __init__(self, jobs: MissionJobs, writer: MissionWriter) -> None:
+        self._jobs = jobs
+        self._writer = writer
+        self._turn = asyncio.Lock()
+
+    async def check(self, request: Request) -> Json:
+        """What the flight controller would hold after a write."""
+        async with self._turn:
+            _, items = await _read(request)
+            try:
+                verdict = await self._jobs.check(items)
+            except ControlError as error:
+                raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+            answer = await asyncio.to_thread(checked_mission, items, verdict)
+            await asyncio.sleep(_PAUSE_S)
+        return answer
+
+    async def write(self, request: Request) -> str:
+        """Start writing; returns the write's id. The caller has checked the token."""
+        name, items = await _read(request)
+        return self._writer.begin(name, partial(self._jobs.push, items, f"{name}, from the page"))
+
+
+async def _read(request: Request) -> tuple[str, list[MissionItem]]:
+    name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
+    if request.headers.get("content-type") != _CONTENT_TYPE:
+        raise Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the file as {_CONTENT_TYPE}.")
+    try:
+        body = await request.body()
+    except ClientDisconnect as error:
+        raise Refused(HTTPStatus.BAD_REQUEST, "The file did not arrive completely.") from error
+    try:
+        items = await asyncio.to_thread(read_mission_file, body, name)
+    except MissionFileError as error:
+        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
+    if len(items) > MAX_ROWS:
+        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; {MAX_ROWS} is the limit here.")
+    if not items:
+        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
+    return name, items

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A map that is zoomed and panned: with its buttons, the arrow keys, two fingers, the mouse, or Ctrl and the wheel.
+import { make } from "./dom.js";
+import { drawMap } from "./map.js";
+
+const STEP = 1.5, LEAST = 1, MOST = 64, PAN_PX = 60;
+const ARROWS = { ArrowLeft: [PAN_PX, 0], ArrowRight: [-PAN_PX, 0], ArrowUp: [0, PAN_PX], ArrowDown: [0, -PAN_PX] };
+
+export class MapView {
+  #canvas = make("div", { class: "map-canvas" });
+  #tools;
+  #contents = null;
+  #drawn = "";
+  #camera = { zoom: 1, dx: 0, dy: 0 }; // zoom 1: everything fits; dx, dy: pixels
+  #fingers = new Map();
+
+  constructor(container) {
+    const button = (label, name, press) => make("button", { type: "button", "aria-label": `${name}: ${container.id}`, title: name, onclick: press }, label);
+    this.#tools = make("div", { class: "map-tools" },
+      button("+", "Zoom in", () => this.#zoom(STEP)), button("−", "Zoom out", () => this.#zoom(1 / STEP)), button("Fit", "Show everything", () => this.#move({ zoom: 1, dx: 0, dy: 0 })));
+    container.append(this.#canvas, this.#tools);
+    container.addEventListener("keydown", (event) => this.#key(event));
+    this.#canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
+    this.#canvas.addEventListener("pointerdown", (event) => this.#fingers.set(event.pointerId, [event.clientX, event.clientY]));
+    this.#canvas.addEventListener("pointermove", (event) => this.#drag(event));
+    for (const end of ["pointerup", "pointercancel", "pointerleave"]) this.#canvas.addEventListener(end, (event) => this.#fingers.delete(event.pointerId));
+    new ResizeObserver(() => this.#draw()).observe(container);
+  }
+
+  // contents: items, position and attitude as in /api/held and /api/state; trail: [{lat, lon}].
+  show(contents) {
+    this.#contents = contents;
+    this.#draw();
+  }
+
+  #draw() {
+    if (this.#contents === null) return;
+    const width = Math.max(this.#canvas.clientWidth, 200);
+    const wanted = JSON.stringify([this.#contents, this.#camera, width]);
+    if (wanted === this.#drawn) return;
+    this.#drawn = wanted;
+    const { items, position, attitude, trail } = this.#contents;
+    const svg = drawMap(items, position, attitude, trail, width, this.#camera);
+    this.#tools.hidden = svg === null;
+    this.#canvas.replaceChildren(svg ?? "Neither a mission nor a position is known yet.");
+    // Until it is zoomed, one finger scrolls the page.
+    this.#canvas.classList.toggle("zoomed", this.#camera.zoom > 1);
+  }
+
+  #move(camera) {
+    this.#camera = camera.zoom <= LEAST ? { zoom: 1, dx: 0, dy: 0 } : camera;
+    this.#draw();
+  }
+
+  #pan(dx, dy) {
+    if (this.#camera.zoom > 1) this.#move({ ...this.#camera, dx: this.#camera.dx + dx, dy: this.#camera.dy + dy });
+  }
+
+  // x, y: the point that stays where it is, pixels from the middle.
+  #zoom(factor, x = 0, y = 0) {
+    const { zoom, dx, dy } = this.#camera;
+    const next = Math.min(Math.max(zoom * factor, LEAST), MOST), ratio = next / zoom;
+    this.#move({ zoom: next, dx: x - (x - dx) * ratio, dy: y - (y - dy) * ratio });
+  }
+
+  #zoomAt(factor, clientX, clientY) {
+    const box = this.#canvas.getBoundingClientRect();
+    this.#zoom(factor, clientX - box.left - box.width / 2, clientY - box.top - box.height / 2);
+  }
+
+  #key(event) {
+    const arrow = ARROWS[event.key];
+    if (!arrow || this.#camera.zoom <= 1) return;
+    event.preventDefault();
+    this.#pan(...arrow);
+  }
+
+  #wheel(event) {
+    if (!event.ctrlKey) return; // the wheel alone scrolls the page
+    event.preventDefault();
+    this.#zoomAt(event.deltaY < 0 ? STEP : 1 / STEP, event.clientX, event.clientY);
+  }
+
+  #drag(event) {
+    const before = this.#fingers.get(event.pointerId);
+    if (!before) return;
+    const now = [event.clientX, event.clientY];
+    const other = [...this.#fingers].find(([id]) => id !== event.pointerId)?.[1];
+    this.#fingers.set(event.pointerId, now);
+    if (!other) {
+      this.#pan(now[0] - before[0], now[1] - before[1]);
+      return;
+    }
+    const distance = (point) => Math.max(Math.hypot(point[0] - other[0], point[1] - other[1]), 1);
+    this.#zoomAt(distance(now) / distance(before), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
+  }
+}

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The bar that stays in sight: armed, lost, stale; the transfer under way; and, for screen readers, what has changed.
+import { byId, make, setText } from "./dom.js";
+
+export const STALE_S = 3;
+let spoken = null; // the badges that were announced last
+
+// state: of /api/state, or the last one known (null: none) if silent_s is not null.
+export function showStateBar(state, silent_s) {
+  const badges = badgesOf(state, silent_s);
+  const bar = byId("badges");
+  const texts = badges.map((badge) => `${badge.kind} ${badge.text}`).join("|");
+  if (bar.dataset.shown !== texts) {
+    bar.replaceChildren(...badges.flatMap(({ text, kind }) => [make("span", { class: `badge ${kind}` }, text), " "]));
+    bar.dataset.shown = texts;
+  }
+  const names = badges.map((badge) => badge.name).join(", ");
+  document.title = `${names} · naze-bridge`;
+  setText(byId("headline"), headline(state));
+  showTransfer(silent_s === null ? state.transfer : null);
+  announce(names);
+}
+
+function badgesOf(state, silent_s) {
+  const armed = state?.status.armed ?? null;
+  const wasArmed = armed ? [badge("bad", "WAS ARMED")] : [];
+  if (silent_s !== null) return [badge("bad", "NO REPLY FROM THE PI", silent_s), ...wasArmed];
+  if (state.link.flight_controller === null) {
+    const what = state.lost_s === null ? badge("bad", state.port.trouble ? "PORT PROBLEM" : "SEARCHING") : badge("bad", "LOST", state.lost_s);
+    return [what, ...wasArmed];
+  }
+  const known = armed === null ? badge("soft", "ARMED STATE UNKNOWN") : armed ? badge("bad", "ARMED") : badge("good", "DISARMED");
+  return state.status.age_s > STALE_S ? [known, badge("bad", "STALE", state.status.age_s)] : [known];
+}
+
+const badge = (kind, name, age_s = null) => ({ kind, name, text: age_s === null ? name : `${name} ${age(age_s)}` });
+
+export const age = (seconds) => (seconds < 120 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`);
+
+function headline(state) {
+  if (state === null) return "";
+  if (state.port.trouble) return state.port.trouble;
+  if (state.link.flight_controller === null) return `Looking for a flight controller on ${state.port.address}`;
+  return [state.link.flight_controller, state.status.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`].filter(Boolean).join(", ");
+}
+
+function showTransfer(transfer) {
+  byId("transfer").hidden = transfer === null;
+  if (transfer === null) return;
+  const { step, done, total, source } = transfer;
+  const what = step === "receiving" ? "Receiving items" : done < total ? "Writing records" : "Verifying records";
+  setText(byId("transfer-text"), `${what}: ${done} of ${total}, ${source}`);
+  Object.assign(byId("transfer-bar"), { max: Math.max(total, 1), value: done });
+}
+
+// Ages count on without a word; the first state is on the page anyway.
+function announce(names) {
+  if (spoken !== null && names !== spoken) setText(byId("spoken"), names.toLowerCase());
+  spoken = names;
+}

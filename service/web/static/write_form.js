@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The form that writes a mission: token, button, and beside it the result of this very press, never of another write.
+import { make, setClass, setText } from "./dom.js";
+import { currentToken, tokenField } from "./token.js";
+
+const forms = new Set();
+let armed = null;
+
+// start: posts the request with a token and resolves to {id}.
+export function writeForm(label, start) {
+  const button = make("button", { class: "write" }, label);
+  const result = make("p", { class: "result", role: "status" });
+  const bar = make("progress", { hidden: "", "aria-label": "Records written" });
+  const form = { id: null, begunAt: 0, button, result, bar, element: null };
+  form.element = make("form", { class: "row", onsubmit: (event) => {
+    event.preventDefault();
+    press(form, start);
+  } }, tokenField(), button, bar, result);
+  forms.add(form);
+  block(form);
+  return form.element;
+}
+
+async function press(form, start) {
+  form.id = null;
+  say(form, "", "Sending …");
+  form.button.disabled = true;
+  try {
+    form.id = (await start(currentToken())).id;
+    form.begunAt = performance.now();
+    say(form, "", "Writing …");
+  } catch (error) {
+    say(form, "bad", error.message);
+    block(form);
+  }
+}
+
+// state: of /api/state, requested at askedAt (performance.now()).
+export function followWrites(state, askedAt) {
+  armed = state.status.armed;
+  for (const form of forms) {
+    if (!form.element.isConnected && form.id === null) forms.delete(form);
+    else if (form.id === null) block(form);
+    else if (askedAt > form.begunAt) follow(form, state);
+  }
+}
+
+function follow(form, { write, transfer }) {
+  const isOurs = write?.id === form.id;
+  if (isOurs && !write.done) {
+    if (transfer) Object.assign(form.bar, { hidden: false, max: transfer.total, value: write.records });
+    say(form, "", `${write.records} records written …`);
+    return;
+  }
+  form.id = null;
+  form.bar.hidden = true;
+  if (isOurs) say(form, write.ok ? "good" : "bad", write.text);
+  else say(form, "bad", "The result of this write is no longer known here. Stored missions lists it.");
+  block(form);
+}
+
+function block(form) {
+  form.button.disabled = armed === true;
+  form.button.title = armed === true ? "Armed: disarm to change the mission" : "";
+}
+
+function say(form, kind, text) {
+  setClass(form.result, `result ${kind}`.trim());
+  setText(form.result, text);
+}

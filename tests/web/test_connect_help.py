@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where to connect: in Mission Planner's words, and only addresses that other devices reach."""
+
+from service.links.connection import GcsAddress
+from service.web.connect_help import connect_help, page_urls, qr_code
+from service.web.settings import ListenAddress
+
+ANY = "0.0.0.0"  # noqa: S104
+OWN = ["10.42.0.1", "192.168.1.7"]
+
+
+def test_an_open_page_is_at_each_address() -> None:
+    assert page_urls(ListenAddress(ANY, 8080), OWN) == ["http://10.42.0.1:8080/", "http://192.168.1.7:8080/"]
+    assert page_urls(ListenAddress("10.42.0.1", 80), OWN) == ["http://10.42.0.1:80/"]
+
+
+def test_a_page_of_this_machine_alone_is_nowhere_else() -> None:
+    for host in ("127.0.0.1", "::1", "localhost"):
+        assert page_urls(ListenAddress(host, 8080), OWN) == []
+
+
+def test_links_are_named_as_mission_planner_names_them() -> None:
+    links = [
+        GcsAddress("udpin", ANY, 14550),
+        GcsAddress("tcpin", "10.42.0.1", 5760),
+        GcsAddress("udpout", "10.42.0.9", 14550),
+    ]
+    help_ = connect_help(ListenAddress(), links, OWN)
+    assert help_["stations"] == [
+        {"connection": "UDPCl", "hosts": OWN, "port": 14550},
+        {"connection": "TCP", "hosts": ["10.42.0.1"], "port": 5760},
+    ]
+    assert help_["called"] == ["udpout:10.42.0.9:14550"]
+
+
+def test_the_code_is_an_image_without_scripts() -> None:
+    image = qr_code("http://10.42.0.1:8080/")
+    assert b"<svg" in image
+    assert b"<path" in image
+    assert b"script" not in image

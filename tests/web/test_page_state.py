@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page's state bar, and what an update leaves alone."""
+
+import socket
+
+from chromium import PHONE, browser
+from plain_station import PlainStation
+from plan import plain_plan
+from programs import until
+from web_bench import WebBench
+
+from protocols.mavlink.dialect import messages
+
+pytest_plugins = ("web_fixtures",)
+
+
+def test_the_state_stays_in_sight(web: WebBench) -> None:
+    assert web.board is not None
+    with browser(web.port, PHONE) as page:
+        page.open()
+        page.wait_text("#badges", "DISARMED")
+        page.run("scrollTo(0, document.body.scrollHeight)")
+        assert page.run("return document.getElementById('badges').getBoundingClientRect().top") >= 0
+        assert page.run("return document.querySelector('header').offsetHeight") < PHONE[1] / 5
+
+        web.board.set("armed 1")
+        until(lambda: page.text("#badges") == "ARMED", "the armed craft")
+        red = page.run("return getComputedStyle(document.querySelector('.badge')).backgroundColor")
+        assert page.driver.title == "ARMED · naze-bridge"
+        assert page.text("#spoken") == "armed"
+
+        web.board.set("unplug")
+        page.wait_text("#badges", "LOST")
+        page.wait_text("#badges", "WAS ARMED")
+        assert page.run("return getComputedStyle(document.querySelector('.badge')).backgroundColor") == red
+        page.wait_text("#vehicle-age", "Last heard")
+
+        web.daemon.end()
+        page.wait_text("#badges", "NO REPLY FROM THE PI")
+        page.wait_text("#badges", "WAS ARMED")
+        page.wait_text("#trouble", "The Pi does not answer. The values below may be old.")
+
+
+def test_old_values_are_called_stale(web: WebBench) -> None:
+    assert web.board is not None
+    with browser(web.port) as page:
+        page.open()
+        page.wait_text("#badges", "DISARMED")
+        web.board.set("hang 1")
+        until(lambda: {"STALE", "LOST"} & set(page.text("#badges").split()), "a word on the silence")
+        web.board.set("hang 0")
+        until(lambda: page.text("#badges") == "DISARMED", "the craft again")
+
+
+LIVE = """
+    return [...document.querySelectorAll('[role=status], [role=alert], [aria-live]')].map((e) => e.textContent);"""
+
+
+def test_only_changes_are_spoken(web: WebBench) -> None:
+    assert web.board is not None
+    with browser(web.port) as page:
+        page.open()
+        before = page.run(LIVE)
+        assert not any(before)
+        page.wait_for_looks(3)
+        assert page.run(LIVE) == before
+        web.board.set("armed 1")
+        page.wait_text("#spoken", "armed")
+        spoken = page.run(LIVE)
+        page.wait_for_looks(3)
+        assert page.run(LIVE) == spoken
+
+
+def test_a_selection_survives_updates(web: WebBench) -> None:
+    web.daemon.push(plain_plan(9))
+    select = """
+        const all = [...document.querySelectorAll('dt')].find((e) => e.innerText === 'Firmware').nextElementSibling;
+        getSelection().selectAllChildren(all);"""
+    with browser(web.port) as page:
+        page.open()
+        page.run(select)
+        web.push_example()
+        page.wait_text("#held-text", "13 records")
+        page.wait_for_looks(2)
+        assert page.run("return String(getSelection())") == "Harakiri with the mission extension"
+
+
+def test_an_upload_in_progress_has_a_bar(web: WebBench) -> None:
+    with browser(web.port) as page, PlainStation(udp_to(web.daemon.address)) as station:
+        page.open()
+        station.say_hello()
+        station.send(messages.MAVLink_mission_count_message(1, 1, 20, 0))
+        station.wait_for("MISSION_REQUEST")  # and now it is silent
+        page.wait_text("#transfer-text", "Receiving items: 0 of 20")
+        assert page.run("const bar = document.getElementById('transfer-bar'); return [bar.value, bar.max]") == [0, 20]
+        until(
+            lambda: page.run("return document.getElementById('transfer').hidden"),
+            "the end of the upload that is given up",
+        )
+
+
+def udp_to(address: tuple[str, int]) -> socket.socket:
+    connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    connection.connect(address)
+    return connection
