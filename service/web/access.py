@@ -67,9 +67,7 @@ def is_local_name(host: str) -> bool:
 def check_token(request: Request, token: Token | None) -> None:
     """Refuse who does not show the token."""
     if token is None:
-        raise Refused(
-            HTTPStatus.FORBIDDEN, "The Pi has no token, so this page is read-only; its log says why."
-        )
+        raise Refused(HTTPStatus.FORBIDDEN, "The Pi has no token, so this page is read-only; its log says why.")
     if not token.is_shown_by(request.headers.get("authorization")):
         peer = None if request.client is None else request.client.host
         _log.warning("web.wrong_token", peer=peer, path=request.url.path)

@@ -53,7 +53,7 @@ def test_how_everything_is(page: Browser) -> None:
     assert page.text("#badges") == "DISARMED"
     assert page.text("#headline") == "Harakiri with the mission extension, STABILIZE, 12.6 V"
     assert (page.value("State"), page.value("Mode")) == ("disarmed", "STABILIZE")
-    assert page.value("Battery") == "12.6 V"
+    assert page.value("Battery") == "12.6 V, about 100 %"
     assert page.value("Protocol") == "MSP"
     assert "115200 baud" in page.value("Port")
     until(lambda: page.value("Line").endswith("/s out"), "a rate")
