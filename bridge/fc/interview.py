@@ -23,10 +23,13 @@ class Interview:
     def __init__(self) -> None:
         self._replies: dict[int, MspFrame] = {}
 
-    def ask(self, command: int, reply_payload: int) -> Conversation[MspFrame]:
-        """Ask `command`; the reply may be an error frame, which means that the board does not know it."""
+    def ask(self, command: int, reply_payload: int, *, lasting: int | None = None) -> Conversation[MspFrame]:
+        """Ask `command`; the reply may be an error frame, which means that the board does not know it.
+
+        lasting: how many of its first bytes must agree, if the others may change at any moment.
+        """
         if command not in self._replies:
-            reply = yield from ask_surely(request(command), command, reply_payload)
+            reply = yield from ask_surely(request(command), command, reply_payload, lasting=lasting)
             if reply is None:
                 raise NoAnswer
             self._replies[command] = reply

@@ -18,6 +18,7 @@ from bridge.model.vehicle import (
     Motors,
     Orientation,
     Power,
+    Readiness,
     Reading,
     Signal,
     Source,
@@ -57,6 +58,7 @@ POLL_FOR: Mapping[type[Reading], Msp] = {
     Motors: Msp.MOTOR,
     ImuSample: Msp.RAW_IMU,
     MissionLeg: Msp.NAV_STATUS,
+    Readiness: Msp.INAV_STATUS,
 }
 _MAX_RSSI = 1020
 
@@ -120,7 +122,9 @@ def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
     status = decode_status(payload)
     if status is None:
         return
-    vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors))
+    before = vehicle.last(Health)
+    load = None if before is None else before.cpu_load
+    vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors, load))
     armed = None if controller.arm_bit is None else bool(status.box_flags >> controller.arm_bit & 1)
     mode = flight_mode(status.box_flags, controller.boxes) if controller.boxes else None
     vehicle.hear(FlightState(now, Source.MSP, armed, mode))

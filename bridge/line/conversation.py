@@ -7,7 +7,7 @@ when the bridge is about to end, its subclass Stopped.
 """
 
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from bridge.model.mission_log import ArrivedMission, Conclusion, PendingMission
@@ -125,8 +125,12 @@ def ask(
     return None
 
 
-def ask_surely(frame: bytes, command: int, reply_payload: int) -> Conversation[MspFrame | None]:
+def ask_surely(
+    frame: bytes, command: int, reply_payload: int, *, lasting: int | None = None
+) -> Conversation[MspFrame | None]:
     """Ask until two replies in a row are equal; None if they never are, or if a reply is missing.
+
+    lasting: how many bytes of the payload are compared, if the others may change; None: all.
 
     The checksum of 8 bits lets a pair of flipped bits through: at one wrong bit in a thousand one INFO reply in 500,
     and one BOXNAMES reply in 25. An error frame is an answer too.
@@ -134,10 +138,14 @@ def ask_surely(frame: bytes, command: int, reply_payload: int) -> Conversation[M
     before: MspFrame | None = None
     for _ in range(_MAX_ASKS):
         reply = yield from ask(frame, command, reply_payload)
-        if reply is None or reply == before:
+        if reply is None or (before is not None and _lasting(reply, lasting) == _lasting(before, lasting)):
             return reply
         before = reply
     return None
+
+
+def _lasting(reply: MspFrame, size: int | None) -> MspFrame:
+    return replace(reply, payload=reply.payload[:size])
 
 
 def pause(seconds: float) -> Conversation[None]:

@@ -148,6 +148,13 @@ class Health(Reading):
 
 
 @dataclass(frozen=True, slots=True)
+class Readiness(Reading):
+    """What keeps the craft from arming, in words; () if nothing does. Unknown on firmware that does not say."""
+
+    blockers: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Motors(Reading):
     """Motor outputs, microseconds."""
 

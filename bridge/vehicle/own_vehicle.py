@@ -13,11 +13,11 @@ from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.gcs.message_rates import MessageRates
-from bridge.gcs.station import Peer, Station
+from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import MissionProgress
-from bridge.model.vehicle import FlightState, Home, MissionLeg, Reading
+from bridge.model.vehicle import FlightState, Home, MissionLeg, Readiness, Reading
 from bridge.vehicle import vehicle_messages
 from bridge.vehicle.telemetry_table import EXTENDED_STATUS, EXTRA3, NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
@@ -71,6 +71,7 @@ class OwnVehicle:
             messages.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
         }
         self._announced_home: Home | None = None
+        self._told_blockers: tuple[str, ...] = ()
         self._also_wanted: Mapping[type[Reading], float] = {}
         #: New ground stations, and until when they get more heartbeats.
         self._newcomers: dict[Peer, float] = {}
@@ -80,6 +81,7 @@ class OwnVehicle:
     def newcomer(self, peer: Peer) -> None:
         """Greet a new ground station: it gets heartbeats faster so that it connects sooner, and must hear of home."""
         self._announced_home = None
+        self._told_blockers = ()
         self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
         self._ground.greet(peer, self._make_heartbeat())
@@ -127,6 +129,8 @@ class OwnVehicle:
                 self._send(row, at, everyone)
         if MissionLeg in news:
             self._follow_mission()
+        if Readiness in news:
+            self._tell_readiness()
         if FlightState in news and self._announced != self._shown_state():
             self._heartbeat()
 
@@ -246,12 +250,24 @@ class OwnVehicle:
         return None if unix_s is None else vehicle_messages.system_time(self._moment(), unix_s)
 
     def _follow_mission(self) -> None:
-        """Tell at once what was reached; where it flies to next comes every second."""
+        """Tell at once what was reached and where it flies to next."""
         leg = self._session.vehicle.last(MissionLeg)
+        before = self._progress.number, self._progress.progress
         reached = None if leg is None else self._progress.take(leg.status)
+        if before != (self._progress.number, self._progress.progress):
+            self._ground.broadcast(self._mission_current())
         seq = self._missions.seq_of(reached or 0)
         if seq:
             self._ground.broadcast(vehicle_messages.mission_item_reached(seq))
+
+    def _tell_readiness(self) -> None:
+        """Tell why it will not arm, whenever the reasons change; in flight there are none."""
+        readiness = self._session.vehicle.last(Readiness)
+        if readiness is None or readiness.blockers == self._told_blockers:
+            return
+        self._told_blockers = readiness.blockers
+        if readiness.blockers:
+            self._ground.say(Severity.NOTICE, f"Not ready to arm: {', '.join(readiness.blockers)}")
 
     def _announce_home(self) -> None:
         """HOME_POSITION whenever it is another one; who asks gets it at any time."""

@@ -23,6 +23,7 @@ from bridge.model.vehicle import (
     Orientation,
     Power,
     Pressure,
+    Readiness,
     ReadingT,
     Signal,
     Sticks,
@@ -263,6 +264,10 @@ def sys_status(at: Moment) -> Message | None:
         signal = at.vehicle.last(Signal)
         if at.fresh(Sticks) is not None and (signal is None or signal.strength > 0):
             healthy |= messages.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    readiness = at.fresh(Readiness)
+    if readiness is not None:
+        sensors |= messages.MAV_SYS_STATUS_PREARM_CHECK
+        healthy |= 0 if readiness.blockers else messages.MAV_SYS_STATUS_PREARM_CHECK
     power = at.fresh(Power)
     return messages.MAVLink_sys_status_message(
         sensors,

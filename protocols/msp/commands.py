@@ -24,6 +24,8 @@ class Msp(IntEnum):
     WP = 118
     BOXIDS = 119
     NAV_STATUS = 121
+    INAV_STATUS = 0x2000
+    INAV_ANALOG = 0x2002
 
 
 class MspAction(IntEnum):

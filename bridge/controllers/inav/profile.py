@@ -2,6 +2,7 @@
 """INAV: how it is recognised, and what it can do."""
 
 from bridge.controllers.inav.mission_store import InavMissions
+from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NavCraft
 from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
@@ -10,9 +11,14 @@ from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleVi
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
+from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
 from protocols.msp.nav import INFO_SIZE, Nav, decode_info
 
 _VARIANT = "INAV"
+#: Bytes of GETINFO that stay the same.
+_LASTING_INFO = 2
+#: MultiWii's MULTITYPE for INAV's platform types: aeroplane, helicopter, tricopter. Others are shown as a quadrocopter.
+_MIXERS = {1: 14, 2: 15, 3: 1}
 #: Permanent box ids (docs/inav.md) of the modes that make a flight mode.
 _BOXES = {0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "NAV ALTHOLD", 10: "NAV RTH", 11: "NAV POSHOLD", 28: "NAV WP"}
 
@@ -22,12 +28,15 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
         return None
     boxes = yield from board.boxes_by_id(_BOXES)
     controller = FlightController(PROFILE, PROFILE.name, boxes=boxes)
-    info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE)).payload)
+    # The pilot may load another mission meanwhile: only the capacity cannot change.
+    info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE, lasting=_LASTING_INFO)).payload)
     if info is None or not info.capacity or controller.arm_bit is None:
         # Without an arm flag nothing would keep missions from being written in flight.
         return None
+    platform = decode_platform((yield from board.ask(MIXER, MIXER_SIZE)).payload)
+    mixer = _MIXERS.get(platform or 0)
     version = yield from board.version()
-    return FlightController(PROFILE, PROFILE.name, boxes=boxes, capacity=info.capacity, version=version)
+    return FlightController(PROFILE, PROFILE.name, mixer, boxes, capacity=info.capacity, version=version)
 
 
 def _rules(settings: RuleSettings) -> NavRules:
@@ -44,7 +53,8 @@ PROFILE = Profile(
     "INAV",
     "INAV",
     recognise=_recognise,
-    polls=(*POLLS, NAV_POLL),
+    polls=(*POLLS, NAV_POLL, *INAV_POLLS),
+    decoders=INAV_DECODERS,
     has_2d_fix=True,
     accepts_any_byte=True,
     open_store=_open_store,

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Readings that only INAV has: load, what keeps it from arming, battery percentage and cells (MSP v2)."""
+
+from collections.abc import Mapping
+
+from bridge.fc.profile import Decoder, FlightController
+from bridge.line.poll_schedule import Poll
+from bridge.model.vehicle import Health, Power, Readiness, Signal, Source, Vehicle
+from protocols.msp.commands import Msp
+from protocols.msp.frame import request
+from protocols.msp.inav import ANALOG_SIZE, STATUS_SIZE, decode_inav_analog, decode_inav_status
+from protocols.msp.telemetry import decode_analog
+
+INAV_POLLS = (
+    Poll(Msp.INAV_STATUS, request(Msp.INAV_STATUS), STATUS_SIZE, 1.0),
+    Poll(Msp.INAV_ANALOG, request(Msp.INAV_ANALOG), ANALOG_SIZE, 1.0),
+)
+_MAX_RSSI = 1023
+
+
+def _inav_status(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    told = decode_inav_status(payload)
+    if told is not None:
+        load = told.load_percent / 100
+        vehicle.hear(Health(now, Source.MSP, told.sensors, told.cycle_time_us, told.i2c_errors, load))
+        vehicle.hear(Readiness(now, Source.MSP, told.blockers))
+
+
+def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    """Without a battery it has no cells, and its percentage means nothing."""
+    told = decode_inav_analog(payload)
+    if told is None:
+        return
+    if told.cells:
+        volts, amperes = told.battery_cv / 100, told.current_ca / 100
+        vehicle.hear(Power(now, Source.MSP, volts, amperes, told.drawn_mah, told.cells, told.percent))
+    else:
+        vehicle.hear(Power(now, Source.MSP, told.battery_cv / 100 or None))
+    _hear_signal(vehicle, told.rssi, now)
+
+
+def _analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    """MSP_ANALOG: INAV_ANALOG has the battery in a finer scale."""
+    told = decode_analog(payload)
+    if told is not None:
+        _hear_signal(vehicle, told.rssi, now)
+
+
+def _hear_signal(vehicle: Vehicle, rssi: int, now: float) -> None:
+    if rssi or vehicle.last(Signal) is not None:
+        vehicle.hear(Signal(now, Source.MSP, min(rssi / _MAX_RSSI, 1.0)))
+
+
+INAV_DECODERS: Mapping[int, Decoder] = {
+    Msp.INAV_STATUS: _inav_status,
+    Msp.INAV_ANALOG: _inav_analog,
+    Msp.ANALOG: _analog,
+}

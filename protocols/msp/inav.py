@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""INAV's own telemetry over MSP v2 (src/main/fc/fc_msp.c; layouts seen on INAV 9.1.0's simulator)."""
+
+import struct
+from dataclasses import dataclass
+
+from protocols.msp.telemetry import Sensor
+
+_STATUS = struct.Struct("<HHHHBI")
+_ANALOG = struct.Struct("<BHHIIIIBH")
+_PLATFORM_AT = 3
+STATUS_SIZE = 22
+ANALOG_SIZE = _ANALOG.size
+MIXER = 0x2010
+MIXER_SIZE = 9
+_ALL_SENSORS = sum(Sensor)
+
+#: The flags of MSP2_INAV_STATUS that keep it from arming (fc/runtime_config.h), as a pilot reads them.
+ARMING_BLOCKERS = {
+    6: "geozone",
+    7: "failsafe",
+    8: "not level",
+    9: "sensors calibrating",
+    10: "system overloaded",
+    11: "navigation unsafe",
+    12: "compass not calibrated",
+    13: "accelerometer not calibrated",
+    14: "arm switch on",
+    15: "hardware failure",
+    16: "failsafe switch on",
+    18: "no RC link",
+    19: "throttle not low",
+    20: "command line open",
+    21: "CMS menu open",
+    22: "OSD menu open",
+    23: "sticks not centered",
+    24: "servo autotrim on",
+    25: "out of memory",
+    26: "invalid setting",
+    27: "PWM output error",
+    28: "prearm switch off",
+    29: "DShot beeper",
+    30: "landing detected",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class InavStatus:
+    """MSP2_INAV_STATUS. load_percent: of the CPU. blockers: what keeps it from arming."""
+
+    cycle_time_us: int
+    i2c_errors: int
+    sensors: Sensor
+    load_percent: int
+    blockers: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class InavAnalog:
+    """MSP2_INAV_ANALOG. rssi: 0..1023. cells: 0 without a battery."""
+
+    cells: int
+    battery_cv: int
+    current_ca: int
+    drawn_mah: int
+    percent: int
+    rssi: int
+
+
+def decode_inav_status(payload: bytes) -> InavStatus | None:
+    """Decode MSP2_INAV_STATUS; None if it is too short."""
+    if len(payload) < _STATUS.size:
+        return None
+    cycle_us, i2c_errors, sensors, load, _, flags = _STATUS.unpack_from(payload)
+    blockers = tuple(name for bit, name in ARMING_BLOCKERS.items() if flags >> bit & 1)
+    return InavStatus(cycle_us, i2c_errors, Sensor(sensors & _ALL_SENSORS), load, blockers)
+
+
+def decode_inav_analog(payload: bytes) -> InavAnalog | None:
+    """Decode MSP2_INAV_ANALOG; None if it is too short."""
+    if len(payload) < _ANALOG.size:
+        return None
+    battery, volts, current, _, drawn, _, _, percent, rssi = _ANALOG.unpack_from(payload)
+    return InavAnalog(battery >> 4, volts, current, drawn, min(percent, 100), rssi)
+
+
+def decode_platform(payload: bytes) -> int | None:
+    """The platform type in MSP2_INAV_MIXER; None if it is too short."""
+    return payload[_PLATFORM_AT] if len(payload) > _PLATFORM_AT else None

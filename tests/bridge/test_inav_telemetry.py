@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What only INAV tells: version, platform, load, battery, and what keeps it from arming."""
+
+from typing import Any
+
+import pytest
+from conversations import Upload
+from test_inav import plan
+from test_inav_boards import board_with
+from world import GroundStation, World
+
+from bridge.model.vehicle import Health, MissionLeg, Power
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.msp.nav import NavMode
+from simulator.fc_kinds import make_board
+from simulator.inav_boxes import BOXES, NAV_WP
+from simulator.msp_board import MspBoard
+from simulator.msp_options import MspOptions
+from simulator.options import Faults
+
+PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
+RC_LINK, NOT_LEVEL = 1 << 18, 1 << 8
+
+
+def introduced(**options: Any) -> tuple[MspBoard, World, GroundStation]:
+    board, world, station = board_with(**options)
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.run(3)
+    return board, world, station
+
+
+@pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
+def test_its_version_is_known(version: str) -> None:
+    _, world, _ = introduced(version=version)
+    assert world.bridge.session.controller is not None
+    assert world.bridge.session.controller.version == tuple(map(int, version.split(".")))
+
+
+@pytest.mark.parametrize(("platform", "kind"), [(0, messages.MAV_TYPE_QUADROTOR), (1, messages.MAV_TYPE_FIXED_WING)])
+def test_an_aeroplane_is_shown_as_one(platform: int, kind: int) -> None:
+    _, _, station = introduced(platform=platform)
+    assert {heartbeat.type for heartbeat in station.said("HEARTBEAT")} == {kind}
+
+
+def test_load_battery_percentage_and_cells_are_the_boards_own() -> None:
+    _, world, station = introduced()
+    power, health = world.bridge.session.vehicle.last(Power), world.bridge.session.vehicle.last(Health)
+    assert power is not None
+    assert health is not None
+    assert (power.cells, power.remaining_percent, power.drawn_mah) == (3, 88, 120)
+    assert health.cpu_load == pytest.approx(0.07)
+    status = station.said("SYS_STATUS")[-1]
+    assert (status.load, status.battery_remaining) == (70, 88)
+    assert 12_000 < status.voltage_battery < 12_700
+
+
+def test_what_keeps_it_from_arming_is_told_when_it_changes() -> None:
+    board, world, station = introduced(faults=Faults(boxes=0, arming_blockers=RC_LINK | NOT_LEVEL))
+    assert station.said("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM == 0
+    assert [text for text in station.texts() if "arm" in text] == ["Not ready to arm: not level, no RC link"]
+    board.faults.arming_blockers = 0
+    world.run(3)
+    assert station.said("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM
+    assert len([text for text in station.texts() if "arm" in text]) == 1
+
+
+def test_a_mission_that_is_loaded_while_it_is_identified_does_not_hide_it() -> None:
+    """Of GETINFO only the capacity is compared: the count may change with every answer."""
+    board = make_board("inav", MspOptions(), Faults(boxes=0))
+    world = World(speeds=(115200,), peer=board)
+    original, counts = board.receive, iter(range(1, 10_000))
+
+    def receive(data: bytes, now: float) -> None:
+        board.faults.stick_loads += 1
+        mission = board._firmware._mission if board._firmware else None  # type: ignore[attr-defined]
+        if mission is not None:
+            mission.count = next(counts) % 100
+        original(data, now)
+
+    board.receive = receive  # type: ignore[method-assign]
+    world.wait_until(lambda w: w.kind is not None and w.kind.name == "INAV", 15)
+
+
+def test_the_present_item_is_told_together_with_nav_status() -> None:
+    board, world, station = introduced()
+    home = (453838000, 84733000)
+    legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home[0] + 900 * n, home[1], 20.0) for n in (1, 2, 3)]
+    assert Upload(station, [plan(1)[0], *legs]).run() is MissionResult.ACCEPTED
+    board.faults.armed, board.faults.boxes = True, 1 << BOXES["9.1.0"].index(NAV_WP)
+    seen: set[int] = set()
+    for _ in range(400):
+        world.run(0.1)
+        leg = world.bridge.session.vehicle.last(MissionLeg)
+        if leg is not None and leg.status.mode == NavMode.MISSION:
+            seen.add(leg.status.number)
+            assert station.said("MISSION_CURRENT")[-1].seq == leg.status.number
+    assert seen == {1, 2, 3}
