@@ -16,6 +16,7 @@
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
 #   make cli-page    write docs/cli.md anew
+#   make rules-page   write the table of docs/mission-rules.md anew, from the rules
 #   make inav-page   write the table of docs/inav.md anew
 #   make config-sample  write systemd/config.toml and the keys of docs/configuration.md anew
 #   make zenoh-schemas  write service/zenoh_link/schemas/ anew, from the types that the payloads are made of
@@ -29,7 +30,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: demo test lint bench pictures real-board soak deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page demo test lint bench pictures real-board soak deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
 
 # Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -124,6 +125,13 @@ inav-page: $(VENV)/.test-ready
 	PYTHONPATH=. $(BIN)/python tests/simulator/nav_rows.py > docs/inav.table
 	sed -i -e '/begin: make inav-page/,/end: make inav-page/{/make inav-page -->/!d}' -e '/begin: make inav-page/r docs/inav.table' docs/inav.md
 	rm docs/inav.table
+
+# The table of what Harakiri stores of each command.
+rules-page: $(VENV)/.test-ready
+	$(BIN)/python -m bridge.controllers.harakiri.rules_page > docs/rules.table
+	sed -i -e '/begin: make rules-page/,/end: make rules-page/{/make rules-page -->/!d}' \
+	    -e '/begin: make rules-page/r docs/rules.table' docs/mission-rules.md
+	rm docs/rules.table
 
 # The sample file of all settings, and their reference page.
 config-sample: $(VENV)/.test-ready

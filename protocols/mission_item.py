@@ -38,7 +38,7 @@ class Frame(IntEnum):
 
 
 class MissionResult(IntEnum):
-    """MAV_MISSION_RESULT: what a MISSION_ACK says. ERROR is never a final word (mission-rules.md)."""
+    """MAV_MISSION_RESULT: what a MISSION_ACK says. ERROR is never a final word (docs/ground-stations.md)."""
 
     ACCEPTED = 0
     ERROR = 1
@@ -79,6 +79,6 @@ class MissionItem:
 
 
 def degrees_to_e7(degrees: float) -> int | None:
-    """Round degrees to 1e-7 degrees; None if not a finite number (mission-rules.md, "Each item")."""
+    """Round degrees to 1e-7 degrees; None if not a finite number (docs/mission-rules.md, "Each item")."""
     scaled = degrees * 1e7  # may overflow to infinity on its own
     return round(scaled) if math.isfinite(scaled) else None

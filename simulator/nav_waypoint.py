@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A waypoint as MSP_WP and MSP_SET_WP carry it (inav.md "Layouts")."""
+"""A waypoint as MSP_WP and MSP_SET_WP carry it (layout: protocols/msp/nav.py)."""
 
 import struct
 from dataclasses import dataclass

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MSP command numbers that the bridge uses (Harakiri's serial.c; the others: inav.md)."""
+"""MSP command numbers that the bridge uses (Harakiri's serial.c; the others: INAV's msp_protocol.h)."""
 
 from enum import IntEnum
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions over MSP_SET_WP: what INAV and MultiWii NAV keep, and how they are asked (inav.md, "Layouts").
+"""Missions over MSP_SET_WP: what INAV and MultiWii NAV keep, and how they are asked (docs/inav.md).
 
 Records are numbered from 1. Numbers 0 and 255 are no part of a mission: writing them moves the home point and a craft
 that holds its position, so no frame with them can be made here.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Replies that carry the vehicle's state. Harakiri's lengths are the least accepted; its relatives send longer ones.
 
-Layouts: harakiri.md "Commands answered", inav.md. A payload that is too short gives None.
+Layouts: Harakiri's serial.c; INAV's fc_msp.c. A payload that is too short gives None.
 """
 
 import struct

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading a mission: mission-rules.md, "Read-back"."""
+"""Reading a mission: docs/mission-rules.md, "Read-back"."""
 
 from dataclasses import replace
 

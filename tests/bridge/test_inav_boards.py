@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions to the simulated INAV and MultiWii (simulator), which have every trap of inav.md."""
+"""Missions to the simulated INAV and MultiWii (simulator), which have every trap of docs/inav.md."""
 
 from typing import Any
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission Planner as a scripted client: what it sends, what it waits for and how long (clients.md; commit a2fcd74d6).
+"""Mission Planner as a scripted client: what it sends, what it waits for and how long (docs/ground-stations.md).
 
 Only its behaviour on the link is here. Its timers may be scaled down (`pace`); everything else is as it is there, the
 odd things above all: it takes any ack to MISSION_COUNT for "go on", it understands only MISSION_REQUEST (40) while it

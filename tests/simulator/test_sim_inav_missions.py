@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated INAV has every trap of inav.md; what is asserted here was seen on INAV's own simulator, too."""
+"""The simulated INAV has every trap of docs/inav.md; what is asserted here was seen on INAV's own simulator, too."""
 
 from dataclasses import replace
 

@@ -13,7 +13,7 @@ _UNKNOWN_COMMAND = 0
 
 
 def items_from_records(records: Iterable[WpRecord], sent_as: Mapping[int, int] = _NONE_KNOWN) -> list[MissionItem]:
-    """Return the read-back form of a stored list (mission-rules.md, "Read-back").
+    """Return the read-back form of a stored list (docs/mission-rules.md, "Read-back").
 
     Frame 3, home frame 0. A region of interest carries the command number that `sent_as` (stored seq to MAV_CMD)
     remembers, else 80. A record whose number is no WpCommand (ours) is shown as MAV_CMD 0, which no ground station
