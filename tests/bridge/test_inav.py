@@ -124,7 +124,7 @@ def test_where_there_was_nothing_half_a_list_stays_that_cannot_be_flown() -> Non
     assert Upload(station, plan(40)).run() is DENIED
     assert (len(inav.records), inav.is_valid, inav.saved) == (19, False, None)
     assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
-    assert Download(station).run() [1:] == []
+    assert Download(station).run()[1:] == []
 
 
 @pytest.mark.parametrize("make", [FakeInav, FakeMultiwii])
@@ -197,8 +197,8 @@ def test_cleared_is_a_single_way_home_and_reads_as_nothing() -> None:
         world.run(3)
         assert (board.flown if isinstance(board, FakeMultiwii) else board.saved) == [CLEARED]
         download = Download(station)
-        assert download.run() [1:] == []
-        assert download.count == 0
+        assert download.run()[1:] == []
+        assert download.count == 1  # home
         other, other_station = found(board)
         assert other.bridge.missions.held is not None
         assert Download(other_station).run() == []

@@ -97,7 +97,7 @@ def test_a_multiwii_holds_what_it_can() -> None:
     assert without_home(Download(station).run()) == without_home(plan(21))
     station.send(clear_message())
     world.run(2)
-    assert Download(station).run() [1:] == []
+    assert Download(station).run()[1:] == []
 
 
 @pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])

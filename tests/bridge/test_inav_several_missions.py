@@ -119,7 +119,7 @@ def test_clear_clears_the_loaded_one() -> None:
     bench.station.send(clear_message())
     bench.world.run(3)
     assert bench.stored()[-1] == sets(4, 6)[1]
-    assert Download(bench.station).run() [1:] == []
+    assert Download(bench.station).run()[1:] == []
     assert bench.flown() == []
 
 
