@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Mapping
 from itertools import accumulate
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
@@ -21,12 +21,16 @@ from bridge.model.vehicle_groups import Group
 from service.daemon import Daemon
 from service.mission_data import Json
 from service.version import version
+from service.zenoh_link.settings import host_name
 
 #: What /metrics is answered with.
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 _PREFIX = "naze_bridge_"
 #: An upload takes a second on a good link, and is given up after some more.
 _UPLOAD_S = (0.25, 0.5, 1, 2, 4, 8, 16, 32, 64)
+#: Followers' figures that only ever grow.
+_COUNTED = {"zenoh_dropped"}
+_FIXES = {"none": 0, "2D": 2, "3D": 3}
 _BEGINS = {"mission.upload_started", "mission.push_started"}
 _ENDS = {"mission.upload_ended", "mission.refused", "mission.push_ended"}
 
@@ -37,6 +41,10 @@ class Metrics:
     def __init__(self, daemon: Daemon) -> None:
         self._registry = CollectorRegistry()
         self._registry.register(_State(daemon))
+        ProcessCollector(registry=self._registry)
+        settings = daemon.settings.zenoh
+        self._labelled = CollectorRegistry()
+        self._labelled.register(_OfVehicle(self._registry, host_name() if settings is None else settings.vehicle))
         self._events = self._counter("events", "Events of the log (docs/events.md).", "event", "level")
         self._missions = self._counter("missions", "Missions that came in, by their final ack.", "ack")
         self._findings = self._counter("findings", "Values that were changed or items dropped, by field.", "field")
@@ -52,7 +60,7 @@ class Metrics:
 
     def render(self) -> bytes:
         """Return the text."""
-        return generate_latest(self._registry)
+        return generate_latest(self._labelled)
 
     def telemetry(self, groups: frozenset[Group]) -> None:
         """It is read when somebody asks."""
@@ -81,6 +89,26 @@ class Metrics:
         return Counter(_PREFIX + name, meaning, labels, registry=self._registry)
 
 
+class _OfVehicle(Collector):
+    """Every metric of a registry, with the vehicle's name as a label: a fleet's metrics meet in one database."""
+
+    def __init__(self, registry: CollectorRegistry, vehicle: str) -> None:
+        self._registry = registry
+        self._vehicle = vehicle
+
+    def describe(self) -> list[Metric]:
+        """Names are checked by the registry within."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """Read everything."""
+        for family in self._registry.collect():
+            family.samples = [
+                sample._replace(labels={**sample.labels, "vehicle": self._vehicle}) for sample in family.samples
+            ]
+            yield family
+
+
 class _State(Collector):
     """What the daemon and its bridge know at the moment of a scrape."""
 
@@ -98,7 +126,11 @@ class _State(Collector):
         yield from self._flight_controller()
         yield from self._vehicle()
         for name, value in self._daemon.followers_status().items():
-            if isinstance(value, int):
+            if name in _COUNTED:
+                counted = _counters(name, f"As `naze-bridge status` shows it: {name}.")
+                counted.add_metric([], value)
+                yield counted
+            elif isinstance(value, int):
                 yield _gauge(name, f"As `naze-bridge status` tells it: {name}.", {}, value)
 
     def _links(self) -> Iterator[Metric]:
@@ -148,6 +180,10 @@ class _State(Collector):
         known: dict[str, tuple[str, float | None]] = {
             "armed": ("1 while it is armed.", report.status.armed),
             "battery_volts": ("Battery.", report.battery.voltage_v),
+            "latitude_degrees": ("By GPS, WGS 84.", report.position.lat_deg),
+            "longitude_degrees": ("By GPS, WGS 84.", report.position.lon_deg),
+            "height_meters": ("Above the place of the launch.", report.position.height_m),
+            "gps_fix": ("0, 2 or 3 dimensions.", _FIXES.get(report.gps.fix or "")),
             "satellites": ("Satellites in use.", report.gps.satellites),
             "mission_records": ("Records that the flight controller holds.", records),
         }

@@ -21,10 +21,16 @@ Samples = dict[tuple[str, tuple[str, ...]], float]
 def read(metrics: Metrics) -> Samples:
     families = text_string_to_metric_families(metrics.render().decode())
     return {
-        (sample.name.removeprefix("naze_bridge_"), tuple(sample.labels.values())): sample.value
+        (sample.name.removeprefix("naze_bridge_"), tuple(_other_labels(sample.labels))): sample.value
         for family in families
         for sample in family.samples
     }
+
+
+def _other_labels(labels: dict[str, str]) -> list[str]:
+    """All but the vehicle's name, which each sample has."""
+    assert labels["vehicle"]
+    return [value for name, value in labels.items() if name != "vehicle"]
 
 
 async def test_what_a_daemon_counts(tmp_path: Path) -> None:
@@ -53,6 +59,9 @@ async def test_what_a_daemon_counts(tmp_path: Path) -> None:
     assert after["mission_records", ()] == 12
     assert after["ground_stations", ()] == 1
     assert 0 < after["battery_volts", ()] < 30
+    assert -90 < after["latitude_degrees", ()] < 90
+    assert ("height_meters", ()) in after
+    assert after["process_resident_memory_bytes", ()] > 1e6
     # MISSION_ITEM_INT, each asked for until it is there.
     assert after["ground_received_frames_total", (str(link), "73")] >= 12
     answered = after["fc_round_trip_seconds_bucket", ("+Inf",)]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The router of a fleet as a process of its own: examples/zenoh_router.py."""
+"""The router of a fleet as a process of its own: zenohd if ZENOHD names one, else examples/zenoh_router.py."""
 
+import os
 import signal
 import socket
 import subprocess
@@ -11,6 +12,8 @@ from pathlib import Path
 
 from programs import PATIENCE, Program, free_port, until
 
+ZENOHD = os.environ.get("ZENOHD")
+_UP = "is up" if ZENOHD is None else "can be reached at"
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
@@ -23,12 +26,15 @@ class Router(Program):
 
     def _start(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, str(EXAMPLES / "zenoh_router.py"), *self._arguments]
+        if ZENOHD is not None:
+            (where,) = self._arguments
+            command = [ZENOHD, "--no-multicast-scouting", "-c" if where.endswith(".json5") else "-l", where]
         with self._output.open("ab") as file:
-            self._starts = self._output.read_text().count("is up")
+            self._starts = self._output.read_text().count(_UP)
             return subprocess.Popen(command, stdout=file, stderr=file)
 
     def wait(self) -> None:
-        until(lambda: self.printed.count("is up") > self._starts or not self.is_alive, "the router")
+        until(lambda: self.printed.count(_UP) > self._starts or not self.is_alive, "the router")
         assert self.is_alive, self.printed
 
     def stop(self) -> None:

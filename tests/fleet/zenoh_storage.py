@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A zenoh storage on `fleet/**`: a real one if ZENOHD names a zenohd, else one that acts alike."""
+"""A zenoh storage on `fleet/**`: a real one if ZENOHD has the storage manager beside it, else one that acts alike."""
 
 import json
-import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,9 +10,9 @@ from threading import Lock
 
 import zenoh
 from programs import until
+from zenoh_router import ZENOHD
 
-#: A zenohd; libzenoh_plugin_storage_manager.so must be beside it.
-ZENOHD = os.environ.get("ZENOHD")
+_PLUGIN = "libzenoh_plugin_storage_manager.so"
 
 
 def client(endpoint: str) -> zenoh.Session:
@@ -27,7 +26,7 @@ def client(endpoint: str) -> zenoh.Session:
 def storage(folder: Path, endpoint: str) -> Iterator[zenoh.Session]:
     """Run a storage behind a router; yields a session that can look into it."""
     with client(endpoint) as looking:
-        if ZENOHD is not None:
+        if ZENOHD is not None and Path(ZENOHD).with_name(_PLUGIN).exists():
             with _zenohd(folder, endpoint):
                 yield looking
         else:

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""examples/fleet: each metric that a dashboard or an alert names is one that a daemon has."""
+
+import asyncio
+import json
+import re
+from pathlib import Path
+
+from programs import until
+from prometheus_client.parser import text_string_to_metric_families
+from zenoh_router import EXAMPLES
+
+from service.daemon import Daemon
+from service.links.connection import parse_fc
+from service.metrics import Metrics
+from service.settings import Settings
+from service.zenoh_link.settings import ZenohSettings
+
+_NAME = re.compile(r"\b(?:naze_bridge|process)_[a-z_]+")
+#: Counted only once something has happened, or only with a session.
+_LATER = {"naze_bridge_missions_total", "naze_bridge_refused_frames_total", "naze_bridge_zenoh_dropped_total"}
+
+
+def wanted() -> set[str]:
+    dashboards = [json.loads(path.read_text()) for path in (EXAMPLES / "fleet" / "grafana" / "dashboards").iterdir()]
+    expressions = [target["expr"] for each in dashboards for panel in each["panels"] for target in panel["targets"]]
+    assert len(expressions) > 10
+    alerts = (EXAMPLES / "fleet" / "alerts.yml").read_text()
+    return set(_NAME.findall(" ".join([*expressions, alerts])))
+
+
+async def test_the_metrics_are_there(tmp_path: Path) -> None:
+    daemon = Daemon(Settings(parse_fc("sim:"), [], tmp_path, zenoh=ZenohSettings(vehicle="kite")))
+    metrics = Metrics(daemon)
+    running = asyncio.create_task(daemon.run())
+
+    def names() -> set[str]:
+        families = list(text_string_to_metric_families(metrics.render().decode()))
+        assert all(sample.labels["vehicle"] == "kite" for family in families for sample in family.samples)
+        return {sample.name for family in families for sample in family.samples}
+
+    await asyncio.to_thread(until, lambda: wanted() - _LATER <= names(), "all metrics of the dashboards")
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
