@@ -19,7 +19,9 @@ _LIB = Path("usr/lib/naze-bridge")
 _PAGES = (
     *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE"),
     *("firmware/README.md", "systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
+    "systemd/config.toml",
 )
+_SCHEMAS = "service/zenoh_link/schemas"
 _SCRIPTS = ("postinst", "prerm", "postrm")
 #: Of pymavlink's 44 MB of dialects the bridge imports one, and pymavlink's own mavutil one; lxml is for its generator.
 _DIALECTS = ("v20/__init__.py", "v20/ardupilotmega.py", "v20/all.py")
@@ -52,6 +54,7 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     shutil.copytree(project / "docs", documents / "docs")
     for page in _PAGES:
         _copy(project / page, documents / Path(page).parent)
+    shutil.copytree(project / _SCHEMAS, documents / _SCHEMAS, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(project / "examples", documents / "examples", ignore=shutil.ignore_patterns("__pycache__"))
     (documents / "changelog.gz").write_bytes(gzip.compress((project / "CHANGELOG.md").read_bytes(), mtime=0))
     _write(root / "usr/share/man/man1/naze-bridge.1.gz", gzip.compress(man_page().encode(), mtime=0))
