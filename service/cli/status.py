@@ -46,8 +46,7 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
         yield "Connect to", _reachable(link, addresses)
     if facts["page"] is not None:
         host, _, port = facts["page"].rpartition(":")
-        own = addresses[:1] if host == "0.0.0.0" and addresses else [host]  # noqa: S104
-        yield "Page", f"http://{own[0]}:{port}/"
+        yield "Page", f"http://{_own(host, addresses)[0]}:{port}/"
     if facts["store_trouble"]:
         yield "Missions", f"kept in memory only: {facts['store_trouble']}"
     for text in facts["recording"]:
@@ -99,5 +98,9 @@ def _reachable(link: str, addresses: list[str]) -> str:
     protocol = {"udpin": "UDP", "tcpin": "TCP"}.get(kind)
     if protocol is None:
         return link
-    own = addresses if host in ("0.0.0.0", "[::]") and addresses else [host]  # noqa: S104
-    return f"{protocol} {' or '.join(own)}, port {port}"
+    return f"{protocol} {' or '.join(_own(host, addresses))}, port {port}"
+
+
+def _own(host: str, addresses: list[str]) -> list[str]:
+    """What to give a client for a listening address; without a network only this machine itself connects."""
+    return (addresses or ["127.0.0.1"]) if host in ("0.0.0.0", "[::]") else [host]  # noqa: S104
