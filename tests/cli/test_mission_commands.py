@@ -268,7 +268,7 @@ def test_the_list_of_commands_imports_none_of_them() -> None:
 def test_a_daemon_that_belongs_to_somebody_else(daemon: Daemon) -> None:
     """Nobody may look into root's directory; who is not root is kept out of a directory of his own."""
     as_nobody = (
-        "import os; from service.cli.main import main; import service.cli.mission_commands;"
+        "import os; from service.cli.main import main; import service.cli.status, service.settings;"
         "os.geteuid() or os.setuid(65534); main(prog_name='naze-bridge')"
     )
     daemon.state_dir.chmod(0)
