@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A guest and another vehicle of a fleet that try to speak for a vehicle, past the example routers as they stand."""
+
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import zenoh
+from benches import Starter
+from secured_fleet import Fleet, password_fleet, tls_fleet
+from zenoh_bench import Reader, ask_surely, key, zenoh_bench
+
+
+@pytest.fixture(params=[tls_fleet, password_fleet], ids=["tls", "passwords"])
+def fleet(request: pytest.FixtureRequest, tmp_path: Path, stack: ExitStack) -> Fleet:
+    folder = tmp_path / "fleet"
+    folder.mkdir()
+    found: Fleet = request.param(folder, stack)
+    return found
+
+
+def test_nobody_speaks_for_a_vehicle(start: Starter, fleet: Fleet) -> None:
+    bench = zenoh_bench(start, f'config_file = "{fleet.config("vehicle", "naze-1")}"\ncommands = true')
+    with (
+        fleet.open("pilot", "pilot") as pilot,
+        fleet.open("pilot", "guest") as guest,
+        fleet.open("vehicle", "naze-2") as other,
+    ):
+        # The guest looks on.
+        assert Reader(guest, key("telemetry/*")).wait("telemetry/attitude")
+        truth = ask_surely(pilot, "state")
+        heard = Reader(pilot)
+        tokens: list[str] = []
+        pilot.liveliness().declare_subscriber("fleet/**", lambda sample: tokens.append(str(sample.key_expr)))
+        for liar in (guest, other):
+            _lie(liar)
+        time.sleep(2.0)  # for the lies to arrive, if they do
+        heard.wait("telemetry/attitude")
+        assert [sample for sample in heard.samples if b"forged" in str(sample).encode()] == []
+        assert [
+            reply for reply in pilot.get(key("state"), timeout=3.0) if reply.ok and b"forged" in _bytes(reply)
+        ] == []
+        assert ask_surely(pilot, "state").keys() == truth.keys()
+        assert [token for token in tokens if "forged" in token] == []
+    bench.board.assert_was_treated_well()
+
+
+def _lie(session: zenoh.Session) -> None:
+    session.put(key("telemetry/position"), b"forged")
+    session.delete(key("telemetry/position"))
+    session.declare_queryable(key("state"), lambda query: query.reply(query.key_expr, b"forged"), complete=True)
+    session.liveliness().declare_token(key("forged"))
