@@ -10,6 +10,7 @@
 #   make pictures       take the docs' pictures of the status page
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts)
 #   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
+#   make fuzz           feed the bridge anything, 20,000 examples of up to 20 inputs for each way in (EXAMPLES=500000)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13)
@@ -30,7 +31,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: rules-page demo test lint bench pictures real-board soak deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page demo test lint bench pictures real-board soak fuzz deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
 
 # Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
 BROWSER_PACKAGES := chromium chromium-driver
@@ -74,6 +75,9 @@ real-board: $(VENV)/.test-ready
 
 soak: $(VENV)/.test-ready
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
+
+fuzz: $(VENV)/.test-ready
+	FUZZ_EXAMPLES=$(or $(EXAMPLES),20000) $(BIN)/python -m pytest tests/bridge/test_fuzz.py --timeout 0 --numprocesses $(JOBS) $(ARGS)
 
 deb: $(VENV)/.demo-ready
 	$(BIN)/python -m deb.build $(ARCH)
