@@ -24,7 +24,7 @@ def test_the_lines_of_one_incident_have_one_id(start: Starter) -> None:
         station.say_hello()
         station.wait_for("HEARTBEAT")
         station.upload(plain_plan(5))
-        station.upload(plain_plan(1))
+        station.upload(plain_plan(147))
     bench.daemon.push(plain_plan(6))
     bench.board.end()
     until(lambda: bench.daemon.has_logged("fc.port_lost"), "the loss")

@@ -344,7 +344,7 @@ def test_a_user_who_goes_away_blocks_nobody(shared: Bench, kept: list[str]) -> N
     gone = shared.mission_planner()
     gone.write_begun(plain_plan(30, start=100), 9)
     planner = shared.mission_planner()
-    planner.wait_for_text("silent for 5 s")
+    until(lambda: shared.daemon.missions()[0]["detail"] == "Upload silent for 5 s, old mission kept", "the end")
     assert shared.board.records() == kept
     planner.write(plain_plan(12, start=100))
 
