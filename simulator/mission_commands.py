@@ -89,7 +89,7 @@ class MissionCommands:
 
     def store(self, records: bytes) -> None:
         """Make records the stored list; see Missions."""
-        if not self._board.armed:
+        if not self._board.armed and records != self.stored:
             self._transfer = None
             self._slots.store(records)
 

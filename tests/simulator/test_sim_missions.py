@@ -384,6 +384,14 @@ def test_a_radius_is_written_in_the_next_loop_which_takes_a_while() -> None:
     assert info(bench).wp_radius_cm == 350
 
 
+def test_writing_a_radius_leaves_an_open_transfer() -> None:
+    bench = Bench()
+    bench.progress(encode_begin(identify(mission(3))))
+    bench.payload(encode_radius(350))
+    bench.run(0.5)
+    assert info(bench).flags == InfoFlag.TRANSFER_OPEN
+
+
 def test_a_radius_that_was_not_yet_written_goes_with_the_power() -> None:
     bench = Bench(SimOptions(config_write_delay_ms=1000))
     bench.payload(encode_radius(350))
