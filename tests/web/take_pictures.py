@@ -7,7 +7,7 @@ from pathlib import Path
 
 from chromium import PHONE, browser
 from plan import plain_plan
-from web_bench import web_bench
+from web_bench import EXAMPLE, web_bench
 
 #: High enough for the whole map.
 _LAPTOP = (1100, 1060)
@@ -25,6 +25,11 @@ def take_pictures(folder: Path) -> None:
             laptop.picture(folder / "status-page.png")
             laptop.run("document.getElementById('upload-title').scrollIntoView()")
             laptop.picture(folder / "sent-and-stored.png")
+            laptop.find("#file").send_keys(str(EXAMPLE))
+            laptop.wait_text("#checked", "14 items")
+            laptop.wait_for_looks(2)
+            laptop.run("document.getElementById('file-title').scrollIntoView()")
+            laptop.picture(folder / "checked-file.png")
         with browser(bench.port, PHONE, dark=True) as phone:
             phone.open()
             phone.wait_for_looks(2)

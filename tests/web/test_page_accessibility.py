@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""axe-core's verdict on the page in each of its states, on a laptop and on a phone, light and dark."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+from chromium import LAPTOP, PHONE, Browser, browser
+from plan import plain_plan
+from programs import until
+from web_bench import EXAMPLE, WebBench
+
+pytest_plugins = ("web_fixtures",)
+
+
+def axe_core() -> str:
+    found = importlib.util.find_spec("axe_playwright_python")
+    assert found is not None
+    assert found.origin is not None
+    return (Path(found.origin).parent / "axe.min.js").read_text()
+
+
+def violations(page: Browser) -> list[str]:
+    page.run(axe_core())
+    run = """
+        const done = arguments[arguments.length - 1];
+        axe.run().then((result) => done(result.violations.flatMap(
+          (found) => found.nodes.map((node) => `${found.id}: ${node.html} ${node.failureSummary}`))));"""
+    found: list[str] = page.driver.execute_async_script(run)
+    return found
+
+
+@pytest.mark.parametrize(("size", "dark"), [(LAPTOP, False), (PHONE, True)])
+def test_axe_finds_nothing_in_any_state(web: WebBench, size: tuple[int, int], *, dark: bool) -> None:
+    assert web.board is not None
+    with browser(web.port, size, dark=dark) as page:
+        page.driver.set_script_timeout(60)
+        page.open()
+        assert violations(page) == []  # without a mission
+        web.daemon.push(plain_plan(9))
+        web.push_example()
+        page.wait_text("#held-text", "13 records")
+        page.find("#file").send_keys(str(EXAMPLE))
+        page.wait_text("#checked", "14 items")
+        page.press("button[aria-label='Show mission 1']")
+        page.wait_text("tr.detail h3", "Mission 1")
+        page.find("#logs input").send_keys("wrong")
+        page.press("#logs button")
+        page.wait_text("#logs", "Wrong token")
+        assert violations(page) == []
+        web.board.set("armed 1")
+        until(lambda: page.text("#badges") == "ARMED", "the armed craft")
+        assert violations(page) == []
+        web.board.set("unplug")
+        page.wait_text("#badges", "LOST")
+        assert violations(page) == []
+        web.daemon.end()
+        page.wait_text("#badges", "NO REPLY")
+        assert violations(page) == []

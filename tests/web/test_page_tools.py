@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The map's zoom and pan, and a telemetry log's way into the browser's downloads."""
+
+from pathlib import Path
+
+from chromium import PHONE, Browser, browser
+from plan import plain_plan
+from programs import until
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+from web_bench import WebBench
+
+from service.web.telemetry_logs import PIECE
+
+pytest_plugins = ("web_fixtures",)
+
+
+def place(page: Browser) -> list[float]:
+    """The middle of waypoint 2, pixels."""
+    script = "const c = document.querySelectorAll('#map .point')[1]; return [c.cx.baseVal.value, c.cy.baseVal.value]"
+    found: list[float] = page.run(script)
+    return found
+
+
+def test_the_map_is_zoomed_and_panned(web: WebBench) -> None:
+    web.daemon.push(plain_plan(9))
+    with browser(web.port) as page:
+        page.open()
+        until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
+        fit, scale = place(page), page.text("#map .scale + text")
+        for _ in range(4):
+            page.press("#map button")
+        zoomed = place(page)
+        assert zoomed != fit
+        assert page.text("#map .scale + text") != scale
+        page.find("#map button").send_keys(Keys.ARROW_RIGHT)
+        panned = place(page)
+        assert (panned[0] < zoomed[0], panned[1]) == (True, zoomed[1])
+        canvas = page.find("#map .map-canvas")
+        ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(50, 30).release().perform()
+        dragged = place(page)
+        assert [round(new - old) for new, old in zip(dragged, panned, strict=True)] == [50, 30]
+        page.wait_for_looks(2)
+        assert place(page) == dragged  # an update does not move it back
+        page.press("#map button:last-child")
+        assert place(page) == fit
+
+
+def test_a_log_is_downloaded(web: WebBench, tmp_path: Path) -> None:
+    folder = web.daemon.state_dir / "logs"
+    folder.mkdir(exist_ok=True)
+    name, contents = "2026-01-02 03-04-05.tlog", bytes(range(256)) * (PIECE // 100)
+    (folder / name).write_bytes(contents)
+    downloads = tmp_path / "downloads"
+    with browser(web.port, PHONE) as page:
+        allow = {"behavior": "allow", "downloadPath": str(downloads)}
+        page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", allow)
+        page.open()
+        page.find("#logs input").send_keys(web.token)
+        page.press("#logs button")
+        page.wait_text("#logs", name)
+        page.press(f"button[aria-label='Download {name}']")
+        until(lambda: (downloads / name).exists() and (downloads / name).read_bytes() == contents, "the log")
+        page.wait_text("#logs", "Downloaded")
+        assert page.run("return document.documentElement.scrollWidth") <= PHONE[0]
+        assert page.complaints() == []
