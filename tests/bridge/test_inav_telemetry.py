@@ -72,7 +72,6 @@ def test_a_mission_that_is_loaded_while_it_is_identified_does_not_hide_it() -> N
     original, counts = board.receive, iter(range(1, 10_000))
 
     def receive(data: bytes, now: float) -> None:
-        board.faults.stick_loads += 1
         mission = board._firmware._mission if board._firmware else None  # type: ignore[attr-defined]
         if mission is not None:
             mission.count = next(counts) % 100
