@@ -6,6 +6,7 @@ metrics. Units are SI, angles are in degrees. None means unknown. A reading keep
 that an old value can be told from a current one; a lost link clears nothing.
 """
 
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import TypeVar
@@ -222,19 +223,28 @@ class Vehicle:
 
     def hear(self, reading: Reading) -> None:
         """Store a reading in place of the previous one of its kind."""
-        was_armed, kind = self.armed, type(reading)
+        kind = type(reading)
+        if kind is Power:
+            reading = self._estimated(reading)
+        before = self._readings.get(kind)
         self._readings[kind] = reading
         self._news.add(kind)
-        self.heard_at = max(reading.heard_at, self.heard_at or reading.heard_at)
-        if isinstance(reading, Power) and reading.voltage_v is not None and reading.cells is None:
-            # Never fewer than before: a battery that runs down is not one of fewer cells.
-            self._cells = max(self._cells, least_cells(reading.voltage_v))
-            percent = reading.remaining_percent
-            if percent is None:
-                percent = remaining_percent(reading.voltage_v, self._cells)
-            self._readings[kind] = replace(reading, cells=self._cells, remaining_percent=percent)
-        if kind in _PLACES_HOME:
-            self._place_home(has_armed=was_armed is False and self.armed is True)
+        if self.heard_at is None or reading.heard_at > self.heard_at:
+            self.heard_at = reading.heard_at
+        if isinstance(reading, FlightState):
+            was_armed = before.armed if isinstance(before, FlightState) else None
+            self._place_home(has_armed=was_armed is False and reading.armed is True)
+        elif kind is GlobalPosition or kind is Height:
+            self._place_home(has_armed=False)
+
+    def _estimated(self, reading: Reading) -> Reading:
+        """What is left of a battery, where the flight controller does not say."""
+        assert isinstance(reading, Power)
+        if reading.voltage_v is None or reading.remaining_percent is not None:
+            return reading
+        # Never fewer than before: a battery that runs down is not one of fewer cells.
+        self._cells = max(self._cells, reading.cells or least_cells(reading.voltage_v))
+        return replace(reading, cells=self._cells, remaining_percent=remaining_percent(reading.voltage_v, self._cells))
 
     def hear_home(self, lat_e7: int, lon_e7: int) -> None:
         """Take the flight controller's own home, degrees * 1e7. It has none while these are 0."""
@@ -254,12 +264,11 @@ class Vehicle:
         reading = self.last(kind)
         return reading if reading is not None and now <= reading.heard_at + stale_s else None
 
-    def take_news(self) -> frozenset[type[Reading]]:
+    def take_news(self) -> Set[type[Reading]]:
         """The kinds of readings heard since the last call."""
         if not self._news:
             return _NO_NEWS
-        news = frozenset(self._news)
-        self._news.clear()
+        news, self._news = self._news, set()
         return news
 
     def home_or_position(self) -> Home | None:
@@ -290,5 +299,4 @@ class Vehicle:
                 self.home = replace(self.home, altitude_m=position.altitude_m - height.height_m)
 
 
-_PLACES_HOME = frozenset((FlightState, GlobalPosition, Height))
 _NO_NEWS: frozenset[type[Reading]] = frozenset()

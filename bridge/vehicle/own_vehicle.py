@@ -62,6 +62,8 @@ class OwnVehicle:
         self._unix_time_s = unix_time_s
         self._started_at = self._now = now
         self._tick_due = now
+        #: Messages that any ground station wants, by the reading that they follow.
+        self._rows: dict[type[Reading], list[Row]] = {}
         self._rates = MessageRates(_DEFAULTS)
         self._progress = MissionProgress()
         #: Messages that follow no reading.
@@ -85,6 +87,7 @@ class OwnVehicle:
         self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
         self._ground.greet(peer, self._make_heartbeat())
+        self._set_polls(self._ground.everyone())
 
     def tick(self, now: float) -> None:
         """Send what is due by time."""
@@ -105,7 +108,7 @@ class OwnVehicle:
                 self._ground.multicast(pack(message), peers)
         if self._is_lost():
             # No reading triggers it now.
-            self._send(_SYS_STATUS, self._moment(), everyone)
+            self._send(_SYS_STATUS, self._moment(), self._rates.take_due(_SYS_STATUS.msgid, everyone, now))
         self._announce_home()
 
     def next_deadline(self) -> float:
@@ -123,10 +126,13 @@ class OwnVehicle:
         """The vehicle has new readings: send the messages that they are for, where due."""
         self._now = now
         everyone = self._ground.everyone()
-        at = self._moment()
-        for row in TELEMETRY:
-            if row.reading in news:
-                self._send(row, at, everyone)
+        at: Moment | None = None
+        for reading in news:
+            for row in self._rows.get(reading, ()):
+                peers = self._rates.take_due(row.msgid, everyone, now)
+                if peers:
+                    at = at or self._moment()
+                    self._send(row, at, peers)
         if MissionLeg in news:
             self._follow_mission()
         if Readiness in news:
@@ -134,13 +140,11 @@ class OwnVehicle:
         if FlightState in news and self._announced != self._shown_state():
             self._heartbeat()
 
-    def _send(self, row: Row, at: Moment, everyone: Sequence[Peer]) -> None:
-        peers = self._rates.take_due(row.msgid, everyone, at.now)
-        if peers:
-            for make in row.makers:
-                message = make(at)
-                if message is not None:
-                    self._ground.multicast(pack(message), peers)
+    def _send(self, row: Row, at: Moment, peers: Sequence[Peer]) -> None:
+        for make in row.makers:
+            message = make(at)
+            if message is not None:
+                self._ground.multicast(pack(message), peers)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
         """Poll for others than ground stations, too: seconds by reading."""
@@ -195,8 +199,12 @@ class OwnVehicle:
         wanted: dict[Msp, float] = {}
         for reading, interval_s in self._also_wanted.items():
             _want(wanted, reading, interval_s)
+        self._rows = {}
         for row in TELEMETRY:
-            _want(wanted, row.reading, self._rates.fastest_s(row.msgid, everyone))
+            interval_s = self._rates.fastest_s(row.msgid, everyone)
+            if interval_s < inf:
+                self._rows.setdefault(row.reading, []).append(row)
+            _want(wanted, row.reading, interval_s)
         self._session.polls.want(wanted)
 
     def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:

@@ -91,6 +91,7 @@ _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_U8 = 0xFF
 _RAW_CHANNELS, _CHANNELS = 8, 18
 _MAX_RSSI = 254
+_UNKNOWN_RATES = (math.nan, math.nan, math.nan)
 #: An armed craft that is higher or faster than this is in the air.
 _FLYING_M, _FLYING_M_S = 1.0, 0.5
 _THROTTLE = 2
@@ -174,7 +175,7 @@ def attitude(at: Moment) -> Message | None:
     now = at.fresh(Orientation)
     if now is None:
         return None
-    roll_rate, pitch_rate, yaw_rate = map(math.radians, now.rates_deg_s or (math.nan,) * 3)
+    roll_rate, pitch_rate, yaw_rate = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
     return messages.MAVLink_attitude_message(
         at.boot_ms,
         math.radians(now.roll_deg),
@@ -351,7 +352,7 @@ def attitude_quaternion(at: Moment) -> Message | None:
         return None
     halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
     (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
-    rates = map(math.radians, now.rates_deg_s or (math.nan,) * 3)
+    rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
     return messages.MAVLink_attitude_quaternion_message(
         at.boot_ms,
         cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
