@@ -48,13 +48,16 @@ async def test_what_a_daemon_counts(tmp_path: Path) -> None:
         with udp_station((link.host, link.port)) as station:
             station.say_hello()
             station.wait_for("HEARTBEAT")
-            return [station.upload(plain_plan(count)) for count in (12, 1)]
+            return [station.upload(plain_plan(count)) for count in (12, 1, 147)]
 
-    assert await asyncio.to_thread(write) == [MissionResult.ACCEPTED, MissionResult.INVALID]
+    # A home point alone is read and rejected; 147 items are refused at their count.
+    assert await asyncio.to_thread(write) == [MissionResult.ACCEPTED, MissionResult.INVALID, MissionResult.NO_SPACE]
     after = read(metrics)
     assert after["fc_state", ("MSP",)] == 1
     assert after["missions_total", ("ACCEPTED",)] == 1
     assert after["mission_transfer_seconds_count", ("ACCEPTED",)] == 1
+    assert after["missions_total", ("INVALID",)] == 1
+    assert after["events_total", ("mission.upload_ended", "warning")] == 1
     assert after["events_total", ("mission.refused", "warning")] == 1
     assert after["mission_records", ()] == 12
     assert after["ground_stations", ()] == 1
@@ -68,7 +71,7 @@ async def test_what_a_daemon_counts(tmp_path: Path) -> None:
     assert answered == after["fc_round_trip_seconds_count", ()] >= 12
     assert answered >= after["fc_round_trip_seconds_bucket", ("0.1",)]
     assert 0 <= after["fc_round_trip_seconds_sum", ()] < answered
-    # Twelve items, the count twice, and the greeting.
+    # Twelve items, three counts, and the greeting.
     assert after["link_received_pieces_total", (str(link),)] >= 15
     for way in ("received", "sent"):
         for name in ("fc", str(link)):
