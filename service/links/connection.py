@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Connection strings, as users of pymavlink, MAVProxy, MAVSDK and mavp2p know them."""
+"""Connection strings, in the forms of pymavlink, MAVProxy, MAVSDK and mavp2p."""
 
 import re
 import socket
@@ -14,7 +14,7 @@ class AddressError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class SerialFc:
-    """A flight controller on a serial port. `baud` None: the speed is sensed."""
+    """A flight controller on a serial port. `baud` None: detect the speed."""
 
     path: str
     baud: int | None
@@ -25,7 +25,7 @@ class SerialFc:
 
 @dataclass(frozen=True, slots=True)
 class AutoFc:
-    """A flight controller on whichever serial port it is found."""
+    """A flight controller on any serial port."""
 
     def __str__(self) -> str:
         return "auto"
@@ -55,7 +55,7 @@ FcAddress = AutoFc | SerialFc | TcpFc | SimulatedFc
 
 @dataclass(frozen=True, slots=True)
 class GcsAddress:
-    """Where ground stations are. `kind`: udpin, udpout, udpbcast or tcpin."""
+    """A link to ground stations. `kind`: udpin, udpout, udpbcast or tcpin."""
 
     kind: str
     host: str
@@ -67,7 +67,7 @@ class GcsAddress:
 
 
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
-#: Other programs' words for the same: mavp2p's, and pymavlink's for broadcast.
+#: Other programs' names for the same: mavp2p's, and pymavlink's for broadcast.
 _GCS_ALIASES = {
     "udps": "udpin",
     "udpc": "udpout",
@@ -85,7 +85,7 @@ _NEXT_LINK = re.compile(r",\s*(?=[A-Za-z]+:)")
 
 
 def parse_fc(text: str) -> FcAddress:
-    """Read the --fc string; AddressError if it makes no sense."""
+    """Read the --fc string; AddressError if it is not valid."""
     kind, colon, rest = text.strip().partition(":")
     match kind.lower():
         case "auto" if not rest:
@@ -124,13 +124,13 @@ def split_gcs(text: str) -> list[str]:
 
 
 def parse_gcs(text: str) -> GcsAddress:
-    """Read one --gcs string; AddressError if it makes no sense, or could mean two things."""
+    """Read one --gcs string; AddressError if it is not valid, or ambiguous."""
     word, colon, rest = text.strip().partition(":")
     kind = _GCS_ALIASES.get(word.lower(), word.lower())
     rest = rest.removeprefix("//")
     host, _, port = rest.replace(",", ":").rpartition(":")
     if colon and kind in ("udp", "tcp"):
-        # pymavlink listens at udp:, MAVSDK listens or sends, and everybody's tcp: connects, as we do not.
+        # pymavlink listens at udp:, MAVSDK listens or sends; in both, tcp: connects, which the bridge does not.
         if host not in _EVERY_ADDRESS:
             port = port if port.isdecimal() else "14550"
             sending = f"udpout:{host}:{port} to send there, " if kind == "udp" else ""
@@ -144,7 +144,7 @@ def parse_gcs(text: str) -> GcsAddress:
 
 
 def family_of(host: str) -> socket.AddressFamily:
-    """Return IPv6 for such an address; a name stands for an IPv4 address."""
+    """AF_INET6 for an IPv6 address; a name means an IPv4 address."""
     return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 

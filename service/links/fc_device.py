@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opens what a flight controller hangs on: a serial port, a TCP connection, or the simulated Naze."""
+"""Opens the connection to a flight controller: a serial port, a TCP connection, or the simulated Naze."""
 
 import asyncio
 import contextlib
@@ -18,13 +18,13 @@ _TCP_PATIENCE_S = 3.0
 
 
 class Device(Protocol):
-    """What is open: a non-blocking file descriptor."""
+    """An open device: a non-blocking file descriptor."""
 
     def fileno(self) -> int:
-        """Return the descriptor."""
+        """The descriptor."""
 
     def close(self) -> None:
-        """Close it."""
+        """Close the descriptor."""
 
 
 class PortError(Exception):
@@ -32,7 +32,7 @@ class PortError(Exception):
 
 
 def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
-    """Return what opens the device, and opens it again after it was lost. For AutoFc see PortFinder."""
+    """A function that opens the device, also again after a loss. For AutoFc see PortFinder."""
     assert not isinstance(address, AutoFc)
     if isinstance(address, SerialFc):
         path = address.path
@@ -43,18 +43,18 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
         return open_path
     if isinstance(address, TcpFc):
         return lambda: _open_tcp(address.host, address.port)
-    # Only here, because a daemon on a real flight controller need not carry a simulated one in its memory.
+    # Imported only here: a daemon on a real flight controller does not need a simulator in memory.
     from simulator.naze import SimulatedNaze
     from simulator.pipe_link import SimLink
 
-    # One board for all openings: its list outlives a lost port, as the real one's does.
+    # One board for all openings: its mission survives a lost port, as a real board's does.
     return SimLink(SimulatedNaze(), asyncio.get_running_loop()).start
 
 
 def acknowledge(device: Device) -> None:
-    """Let a TCP connection acknowledge what was read at once, not 40 ms later.
+    """Let a TCP connection acknowledge received bytes at once, not 40 ms later.
 
-    INAV 6.1's simulator and cheap serial adapters send a reply byte by byte, and after the first one wait for this.
+    INAV 6.1's simulator and cheap serial adapters send replies byte by byte, and wait for this after the first one.
     """
     if isinstance(device, socket.socket) and device.family != socket.AF_UNIX:
         with contextlib.suppress(OSError):
@@ -62,7 +62,7 @@ def acknowledge(device: Device) -> None:
 
 
 def open_serial(path: str) -> serial.Serial:
-    """Open a serial port for us alone; PortError if that is impossible."""
+    """Open a serial port for exclusive use; PortError if that fails."""
     console = find_console(path)
     if console is not None:
         raise PortError(
@@ -70,8 +70,8 @@ def open_serial(path: str) -> serial.Serial:
             " and take console=... for it out of cmdline.txt"
         )
     try:
-        # VMIN 1, for which pyserial's word is inter_byte_timeout: with 0 a read that finds nothing returns as if the
-        # other end had hung up.
+        # VMIN 1, which pyserial calls inter_byte_timeout: with 0 an empty read returns as if the other end had closed
+        # the line.
         port = serial.Serial(path, 115200, timeout=0, write_timeout=0, inter_byte_timeout=0, exclusive=True)
     except (serial.SerialException, OSError) as error:
         raise PortError(explain_port_error(path, error)) from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller's port: opened, read, written, and opened again whenever it comes back."""
+"""The flight controller's port: opened, read, written, and reopened whenever it comes back."""
 
 import asyncio
 import os
@@ -11,15 +11,15 @@ import structlog
 
 from service.links.fc_device import Device, PortError, acknowledge
 
-#: What `on_close` is told when the port is closed because it is needed no more.
+#: The reason given to `on_close` at the end of the daemon.
 STOPPED = "the daemon stops"
 MOVED_ON = "the flight controller is looked for on another port"
 
 _READ_SIZE = 4096
 _RETRY_S = 0.25
-#: What the port does not take in time is dropped beyond this: ground stations can send faster than a UART.
+#: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
-#: Above so many wake-ups a second their price is worth a delay of this long. A timer is rounded up to whole ms.
+#: Above this rate, wake-ups cost more than this delay is worth. Timers are rounded up to whole ms.
 _GATHER_ABOVE_HZ = 1000
 _GATHER_S = 0.0019
 _RATE_WINDOW_S = 0.1
@@ -28,11 +28,11 @@ _log = structlog.get_logger()
 
 
 class FcPort:
-    """Keeps the port open. `open_device` raises PortError if that is impossible now.
+    """Keeps the port open. `open_device` raises PortError if it cannot be opened now.
 
     `on_open`, `on_data` and `on_close` are called from the event loop.
 
-    The first failure to open is a warning, the same one again is not told twice.
+    The first failure to open is logged as a warning; a repetition is not logged again.
     """
 
     def __init__(
@@ -51,10 +51,10 @@ class FcPort:
         self._speed: int | None = None
         self._unsent = bytearray()
         self._closed = asyncio.Event()
-        #: Why it cannot be opened; empty if it could be.
+        #: Why the port cannot be opened; empty if it could be.
         self.trouble = ""
         self.dropped_bytes = 0
-        #: Reading may be put off by a few ms at high rates, because nobody waits for an answer.
+        #: Reads may be delayed by a few ms at high rates, because no reply is pending.
         self.may_gather = False
         self._gathering: asyncio.TimerHandle | None = None
         self._window_ends = 0.0
@@ -62,7 +62,7 @@ class FcPort:
         self._gathered_rate = 0.0
 
     async def run(self) -> None:
-        """Open the port and open it again for ever; cancel to end."""
+        """Open the port, and reopen it for ever; cancel to end."""
         try:
             while True:
                 try:
@@ -80,11 +80,11 @@ class FcPort:
             self._shut(STOPPED)
 
     def move_on(self) -> None:
-        """Close the port. It is opened again at once, and `open_device` may take another one."""
+        """Close the port. It is reopened at once, and `open_device` may choose another one."""
         self._shut(MOVED_ON)
 
     def set_speed(self, baud: int | None) -> None:
-        """Run the port at another speed, baud. What still waits is dropped: at this one it would be other bytes."""
+        """Change the speed, baud. Unsent bytes are dropped: at the new speed they would be misread."""
         if baud is None or baud == self._speed or not isinstance(self._device, serial.Serial):
             return
         self._speed = baud
@@ -96,7 +96,7 @@ class FcPort:
             self._shut(str(error))
 
     def write(self, data: bytes) -> None:
-        """Write without ever waiting; what does not fit now goes out when the port takes it."""
+        """Write without waiting; the rest is sent when the port takes it."""
         if self._device is None:
             return
         if self._unsent:
@@ -144,7 +144,7 @@ class FcPort:
                 self._begin_window(now)
 
     def _gather(self) -> None:
-        """Read what came since the last time, until it is not much any more."""
+        """Read the bytes of one delay, until the rate drops."""
         data = self._read()
         if self._device is None:
             return

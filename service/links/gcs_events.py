@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a link to ground stations tells the daemon."""
+"""Events from a link to ground stations."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -8,19 +8,19 @@ from bridge.gcs.station import Peer
 
 
 class GcsEvents(Protocol):
-    """What a link tells the daemon."""
+    """The receiver of a link's events: the daemon."""
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        """Bytes came; a datagram holds whole frames."""
+        """Bytes arrived; a datagram holds whole frames."""
 
     def gcs_gone(self, peer: Peer) -> None:
         """A connection was closed."""
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """Which of a full link's connections makes room. `peers`: when each last spoke, oldest first."""
+        """The connection of a full link to close. `peers`: when each was last heard, oldest first."""
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        """`peer` is spoken to before it was heard; or only as long as nobody on its link was heard."""
+        """Send to `peer` before it is heard; with `until_answered` only until any peer of its link is."""
 
     def remove_default_peer(self, peer: Peer) -> None:
-        """It is not any more."""
+        """Stop sending to an unheard peer."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Links to ground stations, made from their addresses. None of them ever waits for a slow peer."""
+"""Links to ground stations, made from their addresses. None of them waits for a slow peer."""
 
 import errno
 from typing import Protocol
@@ -27,14 +27,14 @@ class GcsLink(Protocol):
     name: str
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send without waiting; drop what cannot go."""
+        """Send without waiting; drop what the socket does not take."""
 
     def close(self) -> None:
-        """Close its sockets."""
+        """Close the sockets."""
 
 
 def open_link(address: GcsAddress, events: GcsEvents) -> GcsLink:
-    """Set a link up; LinkError says why that is impossible."""
+    """Open a link; LinkError gives the reason if that fails."""
     try:
         if address.kind == "tcpin":
             return TcpLink(address, events)

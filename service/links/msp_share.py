@@ -19,22 +19,22 @@ _MAX_CLIENTS = 8
 
 
 class Requested(Protocol):
-    """Takes a request and what its reply is given to."""
+    """Takes a request, and a callback for its reply."""
 
     def __call__(self, frame: MspFrame, answer: Callable[[MspFrame], None], *, may_write: bool) -> None:
-        """Carry it, or answer that it is refused."""
+        """Forward the request, or answer with a refusal."""
 
 
 class Share(Protocol):
     """An open port."""
 
     def close(self) -> None:
-        """Close it, and its clients."""
+        """Close the port and its clients."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShareSettings:
-    """Where it listens, tcpin or udpin; `write`: whether requests that change something are carried."""
+    """The address, tcpin or udpin; `write`: True if requests that change something are forwarded."""
 
     address: GcsAddress
     write: bool = False
@@ -56,7 +56,7 @@ def parse_share(entry: object, _folder: Path) -> ShareSettings:
 
 
 async def open_share(settings: ShareSettings, requested: Requested) -> Share:
-    """Listen; LinkError if that is impossible."""
+    """Listen; LinkError if that fails."""
     loop = asyncio.get_running_loop()
     address = settings.address
     where = (address.host, address.port)
@@ -140,7 +140,7 @@ class _UdpShare(asyncio.DatagramProtocol):
             if self._transport is not None:
                 self._transport.sendto(frame.encode(), addr)
 
-        # Whole requests only: a datagram may be lost, and the rest of a cut one never comes.
+        # Whole requests only: the rest of a cut one may have been lost.
         for frame in MspParser(takes_low_v2=True).feed(data):
             if frame.direction is Direction.REQUEST:
                 self._requested(frame, answer, may_write=self._may_write)

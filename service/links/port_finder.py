@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fc = "auto"`: opens one serial port after the other, until a flight controller has been found on one.
+"""`fc = "auto"`: opens serial ports in turn until a flight controller is found.
 
-Only the port on which the flight controller was last, or one that was listened to first, is handed on to be asked. A
-port that another program uses is not opened, one that has shown itself as a GPS receiver's or radio's not again.
+The flight controller's last port is probed at once; any other is first listened to. A port that another program uses is
+not opened, and one that turned out to be a GPS receiver or a radio is not opened again.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ from service.mission_data import Json
 
 #: Autosense visits all speeds within this time.
 _SEARCH_S = 9.0
-#: A flight controller that was here is waited for: a Harakiri that looks for its GPS boots for 25 s.
+#: How long to wait for a lost flight controller: a Harakiri that looks for its GPS boots for 25 s.
 _RETURN_S = 40.0
 _RETRY_S = 1.0
 _READ_SIZE = 4096
@@ -37,7 +37,7 @@ _log = structlog.get_logger()
 
 
 class PortFinder:
-    """Hands out ports (`open`), is told what comes of them as a follower of the daemon, and moves on if nothing does.
+    """Opens ports (`open`), follows the daemon's events, and moves on if no flight controller is found.
 
     `move_on()` must close the present port, so that `open` is called again.
     """
@@ -50,17 +50,17 @@ class PortFinder:
         self._tried: set[str] = set()
         self._watch: OtherDeviceWatch | None = None
         self._timer: asyncio.TimerHandle | None = None
-        #: Why a port was passed over, by its path.
+        #: Why each port was skipped, by its path.
         self._passed: dict[str, str] = {}
         self.move_on: Callable[[], None] = lambda: None
 
     @property
     def where(self) -> str:
-        """The port that is open, or what is looked for."""
+        """The open port, or the kind of device searched for."""
         return "the serial ports" if self._present is None else self._present.path
 
     async def open(self) -> serial.Serial:
-        """Open the next port on which there may be a flight controller; PortError if there is none now."""
+        """Open the next port that may have a flight controller; PortError if there is none now."""
         self._leave()
         for port in self._in_turn():
             self._tried.add(port.key)
@@ -77,7 +77,7 @@ class PortFinder:
         raise PortError("there is no serial port: plug the flight controller in, or switch the UART on the header on")
 
     def received(self, data: bytes) -> None:
-        """Look at what comes while it is not known yet who is there: a GPS receiver may have been switched on."""
+        """Examine bytes while the port is unidentified: a GPS receiver may just have been switched on."""
         if self._watch is not None:
             self._watch.feed(data)
             if self._watch.what and self._present is not None:
@@ -85,13 +85,13 @@ class PortFinder:
                 self.move_on()
 
     def close(self) -> None:
-        """End."""
+        """Stop all timers."""
         self._leave()
 
-    # What a follower of the daemon is told (service.daemon.Follower).
+    # The methods of service.daemon.Follower.
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        """Remember the port once a flight controller is found, and wait for one that is lost to come back."""
+        """Remember the port of a flight controller that was found; wait for a lost one to come back."""
         if self._present is None:
             return
         if event == "fc.found":
@@ -104,13 +104,13 @@ class PortFinder:
             self._wait(_RETURN_S)
 
     def telemetry(self, groups: frozenset[Group]) -> None:
-        """Nothing is done about it."""
+        """Not used."""
 
     def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
-        """Nothing is done about it."""
+        """Not used."""
 
     def status(self) -> Json:
-        """The port in use, and those that were passed over, with the reasons."""
+        """The port in use, and the skipped ones with the reasons."""
         return {
             "port": None if self._present is None else self._present.path,
             "ports_passed_over": self._reasons(),
@@ -124,7 +124,7 @@ class PortFinder:
         return "" if self._present is None else self._present.path
 
     def _in_turn(self) -> list[SerialPort]:
-        """The ports not tried in this round; the flight controller's last one comes first."""
+        """The ports not tried in this round, the flight controller's last one first."""
         ports = serial_ports(self._host)
         there = {port.path for port in ports}
         self._passed = {path: why for path, why in self._passed.items() if path in there}
@@ -164,7 +164,7 @@ class PortFinder:
                 device.close()
 
     async def _listen(self, device: serial.Serial) -> str:
-        """What shows itself on the port as no flight controller; empty if nothing does. Nothing is sent."""
+        """The other device that shows itself on the port; empty if none does. Sends nothing."""
         listener = PortListener(self._loop.time())
         readable = asyncio.Event()
         self._loop.add_reader(device.fileno(), readable.set)

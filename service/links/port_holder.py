@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Says why a serial port cannot be used: missing, not permitted, busy (by whom), or a login console."""
+"""Explains why a serial port cannot be used: missing, no permission, in use (by which program), or a login console."""
 
 import errno
 import os
@@ -17,7 +17,7 @@ def explain_port_error(path: str, error: OSError) -> str:
     code = error.errno
     cause = error.__cause__ or error.__context__
     if code is None and isinstance(cause, OSError | termios.error):
-        # pyserial keeps the number to itself; termios.error has one, too, but is no OSError.
+        # pyserial hides the number; termios.error has one, too, but is no OSError.
         code = cause.args[0]
     if not Path(path).exists():
         return f"{path} is missing: plug the flight controller in, or name another port with --fc"
@@ -32,12 +32,12 @@ def explain_port_error(path: str, error: OSError) -> str:
 
 
 def find_console(path: str) -> str | None:
-    """Return the name of the terminal if a login console sits on the port, else None.
+    """The name of the terminal if a login console runs on the port, else None.
 
-    A getty takes no lock: both could open the port, and each would eat half of what the other is sent.
+    A getty takes no lock: both could open the port, and each would lose half of the input.
     """
     if not Path(path).exists():
-        # It is looked for four times a second: no search through all processes for that.
+        # Called four times a second: too often for a search through all processes.
         return None
     terminal = Path(path).resolve().name
     for process in _processes():
@@ -52,7 +52,7 @@ def find_console(path: str) -> str | None:
 
 
 def find_holder(path: str) -> str | None:
-    """Return "NAME (pid N)" of another process that has the port open, as far as we may see it."""
+    """The process that has the port open, as "NAME (pid N)"; None if none is visible."""
     try:
         target = os.stat(path)
     except OSError:
@@ -62,7 +62,7 @@ def find_holder(path: str) -> str | None:
             continue
         try:
             for descriptor in (process / "fd").iterdir():
-                # By the device: a process in a container may have another one of the same name.
+                # By device number: in a container the device may have another name.
                 if os.path.samestat(descriptor.stat(), target):
                     return f"{(process / 'comm').read_text().strip()} (pid {process.name})"
         except OSError:
@@ -71,9 +71,9 @@ def find_holder(path: str) -> str | None:
 
 
 def find_user(host: Host, path: str) -> str | None:
-    """Name another program that has the port open, or was started with its name; None if there seems to be none.
+    """The name of another program that has the port open, or was started with its name; None if none is found.
 
-    A service may not see what root's programs have open, but their command lines: `gpsd /dev/ttyUSB0`.
+    A service cannot see the open files of root's programs, but it sees their command lines: `gpsd /dev/ttyUSB0`.
     """
     links = [name for name in host.names("/dev") if str(host.resolve(f"/dev/{name}")) == path]
     names = "|".join(re.escape(name) for name in {Path(path).name, *links})

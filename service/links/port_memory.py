@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was found on which serial port, kept in the state directory: the flight controller, and what is none."""
+"""What each serial port was found to be, kept in the state directory: the flight controller, or another device."""
 
 import asyncio
 import json
@@ -17,26 +17,26 @@ _log = structlog.get_logger()
 
 
 class PortMemory:
-    """Ports by their key (see SerialPort). Without a `folder` it lasts as long as the program."""
+    """Ports by their key (see SerialPort). Without a `folder` they are remembered until the program ends."""
 
     def __init__(self, folder: Path | None) -> None:
         self._file = None if folder is None else folder / PORTS_FILE
-        #: Where the flight controller was last; empty at first.
+        #: The last port of the flight controller; empty at first.
         self.flight_controller = ""
-        #: Ports that are left alone, and what showed itself there.
+        #: Ports to skip, and the device found on each.
         self.others: dict[str, str] = {}
         self._saving: set[asyncio.Task[None]] = set()
         self._load()
 
     def found_flight_controller(self, key: str) -> None:
-        """Remember where it is."""
+        """Remember the flight controller's port."""
         if key != self.flight_controller:
             self.flight_controller = key
             self.others.pop(key, None)
             self._save()
 
     def found_other(self, key: str, what: str) -> None:
-        """Remember that something else is there."""
+        """Remember a port with another device."""
         if self.others.get(key) != what:
             self.others[key] = what
             if self.flight_controller == key:
@@ -66,6 +66,6 @@ class PortMemory:
 
 
 def _write(file: Path, data: bytes) -> None:
-    # Without it the ports are searched again after the next start.
+    # Without the file the ports are searched again after the next start.
     with suppress(OSError):
         replace_file(file, data)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a TCP client has not read yet: whole frames, and the oldest telemetry gives way first."""
+"""Frames that a TCP client has not read yet; if they are too many, the oldest telemetry is dropped first."""
 
 from collections import deque
 
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 
-#: Nobody sends these again unasked: a transfer, a command or a parameter would fail without them. Not files and logs:
-#: they fill the queue in a blink, and who downloads one asks again for what is missing.
+#: Never dropped, because no peer repeats them unasked: a transfer, command or parameter would fail. Files and logs are
+#: not among them: they fill the queue at once, and their reader asks again for missing parts.
 _KEPT = frozenset(
     {
         m.MAVLINK_MSG_ID_PARAM_VALUE,
@@ -35,7 +35,7 @@ _KEPT = frozenset(
 
 
 class SendQueue:
-    """At most `limit` bytes. A frame of which some was sent stays whole."""
+    """At most `limit` bytes. A partly sent frame stays whole."""
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
@@ -49,7 +49,7 @@ class SendQueue:
         return bool(self._chunks)
 
     def add(self, chunk: bytes) -> bool:
-        """Put whole frames at the end; False if there is no room left but by losing what must not be lost."""
+        """Append whole frames; False if they fit only by dropping some that must be kept."""
         kept = any(frame.msgid in _KEPT for frame in MavlinkSplitter().feed(chunk))
         self._chunks.append((chunk, kept))
         self._size += len(chunk)
@@ -59,11 +59,11 @@ class SendQueue:
         return self._size <= self._limit
 
     def first(self) -> memoryview:
-        """Return what is to be sent next."""
+        """The next unsent bytes."""
         return memoryview(self._chunks[0][0])[self._sent :]
 
     def sent(self, size: int) -> None:
-        """Take note that so much of `first` is on its way."""
+        """Remove the first `size` bytes, which were sent."""
         chunk, kept = self._chunks[0]
         self._sent += size
         if self._sent == len(chunk):
@@ -72,7 +72,7 @@ class SendQueue:
             self._forget(chunk, kept)
 
     def _drop_telemetry(self) -> None:
-        """Drop the older half of the telemetry: one by one would cost a search for each frame that comes."""
+        """Drop the older half of the telemetry: one at a time would cost a search for each new frame."""
         began = [self._chunks.popleft()] if self._sent else []
         kept_size = self._size - self._telemetry_size
         spared = min(self._telemetry_size // 2, self._limit - kept_size)

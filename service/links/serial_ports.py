@@ -25,7 +25,7 @@ OTHER_PRODUCTS = ("gps", "gnss", "u-blox", "radio", "telemetry", "sik")
 
 @dataclass(frozen=True, slots=True)
 class SerialPort:
-    """`path`: its device; `key`: what it is remembered by, the socket it is in and the chip behind it."""
+    """`path`: the device; `key`: its identity, made of the USB socket and the chip."""
 
     path: str
     key: str
@@ -33,7 +33,7 @@ class SerialPort:
 
 
 def serial_ports(host: Host) -> list[SerialPort]:
-    """The candidates that are there, in the order in which they are tried: header first, then USB."""
+    """The candidates present, in the order in which they are tried: header first, then USB."""
     found = []
     model = pi_model(host)
     header = model.header_uart if model else "/dev/serial0"
@@ -47,7 +47,7 @@ def serial_ports(host: Host) -> list[SerialPort]:
 
 def _usb_port(host: Host, name: str) -> SerialPort | None:
     device = host.path(f"/sys/class/tty/{name}/device").resolve()
-    # From the interface up to the USB device, two or three folders on.
+    # From the interface up to the USB device: two or three folders.
     for folder in (device, *device.parents[:3]):
         if (folder / "idVendor").exists():
             break

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The keys of a daemon's links, and their timestamps, which outlive it.
+"""The keys of a daemon's links, and their signing timestamps, which survive a restart.
 
-A Pi has no clock that runs without power: after a reboot it may believe that it is yesterday. Signatures would begin
-anew with timestamps that were used before, and recorded ones would be taken for new. So the last timestamp is kept in
-a file, 10 s ahead of the truth, so that it is seldom written; at the end it is written as it is. After a power cut what
-was heard since the last write is unknown, but it was signed before the file's time: until then nothing is taken.
+A Pi has no battery-backed clock: after a reboot its time may be a day behind. New signatures would then reuse old
+timestamps, and recorded ones would be accepted. So the last timestamp is kept in a file. To write it seldom, the file
+runs 10 s ahead; a clean stop writes the true value. After a power cut the timestamps heard since the last write are
+unknown, but all are below the file's: until that time is reached, nothing is accepted.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ from service.settings import Settings
 from storage.atomic_file import replace_file
 
 FILE_NAME = "signing.json"
-#: The file's lead over the truth, and so how long after a power cut signatures are refused. Shorter costs SD card life.
+#: The file's lead, and so how long after a power cut signatures are refused. A shorter one wears out the SD card.
 _AHEAD = 10 * TICKS_PER_S
 _LOOK_S = 1.0
 _CLOSE_TIMEOUT_S = 1.0
@@ -32,7 +32,7 @@ _log = structlog.get_logger()
 
 
 class SigningState:
-    """Makes the `links` that a bridge is to guard. Nothing is kept without a `state_dir`, or without any key."""
+    """Makes the `links` that a bridge guards. Nothing is kept without a `state_dir`, or without any key."""
 
     def __init__(self, settings: Settings, clock: Callable[[], float] = time.time) -> None:
         self._path = None if settings.state_dir is None else settings.state_dir / FILE_NAME
@@ -68,21 +68,21 @@ class SigningState:
             self._look(asyncio.get_running_loop(), self._path)
 
     def close(self) -> None:
-        """Write the timestamp as it is."""
+        """Write the true timestamp."""
         if self._timer is not None and self._path is not None:
             self._timer.cancel()
             self._thread.submit(partial(_save, self._path, self._state(self._timestamps.now(), is_end=True)))
         self._thread.close(_CLOSE_TIMEOUT_S)
 
     def _look(self, loop: asyncio.AbstractEventLoop, path: Path) -> None:
-        """Write when what is stored was reached: by time, or because somebody's clock is far ahead of ours."""
+        """Write once the stored time is reached, by our clock or by a peer's that is far ahead."""
         if self._timestamps.last >= self._stored:
             self._stored = self._timestamps.now() + _AHEAD
             self._thread.submit(partial(_save, path, self._state(self._stored, is_end=False)))
         self._timer = loop.call_later(_LOOK_S, self._look, loop, path)
 
     def _state(self, timestamp: int, *, is_end: bool) -> bytes:
-        """Put down what the next run must know. Streams that it would find too late anyway are left out."""
+        """The contents for the next run. Streams that it would reject as too old anyway are left out."""
         late = timestamp - TOLERANCE
         streams = {
             name: [[*stream, last] for stream, last in signing.streams.items() if last >= late]

@@ -14,14 +14,14 @@ from service.links.gcs_events import GcsEvents
 from service.links.send_queue import SendQueue
 
 _READ_SIZE = 2048
-#: What a stalled client may leave unread; then telemetry for it is dropped, the oldest first.
+#: The unread bytes of a stalled client, above which telemetry for it is dropped, oldest first.
 _MAX_UNSENT = 65536
 _KERNEL_BUFFER = 32768
-#: One that has taken nothing for so long is not there any more, though its Wi-Fi could not say so.
+#: A client that reads nothing for this long is gone, though its Wi-Fi could not report it.
 _STALL_MS = 60000
 #: Each costs a copy of the telemetry.
 _MAX_CLIENTS = 32
-#: When the process has no file descriptor left for another client.
+#: The pause after the process has run out of file descriptors.
 _REST_S = 1.0
 
 _log = structlog.get_logger()
@@ -65,7 +65,7 @@ class TcpLink:
             connection, sender = self._socket.accept()
         except OSError as error:
             if error.errno in (errno.EMFILE, errno.ENFILE):
-                # Who waits goes on waiting, and would wake us up again at once.
+                # The client stays in the backlog and would wake the loop again at once.
                 self._loop.remove_reader(self._socket.fileno())
                 self._resting = self._loop.call_later(_REST_S, self._listen)
             return
@@ -79,11 +79,11 @@ class TcpLink:
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)
-        # The kernel would keep minutes of old telemetry for who does not read.
+        # The kernel would buffer minutes of old telemetry for a client that does not read.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
         peer = Peer(self.name, sender)
         if (former := self._clients.pop(peer, None)) is not None:
-            # Its end was never heard of: a laptop that was switched off, and connects from the same port.
+            # Its end was never reported: a laptop that was switched off, and connects from the same port.
             former.close()
             self._events.gcs_gone(peer)
         # A TCP client hears the vehicle from the start: it may wait for a heartbeat before it speaks.
@@ -104,7 +104,7 @@ class TcpLink:
 
 
 class _TcpClient:
-    """One connection with a bounded amount of unsent bytes. `gone`: it was closed, but not by `close`."""
+    """One connection with a bounded amount of unsent bytes. `gone` is called if it ends otherwise than by `close`."""
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class _TcpClient:
         self._socket = connection
         self._loop = loop
         self._received = received
-        #: When it last spoke, on the loop's clock; at first when it came.
+        #: When it last sent bytes, on the loop's clock; at first the time of the connection.
         self.heard_at = loop.time()
         self._gone = gone
         self._unsent = SendQueue(_MAX_UNSENT)
@@ -128,7 +128,7 @@ class _TcpClient:
             return
         if self._unsent:
             if not self._unsent.add(data):
-                # It has not read so many answers that it can make no sense of the next one.
+                # So many replies are unread that the next one would be of no use.
                 self._hang_up()
             return
         sent = self._try_send(memoryview(data))
@@ -145,7 +145,7 @@ class _TcpClient:
         self._socket.close()
 
     def _hang_up(self) -> None:
-        """Close soon: whoever sends is in the middle of sending to others, too."""
+        """Close soon, not now: the caller is in a loop over all clients."""
         if self._hanging_up is None:
             self._hanging_up = self._loop.call_soon(self._end)
 

@@ -13,14 +13,14 @@ from service.links.gcs_events import GcsEvents
 _DATAGRAM_SIZE = 2048
 #: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.
 _DATAGRAMS_AT_ONCE = 64
-#: How often it is asked what a name stands for.
+#: How often a host name is resolved again.
 _LOOK_UP_S = 10.0
 
 _log = structlog.get_logger()
 
 
 class UdpLink:
-    """udpin waits to be spoken to, udpout speaks to one address, udpbcast to all until somebody answers."""
+    """udpin waits for peers, udpout sends to one address, udpbcast to all until one answers."""
 
     def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
         self.name = str(address)
@@ -40,13 +40,13 @@ class UdpLink:
         self._loop.add_reader(self._socket.fileno(), self._readable)
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send one datagram, or drop it: MAVLink repeats what matters."""
+        """Send one datagram, or drop it: MAVLink repeats the important ones."""
         try:
             self._socket.sendto(data, peer.key)  # type: ignore[call-overload]
         except BlockingIOError:
             pass
         except OSError as error:
-            # Wi-Fi that is down says so with every datagram.
+            # While Wi-Fi is down, every datagram fails.
             level = _log.debug if self._complained else _log.warning
             level("gcs.send_failed", peer=str(peer), why=error.strerror or str(error))
             self._complained = True
@@ -76,7 +76,7 @@ class UdpLink:
             self._events.add_default_peer(Peer(self.name, found[0][4]), until_answered=broadcast)
 
     async def _follow_name(self, *, until_answered: bool) -> None:
-        """Speak to what the name stands for: a network comes up after us, and a laptop gets another address."""
+        """Send to the address of a host name: the network may come up later, and a laptop's address may change."""
         known: Peer | None = None
         complained = False
         while True:
@@ -106,6 +106,6 @@ class UdpLink:
             except BlockingIOError:
                 return
             except OSError:
-                # An ICMP "port unreachable" for something we sent; the ground station is just not there yet.
+                # An ICMP "port unreachable" for something we sent: the ground station is not running yet.
                 continue
             self._events.gcs_data(Peer(self.name, sender), data, datagram=True)

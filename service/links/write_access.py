@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who may write over a link to ground stations: what the table form of a `gcs` setting says.
+"""Write permission per ground station link: the table form of a `gcs` setting.
 
 gcs = [
     "udpin:127.0.0.1:14551",
@@ -29,29 +29,29 @@ class WriteAccessError(AddressError):
 
 @dataclass(frozen=True, slots=True)
 class WriteAccess:
-    """`key` None: no signature is asked for. `writers` None: any address will do; none in it: nobody may write."""
+    """`key` None: no signature needed. `writers` None: any address may write; empty: none may."""
 
     key: bytes | None = field(default=None, repr=False)
     writers: tuple[Network, ...] | None = None
 
     @property
     def is_open(self) -> bool:
-        """Tell whether anyone may write."""
+        """True if every station may write."""
         return self.key is None and self.writers is None
 
     def has_address(self, peer: Peer) -> bool:
-        """Tell whether a peer's address is among the writers'."""
+        """True if a peer's address is among the writers'."""
         assert self.writers is not None
         assert isinstance(peer.key, tuple)
         address = ip_address(peer.key[0])
         if isinstance(address, IPv6Address) and address.ipv4_mapped is not None:
-            # How a socket for both protocols shows a peer of IPv4.
+            # A dual-stack socket shows an IPv4 peer like this.
             address = address.ipv4_mapped
         return any(address in network for network in self.writers)
 
 
 def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
-    """Read one entry of `gcs`: a connection string or a table. `folder`: where a relative `key_file` is looked for."""
+    """Read one entry of `gcs`: a connection string or a table. A relative `key_file` is looked for in `folder`."""
     if isinstance(entry, str):
         return parse_gcs(entry), WriteAccess()
     if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
@@ -72,9 +72,9 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
 
 
 def read_key(path: Path) -> bytes:
-    """Return the key of the passphrase that is the one line of a file that others cannot read."""
+    """The key made from a passphrase: the only line of a file that other users cannot read."""
     try:
-        # Not blocking: a FIFO that nobody writes to would hold the daemon up.
+        # Not blocking: a FIFO without a writer would hold the daemon up.
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):

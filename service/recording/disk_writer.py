@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes from the event loop to a slow disk, on a thread: who has something to write never waits for it."""
+"""Bytes from the event loop to a slow disk, through a thread: the loop never waits."""
 
 import threading
 from collections.abc import Callable
 
 import structlog
 
-#: So much is lost if the process is killed.
+#: How much is lost if the process is killed.
 _FLUSH_S = 1.0
-#: At the end: a disk that hangs must not keep the daemon from ending.
-_PATIENCE_S = 2.0
-#: An SD card that stalls for so many bytes loses the rest: minutes of telemetry, 90 s of a full UART at 115200.
+#: For the last write: a hanging disk must not keep the daemon from ending.
+_CLOSE_TIMEOUT_S = 2.0
+#: Bytes beyond this are dropped while an SD card stalls: minutes of telemetry, 90 s of a full UART at 115200.
 _MAX_WAITING = 1 << 20
 
 _log = structlog.get_logger()
 
 
 class DiskWriter:
-    """Calls `write` once a second, on its thread, with what `put` was given since.
+    """Calls `write` on its thread once a second, with the bytes from `put`.
 
-    `lock` is held where bytes are added or taken. `on_take` is called with it held, when bytes were taken: what is put
-    from then on will be in the next `write`. `on_end` is called after the last `write`.
+    `lock` guards the bytes. `on_take` is called with it held, when bytes are taken: bytes put after that go into the
+    next `write`. `on_end` is called after the last `write`.
     """
 
     def __init__(
@@ -37,13 +37,13 @@ class DiskWriter:
         self._waiting = bytearray()
         self._ending = threading.Event()
         self.lock = threading.Lock()
-        #: Bytes that found no room.
+        #: Bytes dropped because too many were waiting.
         self.dropped = 0
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def put(self, data: bytes) -> None:
-        """Have bytes written, or drop them if too many wait. Hold `lock`."""
+        """Queue bytes, or drop them if too many are waiting. Hold `lock`."""
         if len(self._waiting) + len(data) <= _MAX_WAITING:
             self._waiting += data
             return
@@ -52,9 +52,9 @@ class DiskWriter:
         self.dropped += len(data)
 
     def close(self) -> None:
-        """Have the rest written, and end."""
+        """Write the rest, then end the thread."""
         self._ending.set()
-        self._thread.join(_PATIENCE_S)
+        self._thread.join(_CLOSE_TIMEOUT_S)
 
     def _run(self) -> None:
         while not self._ending.wait(_FLUSH_S):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a daemon records of itself: telemetry logs always, the UART if it is asked to."""
+"""The daemon's recordings: telemetry logs by default, the UART on request."""
 
 from collections.abc import Awaitable, Callable
 
@@ -15,7 +15,7 @@ TLOG_FOLDER = "logs"
 
 
 class Recording:
-    """Holds what `settings` ask for. UartFileError if the UART cannot be recorded. `tap` takes MAVLink frames."""
+    """The recordings set up by `settings`; `tap` takes MAVLink frames. UartFileError if the UART cannot be recorded."""
 
     def __init__(self, settings: Settings) -> None:
         self._uart = None if settings.record_uart is None else UartRecorder(settings.record_uart)
@@ -31,23 +31,23 @@ class Recording:
         on_data: Callable[[bytes], None],
         on_close: Callable[[str], None],
     ) -> FcPort:
-        """Return the flight controller's port, recorded if that is wanted."""
+        """The flight controller's port, recorded if set up so."""
         if self._uart is None:
             return FcPort(open_device, on_open, on_data, on_close)
         return RecordedPort(open_device, on_open, on_data, on_close, self._uart)
 
     def flies(self, *, is_flying: bool) -> None:
-        """The craft was armed, or disarmed: the log of a flight is kept longest."""
+        """The craft was armed or disarmed: the logs of flights are kept longest."""
         if self._tlog is not None:
             self._tlog.flies(is_flying=is_flying)
 
     def describe(self) -> list[str]:
-        """Tell what is recorded, and where; or why not any more."""
+        """The files in use, or the reasons why recording stopped, for the status."""
         told = [] if self._tlog is None else [f"telemetry log: {self._tlog.describe()}"]
         return told if self._uart is None else [*told, f"UART capture: {self._uart.describe()}"]
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the unsaved rest."""
         if self._uart is not None:
             self._uart.close()
         if self._tlog is not None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of telemetry logs: one file at a time, bounded in size, total and age.
 
-No clock is read here: which time it is says the caller, or the records themselves.
+Reads no clock: the time is passed in, or taken from the records themselves.
 """
 
 import os
@@ -16,35 +16,35 @@ import structlog
 from protocols.tlog import first_stamp_us
 from service.settings import TlogLimits
 
-#: As Mission Planner names them; ours are in UTC, and those in which the craft was armed say so.
+#: Mission Planner's format, but in UTC; the names of flights (the craft was armed) end in " flight".
 _NAME_FORMAT = "%Y-%m-%d %H-%M-%S.tlog"
 _NAME_PATTERN = re.compile(r"\d{4}-\d\d-\d\d \d\d-\d\d-\d\d( flight)?\.tlog")
 _FLIGHT = " flight"
-#: A full or read-only disk seldom mends itself.
+#: The pause after a failure: a full or read-only disk rarely recovers at once.
 _RETRY_S = 60.0
-#: What was written is on the disk after so long even if the power is cut; more often costs an SD card's life.
+#: How much a power cut may lose; syncing more often wears out an SD card.
 _SYNC_S = 5.0
-#: So much of the disk is left to others: a mission must still find room.
+#: Disk space that logs never use: a mission must still fit.
 LEFT_FREE = 32 << 20
 
 _log = structlog.get_logger()
 
 
 def is_log_name(name: str) -> bool:
-    """True for the names that this folder's logs have, and so never for a path out of it."""
+    """True for names of this folder's logs; never for a path out of it."""
     return _NAME_PATTERN.fullmatch(name) is not None
 
 
 def free_space(folder: Path) -> int:
-    """Return how many bytes still fit on the folder's disk."""
+    """The free space on the folder's disk, bytes."""
     found = os.statvfs(folder)
     return found.f_bavail * found.f_frsize
 
 
 class TlogFolder:
-    """Appends to a file that it opens when there is something to write.
+    """Appends to a file that is opened at the first write.
 
-    Whatever the disk does is not the flight's problem: nothing raises. A failure is told once, and tried again later.
+    Disk errors must not affect a flight, so nothing raises. A failure is logged once, and retried later.
     """
 
     def __init__(
@@ -61,11 +61,11 @@ class TlogFolder:
 
     @property
     def is_full(self) -> bool:
-        """Tell whether the open file has reached its size."""
+        """True if the open file has reached its maximum size."""
         return self._file is not None and self._file.size >= self._limits.file_size
 
     def describe(self) -> str:
-        """Tell which file is open, or why none is. May be called while another thread writes."""
+        """The open file, or the reason why none is open. May be called while another thread writes."""
         file, trouble = self._file, self._trouble
         if file is not None:
             return str(file.path)
@@ -94,13 +94,13 @@ class TlogFolder:
             self._give_up(error, now)
 
     def close(self) -> None:
-        """End the open file; the next `write` begins another one."""
+        """Close the open file; the next `write` begins another one."""
         if self._file is not None:
             self._file.close()
             self._file = None
 
     def _create(self, began: datetime) -> "_OpenFile":
-        """Make a file named for `began`, or for the first second after it that has none: clocks may be set back."""
+        """Make a file named after `began`, or the first free second after it: clocks may be set back."""
         self._folder.mkdir(parents=True, exist_ok=True)
         self._make_room(began)
         while (path := self._folder / began.strftime(_NAME_FORMAT)).exists() or _of_flight(path).exists():
@@ -109,10 +109,10 @@ class TlogFolder:
         return _OpenFile(path)
 
     def _make_room(self, now: datetime) -> None:
-        """Remove the oldest until another file fits, flights last. What is not named as ours are is left alone.
+        """Remove the oldest files until another one fits, flights last. Files with other names are left alone.
 
-        Our own of this run go after earlier ones, in the order in which they were written, and not for their age: the
-        clock may have been weeks behind when we began.
+        Files of this run go after earlier ones, in the order of writing and regardless of their age: the clock may have
+        been weeks behind at the start.
         """
         too_old = (now - timedelta(days=self._limits.days)).strftime(_NAME_FORMAT)
         sizes = {path: path.stat().st_size for path in self._folder.iterdir() if _NAME_PATTERN.fullmatch(path.name)}
@@ -150,11 +150,11 @@ def _of_flight(path: Path) -> Path:
 
 
 class _LittleSpaceError(OSError):
-    """The disk is not full yet, but nearly."""
+    """The disk is nearly full."""
 
 
 class _OpenFile:
-    """A file that is appended to without a buffer: what was written outlives this process."""
+    """A file that is appended to without a buffer: written bytes survive a crash of this process."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -172,7 +172,7 @@ class _OpenFile:
         os.fdatasync(self._descriptor)
 
     def close(self) -> None:
-        """Close it, and leave no empty one behind."""
+        """Close the file, and delete it if it is empty."""
         with suppress(OSError):
             self.sync()
         os.close(self._descriptor)

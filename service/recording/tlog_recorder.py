@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes what ground stations hear and say into telemetry logs."""
+"""Writes the frames to and from ground stations into telemetry logs."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -11,17 +11,17 @@ from service.recording.disk_writer import DiskWriter
 from service.recording.tlog_folder import TlogFolder
 from service.settings import TlogLimits
 
-#: The clock was set: a Pi has none of its own, and hears of the time when there is a network.
+#: A larger jump means that the clock was set: a Pi gets the time only from the network.
 _CLOCK_STEP_US = 10_000_000
 
 
 class TlogRecorder:
-    """Offers `tap`. Within a file time runs on evenly; after a step of the clock a new file begins.
+    """Offers `tap`. Within a file time runs on evenly; after the clock is set a new file begins.
 
-    A file begins without ground stations' heartbeats: Mission Planner shows the craft whose HEARTBEAT comes first in a
-    log, and knows only the systems 255 and 253 for ground stations. They are left out until a vehicle's came.
+    A file begins without ground stations' heartbeats: Mission Planner shows the system whose HEARTBEAT comes first in a
+    log, and recognizes only the systems 255 and 253 as ground stations. They are left out until a vehicle's HEARTBEAT.
 
-    `read_clock`: nanoseconds since the Unix epoch, as far as the system knows.
+    `read_clock`: the system's time, nanoseconds since the Unix epoch.
     """
 
     def __init__(self, folder: Path, limits: TlogLimits, read_clock: Callable[[], int] = time.time_ns) -> None:
@@ -30,7 +30,7 @@ class TlogRecorder:
         self._epoch_us = self._present_epoch_us()
         self._file_is_over = False
         self._is_flying = False
-        self._has_flown = False  # since what was written last
+        self._has_flown = False  # since the last write
         self._awaits_vehicle = True
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
 
@@ -40,25 +40,25 @@ class TlogRecorder:
         with self._writer.lock:
             at_us = self._epoch_us + now_us
             if self._awaits_vehicle:
-                frames = self._vehicle_first(frames)
+                frames = self._from_vehicle_on(frames)
             self._writer.put(b"".join([tlog_record(frame, at_us) for frame in frames]))
 
     def flies(self, *, is_flying: bool) -> None:
-        """What is recorded from now on is a flight, or no more."""
+        """Mark the following frames as part of a flight, or not."""
         with self._writer.lock:
             self._is_flying = is_flying
             self._has_flown = self._has_flown or is_flying
 
     def describe(self) -> str:
-        """Tell into which file it records, or why into none."""
+        """The file in use, or the reason why there is none, for the status."""
         dropped = f", {self._writer.dropped} bytes left out" if self._writer.dropped else ""
         return self._folder.describe() + dropped
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the unsaved frames."""
         self._writer.close()
 
-    def _vehicle_first(self, frames: Sequence[bytes]) -> Sequence[bytes]:
+    def _from_vehicle_on(self, frames: Sequence[bytes]) -> Sequence[bytes]:
         found: list[bytes] = []
         for frame in frames:
             announced = heartbeat_type(frame)
@@ -70,7 +70,7 @@ class TlogRecorder:
         return found
 
     def _taken(self) -> None:
-        """Decide whether what comes from now on goes into a new file; only between two files time may jump."""
+        """Choose the file for the following frames: a time step needs a new one."""
         epoch_us = self._present_epoch_us()
         stepped = abs(epoch_us - self._epoch_us) > _CLOCK_STEP_US
         self._file_is_over = stepped or self._folder.is_full
@@ -86,5 +86,5 @@ class TlogRecorder:
             self._folder.close()
 
     def _present_epoch_us(self) -> int:
-        """Return when the monotonic clock was 0, in microseconds since the Unix epoch."""
+        """The time at which the monotonic clock was 0, microseconds since the Unix epoch."""
         return (self._read_clock() - time.monotonic_ns()) // 1000

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records what passes at the flight controller's port (`run --record-uart FILE`), so that it can be played again."""
+"""Records the traffic on the flight controller's port (`run --record-uart FILE`), so that it can be replayed."""
 
 import os
 import time
@@ -14,18 +14,18 @@ from service.links.fc_device import Device
 from service.links.fc_port import FcPort
 from service.recording.disk_writer import DiskWriter
 
-#: Of the file: hours of telemetry, or three quarters of an hour of a full line at 115200 baud.
+#: Bytes per file: hours of telemetry, or 45 minutes of a full line at 115200 baud.
 _MAX_SIZE = 64 << 20
 
 _log = structlog.get_logger()
 
 
 class UartFileError(Exception):
-    """The file cannot be recorded into; the text is one sentence for the user."""
+    """The file cannot be used; the text is one sentence for the user."""
 
 
 class UartRecorder:
-    """Appends to a capture file until that has its size. Nothing but the port's traffic gets into it."""
+    """Appends to a capture file up to a maximum size. It holds only the port's traffic."""
 
     def __init__(self, path: Path, max_size: int = _MAX_SIZE) -> None:
         self._path = path
@@ -38,18 +38,18 @@ class UartRecorder:
         self._put(capture_header(started))
 
     def note(self, deed: UartDeed, speed: int | None, data: bytes = b"", text: str = "") -> None:
-        """Record what happened just now."""
+        """Record an event with the present time."""
         if not self._over_because:
             self._put(capture_line(UartEvent(time.monotonic() - self._began_at, speed, deed, data, text)))
 
     def describe(self) -> str:
-        """Tell into which file it records, or why not any more."""
+        """The file in use, or the reason why recording stopped, for the status."""
         ended = f", ended: {self._over_because}" if self._over_because else ""
         dropped = f", {self._writer.dropped} bytes left out" if self._writer.dropped else ""
         return f"{self._path}, {self._size / 1e6:.1f} of {self._max_size / 1e6:.0f} MB{dropped}{ended}"
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the unsaved events."""
         self._writer.close()
 
     def _put(self, line: bytes) -> None:
@@ -79,7 +79,7 @@ class UartRecorder:
 
 
 class RecordedPort(FcPort):
-    """The flight controller's port, each deed of which is recorded."""
+    """The flight controller's port, with every event recorded."""
 
     def __init__(
         self,
@@ -106,21 +106,21 @@ class RecordedPort(FcPort):
         self._recorded_speed: int | None = None
 
     def set_speed(self, baud: int | None) -> None:
-        """Run the port at another speed, baud."""
+        """Change the speed, baud."""
         self._recorded_speed = baud
         super().set_speed(baud)
 
     def write(self, data: bytes) -> None:
-        """Write, and record that."""
+        """Write to the port, and record it."""
         self._recorder.note(UartDeed.WRITE, self._recorded_speed, data)
         super().write(data)
 
 
 def _open(path: Path) -> tuple[int, int]:
-    """Open a new or an earlier capture to append to; return its descriptor and its size."""
+    """Open a new capture, or an earlier one to append to. Answer: its descriptor and size."""
     try:
         if path.exists() and not path.is_file():
-            # A serial port would be written to: an aircraft may hang there.
+            # Never write to a device: a serial port may lead to an aircraft.
             raise UartFileError(f"{path} is no file: name a new file for --record-uart")
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
     except OSError as error:
@@ -130,6 +130,6 @@ def _open(path: Path) -> tuple[int, int]:
         os.close(descriptor)
         raise UartFileError(f"{path} is no UART capture: name a new file for --record-uart")
     if size and os.pread(descriptor, 1, size - 1) != b"\n":
-        # The daemon was killed in the middle of a line, which must not swallow the next one.
+        # The daemon was killed in the middle of a line: keep the next one apart.
         os.write(descriptor, b"\n")
     return descriptor, size

@@ -15,7 +15,7 @@ _TIMES = ("received_at", "concluded_at")
 
 
 class Answers:
-    """Answers in the encoding of the samples."""
+    """Replies in the encoding of the samples."""
 
     def __init__(
         self, data: VehicleData, bridge: Bridge, jobs: MissionJobs, payloads: Payloads, history: History

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands below @cmd: what the command line can do, asked for by a query."""
+"""The commands below @cmd: those of the command line, sent as queries."""
 
 import asyncio
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from service.zenoh_link.settings import STATE_NAME
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _PAYLOAD = "the query's payload"
-#: Files on disk may be larger, but they are not read beside a running link: a mission that fits has some 20 KB.
+#: Larger files are read by the command line only, not alongside a running link: a mission that fits has about 20 KB.
 _MAX_BYTES = 1 << 20
 _MAX_ITEMS = 1000
 _USUAL_REQUEST_S = 60.0
@@ -24,7 +24,7 @@ _RATE_NAMES = (*(group.value for group in Group), STATE_NAME)
 
 
 class CommandQueries:
-    """Carries them out as MissionJobs does for everybody."""
+    """Handles the commands through MissionJobs, like all other interfaces."""
 
     def __init__(self, jobs: MissionJobs, rates: SampleRates) -> None:
         self._jobs = jobs
@@ -70,7 +70,7 @@ class CommandQueries:
 
 
 async def _items(question: Question) -> list[MissionItem]:
-    """Return the mission in the payload: the formats, the reader and its words are those of `naze-bridge check`."""
+    """Parse the mission in the payload, with the formats, reader and messages of `naze-bridge check`."""
     if question.size > _MAX_BYTES:
         raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 20} MB: send a mission file")
     try:
@@ -99,7 +99,7 @@ def _number(question: Question, name: str, most: float) -> float | None:
 
 
 def _teller(question: Question, count: int) -> Callable[[Json], None]:
-    """Return what tells the progress towards `count` records."""
+    """A function that reports the progress towards `count` records."""
     return lambda progress: _tell(question, progress | {"of": count})
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The compact encoding: CBOR with a number for each field instead of its name, half the size of JSON.
+"""The compact encoding: CBOR with a number per field instead of its name, half the size of JSON.
 
-The numbers are part of the published schemas (`cborKey`), so that a reader needs nothing but those files. A field keeps
-its number for as long as the version of the keys stays; a reader leaves unknown numbers alone.
+The numbers are part of the published schemas (`cborKey`), so that a reader needs only these files. A field keeps its
+number as long as the keys keep their version; a reader ignores unknown numbers.
 """
 
 import json
@@ -16,12 +16,12 @@ import cbor2
 from service.mission_data import Json
 
 SCHEMAS = Path(__file__).parent / "schemas"
-#: The field of a property's schema that holds its number.
+#: The schema field with a property's number.
 CBOR_KEY = "cborKey"
 
 
 def dumps(schema: str, body: Json) -> bytes:
-    """Encode a payload; `schema`: name of its file."""
+    """Encode a payload; `schema`: the name of its file."""
     return cbor2.dumps(_shortened(body, read_schema(schema)))
 
 
@@ -32,7 +32,7 @@ def loads(schema: str, data: bytes) -> Any:
 
 @cache
 def read_schema(name: str) -> Json:
-    """Read a published schema; ValueError if there is none of this name."""
+    """Read a published schema; ValueError if the name is unknown."""
     path = SCHEMAS / f"{name}.json"
     if path.parent != SCHEMAS or not path.is_file():
         raise ValueError(f"there is no schema {name!r}")
@@ -41,7 +41,7 @@ def read_schema(name: str) -> Json:
 
 
 def object_schema(schema: Json) -> Json:
-    """The schema of the object where one, or something else, may be."""
+    """The object's schema, also out of a choice of several types."""
     for choice in schema.get("anyOf", ()):
         if "properties" in choice or "items" in choice:
             found: Json = choice

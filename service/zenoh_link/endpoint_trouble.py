@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Why a zenoh endpoint does not let us in: zenoh itself only says that it could not connect.
+"""Diagnoses why a zenoh endpoint rejects the bridge: zenoh itself reports only that it could not connect.
 
-So the first steps are taken once more with the standard library, which tells an expired certificate from a wrong name.
+Repeats the first steps with the standard library, which tells an expired certificate from a wrong name.
 Blocks for up to a few seconds: not for an event loop.
 """
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P<port>\d+)(?:[?#].*)?")
 _PATIENCE_S = 2.0
-#: How long a refusal of our own certificate is waited for: TLS 1.3 tells it after the handshake.
+#: How long to wait for a rejection of our own certificate: in TLS 1.3 it comes after the handshake.
 _REFUSAL_S = 0.5
 _OVER_TCP = ("tcp", "tls", "ws")
 
@@ -29,7 +29,7 @@ class TlsFiles:
 
 
 def endpoint_trouble(endpoints: Sequence[str], files: TlsFiles) -> str:
-    """Return what is wrong with each endpoint, in one line."""
+    """The problem of each endpoint, in one line."""
     return "; ".join(f"{endpoint}: {_trouble(endpoint, files)}" for endpoint in endpoints)
 
 
@@ -60,7 +60,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
 
 
 def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
-    """Go on with TLS as zenoh does; SSLError or OSError is the trouble, too."""
+    """Continue with TLS as zenoh does; SSLError or OSError describe the problem, too."""
     context = ssl.create_default_context()
     for path in (files.root_ca_certificate, files.connect_certificate, files.connect_private_key):
         if path is not None and not path.is_file():
@@ -84,5 +84,5 @@ def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
 
 
 def _words(error: ssl.SSLError) -> str:
-    """Return OpenSSL's reason, as "tlsv13 alert certificate required", in lower case."""
+    """OpenSSL's reason in lower case, as in "tlsv13 alert certificate required"."""
     return (error.reason or error.strerror or str(error)).replace("_", " ").lower()

@@ -22,11 +22,11 @@ class History:
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 
     def add(self, event: Json) -> None:
-        """Keep an event's payload, its envelope included."""
+        """Keep an event's payload, including its envelope."""
         self._events.append(event)
 
     async def answer(self, time_range: str | None) -> Json:
-        """What happened in that time; StoreError, or ValueError about the range."""
+        """The events and missions of a time range; StoreError, or ValueError about the range."""
         wanted = parse_time_range(time_range or _DEFAULT_RANGE, time.time())
         missions = (await self._jobs.list_missions(_MAX_MISSIONS))["missions"]
         return {

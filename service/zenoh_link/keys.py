@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every key of a vehicle, in one table: docs/zenoh.md shows the same one.
+"""Every key of a vehicle, in one table; docs/zenoh.md has the same one.
 
-A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` takes a whole fleet. The
+A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` selects a whole fleet. The
 version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread.
 """
 
@@ -10,17 +10,17 @@ from enum import Enum
 
 from bridge.model.vehicle_groups import Group
 
-#: The version of keys and payloads. A new field leaves it alone; a change that would mislead a reader raises it.
+#: The version of keys and payloads. A new field does not change it; a change that would mislead a reader raises it.
 VERSION = 1
 _V = f"v{VERSION}"
-#: Verbatim chunks (@) match no wildcard: nobody sends a command by accident, and a recorder of `fleet/**` does not
-#: become a MAVLink ground station.
+#: Verbatim chunks (@) match no wildcard: a wildcard never sends a command, and a recorder of `fleet/**` does not become
+#: a MAVLink ground station.
 COMMANDS = f"@cmd/{_V}"
 MAVLINK = f"@mavlink/{_V}"
 
 
 class SampleDelivery(Enum):
-    """How a sample travels."""
+    """The quality of service of a sample."""
 
     DROP = "dropped rather than delayed"
     RELIABLE = "reliable"
@@ -29,9 +29,9 @@ class SampleDelivery(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ZenohKey:
-    """One key. `schema`: file name below schemas/, without its ending; None: the payload is raw MAVLink.
+    """One key. `schema`: file name below schemas/, without its suffix; None: the payload is raw MAVLink.
 
-    `kept`: samples that the vehicle keeps, from which a subscriber recovers lost ones; 0: none.
+    `kept`: the number of samples kept for subscribers that lost some; 0: none.
     """
 
     suffix: str
@@ -81,10 +81,10 @@ ALIVE = f"{_V}/alive"
 
 
 def full(prefix: str, vehicle: str, suffix: str) -> str:
-    """A key's whole name."""
+    """The full key."""
     return f"{prefix}/{vehicle}/{suffix}"
 
 
 def vehicle_in(key: object) -> str:
-    """The vehicle's name in a whole key."""
+    """The vehicle's name in a full key."""
     return str(key).split("/")[1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who is there: our liveliness token, other bridges that use its name by mistake, and what we are joined to."""
+"""Liveliness: the bridge's own token, other bridges that use its name by mistake, and connected sessions."""
 
 import asyncio
 
@@ -11,7 +11,7 @@ from service.zenoh_link.threads import post
 
 
 class Liveliness:
-    """Shows that the bridge is there. `others`: sessions of other bridges with the same vehicle name."""
+    """Shows that the bridge is alive. `others`: sessions of other bridges with the same vehicle name."""
 
     def __init__(self, vehicle: str, note: EventLog) -> None:
         self._vehicle = vehicle
@@ -23,7 +23,7 @@ class Liveliness:
         self._neighbours: dict[str, str] = {}
 
     def declare(self, session: zenoh.Session, alive: str) -> None:
-        """Declare the token and look for others; called on the session's thread. `alive`: the tokens' key."""
+        """Declare the token and find others; called on the session's thread. `alive`: the tokens' key prefix."""
         self._own = str(session.zid())
 
         def joined(event: zenoh.TransportEvent) -> None:
@@ -32,7 +32,7 @@ class Liveliness:
 
         session.info.declare_transport_events_listener(zenoh.handlers.Callback(joined, indirect=False), history=True)
         liveliness = session.liveliness()
-        # It lives as long as it is held here.
+        # Must be kept: zenoh undeclares a token that is garbage-collected.
         self._token = liveliness.declare_token(f"{alive}/{self._own}")
 
         def seen(sample: zenoh.Sample) -> None:
@@ -54,11 +54,11 @@ class Liveliness:
 
     @property
     def is_alone(self) -> bool:
-        """Tell whether nobody is joined."""
+        """True if no other session is connected."""
         return not self._neighbours
 
     def status(self) -> Json:
-        """Tell how things stand, for `naze-bridge status`."""
+        """The connections, for `naze-bridge status`."""
         return {
             "zenoh": "open" if self._own else "not open",
             "zenoh_neighbours": len(self._neighbours),

@@ -11,11 +11,11 @@ from service.zenoh_link.keys import MAVLINK_OUT
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.threads import post
 
-#: Whoever reads is one peer: zenoh does not tell them apart.
+#: All subscribers are one peer: zenoh does not tell them apart.
 _READERS = Peer("zenoh", MAVLINK_OUT.suffix)
-#: More than a datagram of any link holds; what is larger is no MAVLink.
+#: More than a datagram of any link holds; larger samples are not MAVLink.
 _MAX_BYTES = 2048
-#: What comes in faster than the event loop takes it is dropped beyond this.
+#: Samples beyond this are dropped when they arrive faster than the event loop takes them.
 _MAX_WAITING = 64
 
 
@@ -35,7 +35,7 @@ class MavlinkLink:
         session.declare_subscriber(name, zenoh.handlers.Callback(self._arrived, indirect=False))
 
     def read(self, *, is_read: bool) -> None:
-        """Somebody reads mavlink/out, or nobody does any more."""
+        """mavlink/out got its first subscriber, or lost the last one."""
         if is_read:
             self._events.add_default_peer(_READERS)
         else:
@@ -47,7 +47,7 @@ class MavlinkLink:
             self._publisher.put_raw(MAVLINK_OUT, data)
 
     def close(self) -> None:
-        """The session closes what was declared."""
+        """Nothing to do: the session undeclares everything."""
 
     def _arrived(self, sample: zenoh.Sample) -> None:
         if self._waiting < _MAX_WAITING and len(sample.payload) <= _MAX_BYTES:

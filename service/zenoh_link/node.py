@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge as one vehicle in zenoh: puts the parts together and hands each what is its business.
+"""The bridge as one vehicle in zenoh: wires the parts together and routes events.
 
-A sample's way from the UART:
+The path of a sample from the UART:
     Daemon.flush -> Node.telemetry -> Publisher.put -> zenoh
-What may wait goes over the session's thread:
+Anything that may wait takes the session's thread:
     Daemon._log_event -> Node.event -> SessionThread -> zenoh
     zenoh -> Queries -> Answers or CommandQueries -> MissionJobs -> Question -> SessionThread -> zenoh
 """
@@ -41,8 +41,8 @@ from service.zenoh_link.settings import ZenohSettings
 from service.zenoh_link.vehicle_data import VehicleData
 
 _STATE_INTERVAL_S = 1.0
-#: How long nobody is there before it is looked into, and until it is looked again.
-_PATIENCE_S = 5.0
+#: The interval of endpoint checks while no session is connected.
+_ENDPOINT_CHECK_S = 5.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
 
 _log = structlog.get_logger()
@@ -71,47 +71,47 @@ class Node:
         if settings.commands:
             self._answerers |= CommandQueries(jobs, self._rates).answerers
         self._held: HeldMission | None = None
-        self._ask_why_at = self._loop.time() + _PATIENCE_S
-        self._why_alone = ""
-        self._soon: asyncio.Handle | None = None
+        self._next_check_at = self._loop.time() + _ENDPOINT_CHECK_S
+        self._diagnosis = ""
+        self._pending_publish: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
-        """Join, as soon as there is somebody to join."""
+        """Join as soon as there is a session to join."""
         self._daemon.add_link(self._mavlink)
         self._daemon.add_follower(self)
         self._thread.start()
         self._every_second()
 
     async def close(self) -> None:
-        """Leave, within a second."""
+        """Leave; takes at most a second."""
         if self._tick is not None:
             self._tick.cancel()
         await self._queries.close()
         self._thread.close()
 
-    # What the daemon tells.
+    # The methods of service.daemon.Follower.
 
     def telemetry(self, groups: frozenset[Group]) -> None:
-        """Publish groups."""
+        """Publish these groups."""
         for group in groups:
             self._publish(group)
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        """Publish an event, and soon after it the state: something has changed."""
+        """Publish an event, and soon after it the changed state."""
         body = self._payloads.head(keys.EVENT) | vehicle_data.event(level, event, facts)
         self._history.add(body)
         self._thread.submit(lambda: self._publisher.put_raw(keys.EVENT, self._payloads.encode(keys.EVENT, body)))
         if level != "debug":
-            self._news()
+            self._publish_soon()
 
     def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
-        """Publish the report."""
-        self._send_surely(keys.MISSION_REPORT, lambda: vehicle_data.mission_report(mission, delivery))
-        self._news()
+        """Publish the mission report."""
+        self._send_reliably(keys.MISSION_REPORT, lambda: vehicle_data.mission_report(mission, delivery))
+        self._publish_soon()
 
     def status(self) -> Json:
-        """Tell how things stand."""
+        """The node's part of `naze-bridge status`."""
         return self._presence.status() | {"zenoh_dropped": self._thread.dropped + self._publisher.failed}
 
     # On the session's thread.
@@ -151,39 +151,39 @@ class Node:
             if self._rates.admits(group, sample, self._loop.time(), gathered=gathered):
                 self._publisher.put(key, plain(sample))
 
-    def _send_surely(self, key: ZenohKey, body: Callable[[], Json]) -> None:
-        """Publish on the session's thread, where the body is made, too: a report of a long list takes its time."""
+    def _send_reliably(self, key: ZenohKey, body: Callable[[], Json]) -> None:
+        """Publish on the session's thread, which also makes the body: for a long list that takes time."""
         head = self._payloads.head(key)
         self._thread.submit(lambda: self._publisher.put_raw(key, self._payloads.encode(key, head | body())))
 
-    def _news(self) -> None:
-        """Publish what changes as a whole, once for all that changes now."""
-        if self._soon is None:
-            self._soon = self._loop.call_soon(self._publish_whole)
+    def _publish_soon(self) -> None:
+        """Publish the state and the mission once, for all changes of this moment."""
+        if self._pending_publish is None:
+            self._pending_publish = self._loop.call_soon(self._publish_whole)
 
     def _every_second(self) -> None:
         self._publish_whole()
-        self._look_into_silence()
+        self._check_endpoints()
         self._tick = self._loop.call_later(_STATE_INTERVAL_S, self._every_second)
 
-    def _look_into_silence(self) -> None:
-        """Say why nobody is joined who should be: zenoh goes on trying and says nothing."""
+    def _check_endpoints(self) -> None:
+        """Log why no session is connected: zenoh keeps trying without a message."""
         now = self._loop.time()
         if not self._presence.is_alone or not self._endpoints:
-            self._ask_why_at = now + _PATIENCE_S
-        elif now >= self._ask_why_at:
-            self._ask_why_at = now + _PATIENCE_S
-            # A thread of its own: an endpoint that swallows everything takes seconds to try.
-            threading.Thread(target=self._find_out_why, name="zenoh why", daemon=True).start()
+            self._next_check_at = now + _ENDPOINT_CHECK_S
+        elif now >= self._next_check_at:
+            self._next_check_at = now + _ENDPOINT_CHECK_S
+            # A separate thread: an endpoint that drops all packets takes seconds to time out.
+            threading.Thread(target=self._diagnose_endpoints, name="zenoh why", daemon=True).start()
 
-    def _find_out_why(self) -> None:
+    def _diagnose_endpoints(self) -> None:
         why = endpoint_trouble(self._endpoints, tls_files(self._config))
-        if why != self._why_alone:
-            self._why_alone = why
+        if why != self._diagnosis:
+            self._diagnosis = why
             _log.warning("zenoh.alone", why=why)
 
     def _publish_whole(self) -> None:
-        self._soon = None
+        self._pending_publish = None
         for group in {Group.LINK, *self._rates.held_back}:
             self._publish(group, gathered=True)
         state = self._data.state()
@@ -193,4 +193,4 @@ class Node:
         held = self._daemon.bridge.missions.held
         if held is not self._held:
             self._held = held
-            self._send_surely(keys.MISSION_CURRENT, partial(vehicle_data.mission_current, held))
+            self._send_reliably(keys.MISSION_CURRENT, partial(vehicle_data.mission_current, held))

@@ -27,14 +27,14 @@ _SCHEMA = f"naze-bridge/v{VERSION}/"
 
 
 def encoding_of(key: ZenohKey, encoding: PayloadEncoding) -> zenoh.Encoding:
-    """The encoding that a sample names: with its schema, as in "application/json;naze-bridge/v1/state"."""
+    """The encoding of a sample, with its schema, as in "application/json;naze-bridge/v1/state"."""
     if key.schema is None:
         return zenoh.Encoding.APPLICATION_OCTET_STREAM
     return _ENCODINGS[encoding].with_schema(_SCHEMA + key.schema)
 
 
 def decoded(data: bytes, encoding: str) -> Any:
-    """What `data` holds, by the encoding that came with it; ValueError or cbor2.CBORError if it cannot be read."""
+    """The contents of `data`, by the encoding of its sample; ValueError or cbor2.CBORError if it cannot be read."""
     kind, _, schema = encoding.partition(";")
     if kind == str(zenoh.Encoding.APPLICATION_CBOR):
         return compact.loads(schema.removeprefix(_SCHEMA), data)
@@ -42,7 +42,7 @@ def decoded(data: bytes, encoding: str) -> Any:
 
 
 class Payloads:
-    """Makes the payloads of one vehicle. Each key has a sequence of its own."""
+    """Makes the payloads of one vehicle. Each key has its own sequence."""
 
     def __init__(self, encoding: PayloadEncoding) -> None:
         self._encoding = encoding
@@ -53,7 +53,7 @@ class Payloads:
         return encoding_of(key, self._encoding)
 
     def encode(self, key: ZenohKey, body: Json) -> bytes:
-        """Write a payload. May be called on any thread."""
+        """Encode a payload. May be called on any thread."""
         if self._encoding is PayloadEncoding.CBOR and key.schema is not None:
             return compact.dumps(key.schema, body)
         return _to_json(body)
@@ -65,24 +65,24 @@ class Payloads:
         return {"v": VERSION, "seq": seq, "time_s": _now_s()}
 
     def answer(self, key: ZenohKey, body: Json) -> bytes:
-        """Make the answer to a query: it has the number of the last sample."""
+        """Make the reply to a query: it has the number of the last sample."""
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
         return self.encode(key, {"v": VERSION, "seq": seq, "time_s": _now_s(), **body})
 
 
 def _now_s() -> float:
-    """The time to the millisecond: no clock of a Pi is better, and each digit is paid for."""
+    """The time in milliseconds: a Pi's clock is no better, and each digit costs data."""
     return round(time.time(), 3)
 
 
 def plain(thing: Any) -> Json:
-    """Turn one of the dataclasses into plain data, deeply. asdict() copies everything, at five times the price."""
+    """Turn a dataclass into plain data, recursively. asdict() copies everything and takes five times as long."""
     names, values = _layout(type(thing))  # type: ignore[arg-type]  # a class can be hashed
     return dict(zip(names, map(_plain_value, values(thing)), strict=True))
 
 
 def strict(value: Any) -> Any:
-    """Replace what JSON has no number for: "not given" (NaN) is null, an infinite number a text."""
+    """Replace numbers that JSON lacks: NaN ("not given") becomes null, infinity a text."""
     if isinstance(value, dict):
         return {key: strict(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
@@ -107,7 +107,7 @@ def _layout(kind: Hashable) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any,
 
 
 def _to_json(body: Json) -> bytes:
-    """Write numbers without json's encoder: called now and then, with cold caches, it costs a third of the put."""
+    """Write numbers without json's encoder: called rarely, with cold caches, it would take a third of the put."""
     parts = []
     for name, value in body.items():
         write = _WRITERS.get(type(value), _write_any)
@@ -115,8 +115,8 @@ def _to_json(body: Json) -> bytes:
     return f"{{{','.join(parts)}}}".encode()
 
 
-#: What JSON writes as Python does: a group of telemetry has no NaN, what else may have one went through `strict`.
-#: Names need no quoting: they are our own.
+#: JSON's form where it equals Python's: telemetry groups have no NaN, and all others went through `strict`. Names are
+#: our own and need no quoting.
 _WRITERS: dict[type, Callable[[Any], str]] = {
     float: repr,
     int: repr,

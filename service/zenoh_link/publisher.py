@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Samples that are sent at once, or not at all: telemetry, the state and MAVLink frames. Runs on the event loop.
+"""Samples that are sent at once or dropped: telemetry, the state and MAVLink frames. Runs on the event loop.
 
 zenoh's put() with DROP and a `wait_before_drop` of 0 does not wait, whatever a receiver does: docs/zenoh.md, "Limits".
 """
@@ -15,15 +15,15 @@ from service.zenoh_link.keys import STATE, SampleDelivery, ZenohKey
 from service.zenoh_link.payload import Payloads
 from service.zenoh_link.threads import post
 
-#: How soon after a sample its number is published, by which a subscriber sees that the last one was lost.
+#: How soon after a sample its number is published, so that a subscriber notices if the last one was lost.
 _LAST_NUMBER_S = 1.0
 
 
 class Publisher:
-    """Publishes a vehicle's samples, and knows which keys have subscribers: telemetry without one is not even made.
+    """Publishes a vehicle's samples, and knows which keys have subscribers: telemetry without one is not even encoded.
 
-    Samples of the keys that are kept are put in any case. A subscriber that was away, or joins late, asks the publisher
-    for them; zenoh's AdvancedSubscriber does so by itself.
+    Samples of kept keys are put in any case. A subscriber that was away, or joins late, asks the publisher for them;
+    zenoh's AdvancedSubscriber does so by itself.
     """
 
     def __init__(self, payloads: Payloads, on_readers: Callable[[ZenohKey, bool], None]) -> None:
@@ -33,11 +33,11 @@ class Publisher:
         self._publishers: dict[str, zenoh.Publisher | ext.AdvancedPublisher] = {}
         self._read: set[str] = set()
         self._listeners: list[zenoh.MatchingListener[None]] = []
-        #: How many samples zenoh refused.
+        #: Samples that zenoh rejected.
         self.failed = 0
 
     def declare(self, session: zenoh.Session, key: ZenohKey, name: str) -> None:
-        """Declare a key's publisher; `name`: the key in full. Called on the session's thread."""
+        """Declare a key's publisher; `name`: the full key. Called on the session's thread."""
         if key.kept:
             self._publishers[key.suffix] = self._declare_kept(session, key, name)
             return
@@ -46,7 +46,7 @@ class Publisher:
             encoding=self._payloads.encoding(key),
             congestion_control=zenoh.CongestionControl.DROP,
             priority=zenoh.Priority.DATA,
-            # A link of datagrams carries it as such; TCP does as ever.
+            # Lets a datagram link send it unreliably; TCP ignores it.
             reliability=zenoh.Reliability.BEST_EFFORT,
         )
         self._publishers[key.suffix] = publisher
@@ -54,7 +54,7 @@ class Publisher:
         def changed(status: zenoh.MatchingStatus) -> None:
             post(self._loop, self._changed, key, status.matching)
 
-        # It is called at once if somebody reads already.
+        # Called at once if there is a subscriber already.
         self._listeners.append(publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False)))
 
     def _declare_kept(self, session: zenoh.Session, key: ZenohKey, name: str) -> ext.AdvancedPublisher:
@@ -64,7 +64,7 @@ class Publisher:
             name,
             encoding=self._payloads.encoding(key),
             congestion_control=zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP,
-            # Each priority has a queue of its own: samples that wait do not hold up telemetry.
+            # Each priority has its own queue: waiting samples do not delay telemetry.
             priority=zenoh.Priority.DATA_LOW if reliable else zenoh.Priority.DATA,
             cache=ext.CacheConfig(max_samples=key.kept),
             sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_LAST_NUMBER_S),
@@ -77,7 +77,7 @@ class Publisher:
         return STATE.suffix in self._publishers
 
     def has_readers(self, key: ZenohKey) -> bool:
-        """Tell whether anybody reads a key."""
+        """True if a key has subscribers."""
         return key.suffix in self._read
 
     def put(self, key: ZenohKey, body: Json) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Queries: they come in on zenoh's threads, are dealt with on the event loop, and answered on the session's thread."""
+"""Queries: received on zenoh's threads, handled on the event loop, answered on the session's thread."""
 
 import asyncio
 import threading
@@ -31,7 +31,7 @@ _log = structlog.get_logger()
 
 
 class QueryRefused(Exception):
-    """Why a query is not answered; one sentence. `result`: what there is to say beyond it."""
+    """The query gets an error; one sentence. `result`: further data for the client."""
 
     def __init__(self, text: str, result: Json | None = None) -> None:
         super().__init__(text)
@@ -39,27 +39,27 @@ class QueryRefused(Exception):
 
 
 class Question:
-    """One query that waits for its answer."""
+    """One query waiting for its reply."""
 
     def __init__(self, query: zenoh.Query, name: str, thread: SessionThread) -> None:
         self._query = query
         self._thread = thread
-        #: The key in full.
+        #: The full key.
         self.name = name
 
     @property
     def size(self) -> int:
-        """Bytes of what was sent along."""
+        """The size of the payload, bytes."""
         payload = self._query.payload
         return 0 if payload is None else len(payload)
 
     def payload(self) -> bytes:
-        """Return what was sent along."""
+        """The payload; empty if there is none."""
         payload = self._query.payload
         return b"" if payload is None else payload.to_bytes()
 
     def parameter(self, name: str) -> str | None:
-        """Return what the selector says after `?`."""
+        """A parameter of the selector; None if it is not given."""
         return self._query.parameters.get(name)
 
     def tell(self, data: bytes, encoding: zenoh.Encoding) -> None:
@@ -78,16 +78,16 @@ class Question:
         self._thread.submit(answer, is_reply=True)
 
     def end(self) -> None:
-        """Say that nothing more follows."""
+        """Mark the last reply as sent."""
         self._thread.submit(self._query.drop, is_reply=True)
 
 
-#: Deals with a question; QueryRefused, ControlError, StoreError and ValueError become the error that is sent.
+#: Handles a query; QueryRefused, ControlError, StoreError and ValueError become the error reply.
 Answerer = Callable[[Question], Awaitable[None]]
 
 
 class Queries:
-    """Starts a task for each query, so many at once."""
+    """Starts a task per query, up to a maximum."""
 
     def __init__(self, thread: SessionThread) -> None:
         self._thread = thread
@@ -109,7 +109,7 @@ class Queries:
         session.declare_queryable(name, zenoh.handlers.Callback(asked, indirect=False))
 
     async def close(self) -> None:
-        """Tell those who wait that no answer will come."""
+        """Tell waiting clients that they get no reply."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

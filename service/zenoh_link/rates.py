@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often each group goes out: the profile, the owner's limits, and for a while what a subscriber asks for. Sans-IO.
+"""The rate of each group: the profile, the owner's limits, and for a while a subscriber's request. Sans-IO.
 
 Times are seconds of a monotonic clock.
 """
@@ -15,9 +15,9 @@ from service.zenoh_link.settings import STATE_NAME, Profile
 _METERED_S = 5.0
 _METERED_STATE_S = 15.0
 _AT_ONCE = {Group.STATUS: ("armed", "mode"), Group.GPS: ("fix",), Group.LINK: ("state", "flight_controller")}
-#: Groups this rare wait for each other and share packets, each of which costs 100 bytes of headers.
+#: Groups with this interval or more share packets, each of which costs 100 bytes of headers.
 GATHERED_FROM_S = 1.0
-#: A subscriber's request ends by itself: the owner pays for it.
+#: A subscriber's request expires, because the owner pays for the data.
 MAX_REQUEST_S = 3600.0
 MAX_REQUEST_HZ = 50.0
 
@@ -32,11 +32,11 @@ class SampleRates:
         self._requests: dict[str, tuple[float, float]] = {}
         self._due_at: dict[str, float] = {}
         self._sent: dict[str, object] = {}
-        #: Groups whose newest sample was not sent, because it came too early.
+        #: Groups whose newest sample came too early to be sent.
         self.held_back: set[Group] = set()
 
     def admits(self, group: Group, sample: Any, now: float, *, gathered: bool = False) -> bool:
-        """True if this sample of a group goes out now. `gathered`: with all others that are held back."""
+        """True if this sample goes out now. `gathered`: together with all others that are held back."""
         if group.value not in self._interval_s:
             return True
         marks = [getattr(sample, name) for name in _AT_ONCE.get(group, ())]
@@ -46,16 +46,16 @@ class SampleRates:
         return admitted
 
     def admits_state(self, marks: object, now: float) -> bool:
-        """True if the state goes out now. `marks`: a change of these cannot wait."""
+        """True if the state goes out now. `marks`: values whose change is sent at once."""
         return STATE_NAME not in self._interval_s or self._admits(STATE_NAME, marks, now)
 
     def request(self, name: str, rate_hz: float, until: float) -> None:
-        """Raise a rate until then. The owner's own is never undercut."""
+        """Raise a rate until that time. The owner's own rate stays the minimum."""
         self._requests[name] = (1 / rate_hz, until)
         self._due_at.pop(name, None)
 
     def describe(self, now: float) -> dict[str, float | None]:
-        """The greatest rate of each name at present, Hz; None: as fast as the flight controller is polled."""
+        """The present maximum rate of each name, Hz; None: as fast as the flight controller is polled."""
         names = [group.value for group in Group] + [STATE_NAME]
         return {name: round(1 / self._current_s(name, now), 3) if name in self._interval_s else None for name in names}
 
@@ -65,7 +65,7 @@ class SampleRates:
         if interval_s == inf or (now < self._due_at.get(name, -inf) and self._sent.get(name) == marks):
             return False
         self._sent[name] = marks
-        # The same instants for all groups, so that they share packets; and 10 Hz become 4 Hz, not 3.3.
+        # The same instants for all groups, so that they share packets; and 10 Hz becomes 4 Hz, not 3.3.
         self._due_at[name] = (now // interval_s + 1) * interval_s
         return True
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes schemas/*.json, the published JSON Schema of each key, from the types that the payloads are made of.
+"""Writes schemas/*.json, the published JSON Schema of each key, from the payload types.
 
-`make zenoh-schemas` does it; a test says when the files are not up to date.
+Run by `make zenoh-schemas`; a test checks that the files are up to date.
 """
 
 import json
@@ -34,7 +34,7 @@ _CHECKSUM: Json = {"type": "string", "pattern": "^[0-9a-f]{8}$", "description": 
 
 
 def schemas() -> dict[str, Json]:
-    """Return the schema of each payload by its file's name."""
+    """The schema of each payload, by file name."""
     items = {"type": "array", "items": _of(MissionItem) | {"properties": _fields(MissionItem) | _ITEM_FIELDS}}
     findings = {"type": "array", "items": _of(Finding)}
     upload = {
@@ -82,7 +82,7 @@ def _published(name: str) -> Json:
 
 
 def numbered(schema: Json, published: Json) -> Json:
-    """Give each field its number: the one that was published, or for a new field the next one."""
+    """Give each field its number: the published one, or for a new field the next free one."""
     schema, inner, known = dict(schema), object_schema(schema), object_schema(published)
     if inner is not schema and (choices := schema.get("anyOf")):
         schema["anyOf"] = [numbered(each, known) if each is inner else each for each in choices]
@@ -142,7 +142,7 @@ def _fields(kind: type) -> Json:
 
 
 def _of(hint: Any) -> Json:
-    """Return the schema of a type."""
+    """The schema of a type."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _of(arguments[0]) | {"description": arguments[1]}
@@ -161,7 +161,7 @@ def _of(hint: Any) -> Json:
 
 
 def text(schema: Json) -> str:
-    """Return a file's contents."""
+    """The contents of a file."""
     return json.dumps(schema, indent=2) + "\n"
 
 

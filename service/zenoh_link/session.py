@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The zenoh session, and the thread on which everything happens that may wait: opening, closing, reliable samples.
+"""The zenoh session, and the thread for everything that may block: opening, closing, reliable samples.
 
-zenoh itself connects and connects again, in threads of its own. The event loop never waits for any of it.
+zenoh connects and reconnects in its own threads. The event loop never waits for any of it.
 """
 
 import threading
@@ -15,17 +15,17 @@ from service.zenoh_link.configuration import in_short
 
 Job = Callable[[], None]
 
-#: Samples and replies that wait for a slow receiver; then the oldest give way.
+#: Samples and replies that wait for a slow receiver; beyond this the oldest are dropped.
 _MAX_WAITING = 256
 _RETRY_S = 2.0
-#: A receiver that is stalled must not hold the daemon's end up; the process may end without a farewell.
-_FAREWELL_S = 0.6
+#: A stalled receiver must not delay the daemon's end: then the session ends without closing.
+_CLOSE_TIMEOUT_S = 0.6
 
 _log = structlog.get_logger()
 
 
 class SessionThread:
-    """Opens the session again and again until it is open, has `declare` set it up, then does jobs in their order."""
+    """Retries until the session is open, calls `declare` to set it up, then runs jobs in their order."""
 
     def __init__(self, config: zenoh.Config, declare: Callable[[zenoh.Session], None]) -> None:
         self._config = config
@@ -35,18 +35,18 @@ class SessionThread:
         self._wake = threading.Condition()
         self._is_closing = False
         self._complaint = ""
-        #: How many samples and replies gave way.
+        #: Samples and replies that were dropped.
         self.dropped = 0
         self._thread = threading.Thread(target=self._run, name="zenoh session", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def submit(self, job: Job, *, is_reply: bool = False) -> None:
-        """Have something done on the thread; if too much waits already, the oldest is left undone.
+        """Run a job on the thread; if too many are waiting, the oldest one is dropped.
 
-        Whoever asks a thousand questions must not displace reports: replies give way themselves.
+        A flood of queries must not displace reports: in that case replies are dropped first.
         """
         with self._wake:
             if is_reply and len(self._jobs) >= _MAX_WAITING // 2:
@@ -63,19 +63,19 @@ class SessionThread:
         return None if self._session is None else self._session.new_timestamp()
 
     def close(self) -> None:
-        """Close the session, and wait for that only a moment."""
+        """Close the session; waits for that only briefly."""
         with self._wake:
             self._is_closing = True
             self._wake.notify()
-        farewell = threading.Thread(target=self._close, name="zenoh farewell", daemon=True)
-        farewell.start()
-        farewell.join(_FAREWELL_S)
-        if farewell.is_alive():
+        closer = threading.Thread(target=self._close, name="zenoh closer", daemon=True)
+        closer.start()
+        closer.join(_CLOSE_TIMEOUT_S)
+        if closer.is_alive():
             _log.warning("zenoh.closed_without_farewell", what="a receiver is stalled")
 
     def _close(self) -> None:
-        # What was to be said last is said first: the thread ends when nothing waits any more.
-        self._thread.join(_FAREWELL_S / 2)
+        # The last jobs still run: the thread ends when none is waiting.
+        self._thread.join(_CLOSE_TIMEOUT_S / 2)
         if self._session is not None:
             try:
                 self._session.close()  # type: ignore[no-untyped-call]
@@ -94,7 +94,7 @@ class SessionThread:
             try:
                 job()
             except (zenoh.ZError, TypeError, ValueError) as error:
-                # Of the encoders, too: one sample must not end all others.
+                # Encoders may fail as well: one sample must not stop all others.
                 self._complain("zenoh.not_sent", error)
 
     def _open(self) -> zenoh.Session | None:
@@ -113,7 +113,7 @@ class SessionThread:
         return None
 
     def _complain(self, event: str, error: Exception) -> None:
-        """Tell of a fault once, not of each time that it comes again."""
+        """Log an error once, not each time that it repeats."""
         why = in_short(error)
         level = _log.debug if why == self._complaint else _log.warning
         level(event, why=why)

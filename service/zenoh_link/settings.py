@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the daemon joins zenoh: the `[zenoh]` table of the configuration file."""
+"""The `[zenoh]` table of the configuration file."""
 
 import re
 import socket
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bridge.model.vehicle_groups import Group
 
-#: What must be written to take commands from whoever reaches the session.
+#: The value that allows commands without authentication.
 I_KNOW = "I know"
 DEFAULT_PREFIX = "fleet"
 _FORBIDDEN = re.compile(r"[*$?#/\s\x00-\x1f\x7f]")
@@ -22,36 +22,36 @@ class ZenohSettingsError(ValueError):
 
 
 class PayloadEncoding(Enum):
-    """How payloads are written."""
+    """The encoding of payloads."""
 
     JSON = "json"
     CBOR = "cbor"
 
 
 class Profile(Enum):
-    """What a vehicle's link may cost."""
+    """How much data a vehicle's link may use."""
 
     FULL = "full"
     METERED = "metered"
 
 
-#: The name of the `state` key among the groups' names, where rates are given.
+#: The name of the `state` key in tables of rates.
 STATE_NAME = "state"
 _MAX_RATE_HZ = 50.0
 
 
 def host_name() -> str:
-    """Return this machine's name as a vehicle's: what a key cannot hold becomes a dash."""
+    """The machine's name as a vehicle name: characters that a key cannot hold become dashes."""
     return _FORBIDDEN.sub("-", socket.gethostname()).lstrip("@")[:_MAX_NAME] or "vehicle"
 
 
 @dataclass(frozen=True, slots=True)
 class ZenohSettings:
-    """How the daemon joins zenoh. Endpoints are zenoh's: "tcp/192.168.4.1:7447".
+    """The `[zenoh]` table. Endpoints are in zenoh's form: "tcp/192.168.4.1:7447".
 
-    `config_file`: a zenoh configuration that is passed through; ours applies where it is silent.
-    `rates`: greatest rate of a group, or of "state", Hz; 0: never.
-    `commands`: whether @cmd is answered; without authentication only if `commands_without_authentication` is "I know".
+    `config_file`: a zenoh configuration file; the bridge's defaults complete it.
+    `rates`: maximum rate of a group, or of "state", Hz; 0: never.
+    `commands`: True if @cmd is answered; without authentication only if `commands_without_authentication` is "I know".
     """
 
     prefix: str = DEFAULT_PREFIX
@@ -74,7 +74,7 @@ class ZenohSettings:
 def check_rates(rates: object) -> dict[str, float]:
     """Read rates in Hz by the groups' names, and "state"; ZenohSettingsError."""
     names = [*(group.value for group in Group), STATE_NAME]
-    assert isinstance(rates, dict)  # the settings' reader says so
+    assert isinstance(rates, dict)  # checked by the settings' reader
     for name, hz in rates.items():
         if name not in names:
             raise ZenohSettingsError(f"zenoh.rates has no group {name!r}: there are {', '.join(names)}")
@@ -84,7 +84,7 @@ def check_rates(rates: object) -> dict[str, float]:
 
 
 def check_name(setting: str, name: str) -> None:
-    """Say what is wrong with a name that cannot be one chunk of a key: ZenohSettingsError."""
+    """ZenohSettingsError if a name cannot be one chunk of a key."""
     bad = _FORBIDDEN.search(name)
     if not name:
         wrong = "empty"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From zenoh's threads to the event loop."""
+"""The way from zenoh's threads to the event loop."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,6 +10,6 @@ Arguments = TypeVarTuple("Arguments")
 
 
 def post(loop: asyncio.AbstractEventLoop, callback: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
-    """Call back on the loop; nothing comes of it if the loop has ended, as zenoh may notice a moment later."""
+    """Call back on the loop; ignored if the loop has ended, because zenoh may notice that a moment later."""
     with suppress(RuntimeError):
         loop.call_soon_threadsafe(callback, *arguments)

@@ -26,7 +26,7 @@ class TimeRange:
 
 
 def parse_time_range(text: str, now_s: float) -> TimeRange:
-    """Read a range; ValueError says how one looks."""
+    """Read a range; ValueError explains the form."""
     match = _RANGE.fullmatch(text.strip())
     if match is None:
         raise _wrong(text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is said at each key, as plain data: the bodies of docs/zenoh.md's payloads."""
+"""The plain data published at each key: the bodies of docs/zenoh.md's payloads."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -14,7 +14,7 @@ from service.zenoh_link.time_source import time_source
 
 
 class VehicleData:
-    """Asks the bridge. `others`: the bridges of the same name."""
+    """Reads the bridge. `others`: bridges with the same name."""
 
     def __init__(self, vehicle: str, bridge: Bridge, others: set[str]) -> None:
         self._vehicle = vehicle
@@ -22,7 +22,7 @@ class VehicleData:
         self._others = others
 
     def state(self) -> Json:
-        """Return everything that is known."""
+        """The whole state."""
         return {
             "vehicle": self._vehicle,
             "others_of_this_name": len(self._others),
@@ -32,7 +32,7 @@ class VehicleData:
 
 
 def mission_current(held: HeldMission | None) -> Json:
-    """Return what the flight controller holds."""
+    """The mission held by the flight controller."""
     if held is None:
         return {"count": None, "checksum": None, "items": None}
     return {
@@ -43,12 +43,12 @@ def mission_current(held: HeldMission | None) -> Json:
 
 
 def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
-    """Return the payload of one event."""
+    """The payload of one event."""
     return {"level": level, "event": name, "facts": {key: _fact(value) for key, value in facts.items()}}
 
 
 def mission_report(mission: ArrivedMission, delivery: Delivery) -> Json:
-    """Return how a mission that came in ended."""
+    """The result of a received mission."""
     verdict = mission.verdict
     body: Json = strict(
         {
