@@ -222,6 +222,7 @@ class Ground:
     def greet(self, peer: Peer, heartbeat: Message) -> None:
         """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it goes on."""
         self._write(peer, heartbeat, self._version(peer))
+        self._introduce(peer, heartbeat)
 
     def broadcast(self, message: Message) -> None:
         """Send a message to everyone."""
@@ -247,11 +248,14 @@ class Ground:
         until it has seen MAVLink 2, which it reads from the start. So where all is signed it needs no MAVLink 1.
         """
         for peer in self.everyone():
-            if peer.link in self._signers or peer is RECORDER:
-                continue
-            other = 1 if self._stations.is_unknown(peer) else 2
-            if self._stations.version(peer) != other:
-                self._write(peer, heartbeat, other)
+            self._introduce(peer, heartbeat)
+
+    def _introduce(self, peer: Peer, heartbeat: Message) -> None:
+        if peer.link in self._signers or peer is RECORDER:
+            return
+        other = 1 if self._stations.is_unknown(peer) else 2
+        if self._stations.version(peer) != other:
+            self._write(peer, heartbeat, other)
 
     def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
         """Show a text on one ground station or on all."""

@@ -94,7 +94,7 @@ def test_no_writers_at_all(tmp_path: Path) -> None:
         ("7", "neither text nor a table"),
         ("{}", "neither text nor a table"),
         ("{address = 7}", "neither text nor a table"),
-        ('{address = "udp:x"}', "is no ground station connection"),
+        ('{address = "radio:x"}', "is no ground station connection"),
         (f'{{address = "{LINK}", keyfile = "k"}}', "'keyfile' is no setting of a link; known are address, key_file"),
         (f'{{address = "{LINK}", key_file = 7}}', "key_file must be the name of a file"),
         (f'{{address = "{LINK}", key_file = ""}}', "key_file must be the name of a file"),
