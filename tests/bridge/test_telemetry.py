@@ -10,7 +10,7 @@ import pytest
 from conversations import waypoints
 from world import GroundStation, World
 
-from bridge.line.poll_schedule import POLLS
+from bridge.controllers.harakiri import profile as harakiri
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
@@ -21,7 +21,7 @@ from simulator.options import Faults, SimOptions
 m = messages
 ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)
 #: Question and reply of Harakiri's telemetry, bytes.
-ROUND_TRIPS = {104: 28, 101: 23, 102: 30, 105: 28, 106: 26, 108: 20, 109: 18, 110: 17, 118: 25}
+ROUND_TRIPS = {104: 28, 101: 23, 102: 30, 105: 28, 106: 26, 108: 20, 109: 18, 110: 17, 113: 42, 118: 25}
 ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
 
 
@@ -226,12 +226,12 @@ def test_telemetry_takes_its_share_of_the_line_and_no_more(baud: int) -> None:
     assert 0.45 * baud / 10 < bytes_per_s <= (0.6 + burst) * baud / 10
     world.assert_line_was_clean()
     assert world.naze.counters.max_outstanding_reply_bytes <= 224
-    assert set(polls(world)) == {poll.command for poll in POLLS}
+    assert set(polls(world)) == {poll.command for poll in harakiri.PATCHED.polls}
 
 
 @pytest.mark.parametrize(("baud", "attitude_hz", "position_hz", "status_hz"), [
     (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
-    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 1.3, 0.25, 0.7),
+    (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 0.9, 0.25, 0.7),
 ])  # fmt: skip
 def test_the_rates_without_a_wish(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
     world, station = flown(5, baud=baud)
