@@ -21,10 +21,14 @@ from pathlib import Path
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import ENVIRONMENT, NAZE_BRIDGE, ROOT, daemon, free_udp_port, wait_for
-from benchmarks.zenoh_programs import client, configuration, cpu_s, router_program
+from benchmarks.zenoh_programs import ALL_TELEMETRY, client, configuration, cpu_s, router_program
 from protocols.mission_file import write_qgc_wpl
+from service.zenoh_link.keys import STATE, full
+from service.zenoh_link.settings import DEFAULT_PREFIX
 
 _FEW, _MANY = 5, 50
+_STATES = full(DEFAULT_PREFIX, "*", STATE.suffix)
+_TELEMETRY = full(DEFAULT_PREFIX, "*", ALL_TELEMETRY)
 _LISTS = 7
 _WATCHED_S = 10.0
 _OPEN = "import json, sys, zenoh; c = zenoh.Config(); c.insert_json5('mode', json.dumps('client'))"
@@ -86,7 +90,7 @@ def _cost(folder: Path, count: int, endpoint: str, router: int, vehicles: Sequen
     push_s = time.perf_counter() - began_at
     answers = json.loads(pushed.stdout)["vehicles"]
     failed = count - sum(answer["ok"] for answer in answers)
-    with client(endpoint) as session, session.declare_subscriber("fleet/*/telemetry/*", lambda _: None):
+    with client(endpoint) as session, session.declare_subscriber(_TELEMETRY, lambda _: None):
         time.sleep(1.0)
         before = cpu_s(router), sum(map(cpu_s, vehicles))
         time.sleep(_WATCHED_S)
@@ -108,7 +112,7 @@ def _timed(command: Sequence[str]) -> float:
 def _wait_for_vehicles(endpoint: str, count: int) -> None:
     def are_there() -> bool:
         time.sleep(0.2)
-        states = [json.loads(reply.ok.payload.to_bytes()) for reply in session.get("fleet/*/state") if reply.ok]
+        states = [json.loads(reply.ok.payload.to_bytes()) for reply in session.get(_STATES) if reply.ok]
         return sum(state["mission"] is not None for state in states) == count
 
     with client(endpoint) as session:

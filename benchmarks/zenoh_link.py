@@ -23,7 +23,7 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.idle import LIBRARIES, libraries_mb, listener, resident_mb, udpout
 from benchmarks.processes import BenchmarkError, daemon, running, wait_for
 from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, wish
-from benchmarks.zenoh_programs import client, configuration, router_program
+from benchmarks.zenoh_programs import ALL_TELEMETRY, client, configuration, router_program
 from bridge.model.vehicle import Orientation
 from bridge.model.vehicle_groups import Group
 from service.daemon import Daemon
@@ -32,7 +32,7 @@ from service.settings import Settings
 from service.zenoh_link.configuration import make_config
 from service.zenoh_link.keys import TELEMETRY, full
 from service.zenoh_link.node import Node
-from service.zenoh_link.settings import ZenohSettings
+from service.zenoh_link.settings import DEFAULT_PREFIX, ZenohSettings
 
 _VEHICLE = "naze"
 _SETTLING_S = 2.0
@@ -70,7 +70,7 @@ def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
                 number = round(json.loads(sample.payload.to_bytes())["roll_deg"] * 10) % ATTITUDES
                 milliseconds.append((came_at - controller.attitudes_at[number]) * 1000)
 
-        with session.declare_subscriber(full("fleet", _VEHICLE, "telemetry/*"), heard):
+        with session.declare_subscriber(full(DEFAULT_PREFIX, _VEHICLE, ALL_TELEMETRY), heard):
             time.sleep(_SETTLING_S)
             drain(ground)
             samples.clear()

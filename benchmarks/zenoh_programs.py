@@ -12,6 +12,10 @@ from pathlib import Path
 import zenoh
 
 from benchmarks.processes import ROOT, running, wait_for
+from service.zenoh_link.keys import VERSION
+
+#: The suffix of all of a vehicle's telemetry keys.
+ALL_TELEMETRY = f"v{VERSION}/telemetry/*"
 
 
 @contextmanager
