@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bridge as a whole: one flight controller on one side, ground stations on the other. Sans-IO.
 
-The service feeds bytes, time and the store's answers in, and afterwards takes what is to be sent, stored and said.
-A byte's way from the UART:
+The service feeds in bytes, time and the store's answers, and then takes the output for lines, links and the store.
+The path of a byte from the UART:
     fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take_datagrams
-A mission item's way to the flight controller, and back for the proof:
+The path of a mission item to the flight controller, and back for verification:
     gcs_received -> Ground -> Guard -> MessageRouter -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
-An autopilot that speaks MAVLink for itself is not represented but passed through, both ways:
+An autopilot that speaks MAVLink itself is not represented but passed through, both ways:
     FcSession <-> PassThrough <-> Ground
 """
 
@@ -109,29 +109,29 @@ class Bridge:
 
     @property
     def speed(self) -> int | None:
-        """Return what the port must be set to, baud."""
+        """The speed to set the port to, baud."""
         return self.session.speed
 
     @property
     def is_passing_through(self) -> bool:
-        """Tell whether an autopilot speaks MAVLink for itself, so that nobody here waits for the next byte."""
+        """True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes."""
         return self._incoming.routes is not None and isinstance(self.session.state, Mavlink)
 
     def fc_opened(self, now: float) -> None:
-        """Take note that the port is open."""
+        """The port is open."""
         self.session.opened(now)
 
     def fc_closed(self, now: float, why: str | None) -> None:
-        """Take note that the port is gone; `why` is None if we closed it ourselves."""
+        """The port is gone; `why` is None if the bridge closed it."""
         self.session.closed(now, why)
 
     def fc_received(self, data: bytes, now: float) -> None:
-        """Take bytes from the port."""
+        """Handle bytes from the port."""
         self.session.received(data, now)
         self._pass_on_news(now)
         armed = self.session.vehicle.armed
         if armed is None or armed == self._was_armed:
-            # What is not known is no change: a Harakiri that arms may fall silent first.
+            # Unknown is not a change: a Harakiri that arms may fall silent first.
             return
         if armed:
             self._uploads.armed(now)
@@ -140,13 +140,13 @@ class Bridge:
         self._was_armed = armed
 
     def take_fc_output(self) -> list[bytes]:
-        """Return what is to be written to the port at the present `speed`."""
+        """The bytes to be written to the port at the present `speed`."""
         return self.session.take_output()
 
     # The ground stations' side.
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        """Take bytes from a ground station. A datagram holds whole frames only."""
+        """Handle bytes from a ground station. A datagram holds whole frames only."""
         self._incoming.received(peer, data, now, datagram=datagram)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
@@ -156,7 +156,7 @@ class Bridge:
         self._left(peer)
 
     def link_closed(self, name: str, now: float) -> None:
-        """A link to ground stations is given up, and all who were heard on it are gone."""
+        """A link is closed, and all ground stations on it are gone."""
         for peer in self.ground.remove_link(name):
             self._uploads.peer_gone(peer, now)
             self._left(peer)
@@ -164,7 +164,7 @@ class Bridge:
     # The store.
 
     def take_store_effects(self) -> list[StoreEffect]:
-        """Return what is to be done in the store; each is answered by `store_answered`."""
+        """The pending store operations; the service answers each with `store_answered`."""
         effects = self._store_effects[:]
         self._store_effects.clear()
         return effects
@@ -174,40 +174,40 @@ class Bridge:
         self.runner.store_answered(effect, answer, now)
 
     def take_mission_endings(self) -> list[tuple[ArrivedMission, Delivery]]:
-        """Return the missions that were dealt with to their end, and how."""
+        """The missions concluded since the last call, each with its result."""
         endings, self._mission_endings = self._mission_endings, []
         return endings
 
     @property
     def transfer(self) -> MissionTransfer | None:
-        """The mission that is received or written at this moment."""
+        """The mission being received or written."""
         return self.missions.writing or self._uploads.receiving
 
     # The end.
 
     @property
     def is_conversing(self) -> bool:
-        """Tell whether something that was begun is not ended yet."""
+        """True while a conversation or transfer is unfinished."""
         return self.runner.is_busy
 
     def stop_missions(self, now: float) -> None:
-        """Begin no more transfers. An upload whose items are still coming in ends; a push under way goes on."""
+        """Accept no more transfers. An upload that still receives items ends; a running push continues."""
         self.missions.close()
         self._uploads.stop(now)
 
     def abort_missions(self, now: float) -> None:
-        """End a push under way: the flight controller keeps its old list, and the store and who sent it are told."""
+        """End a running push: the flight controller keeps its old list; the store and the sender get the result."""
         self.runner.stop(now)
 
     # Time.
 
     def restart(self, why: str, now: float) -> None:
-        """Recover from a fault of our own: end the running conversation and search for the flight controller again."""
+        """Recover from a bug: end the running conversation and search for the flight controller again."""
         self.runner.reset(now)
         self.session.restart(why, now)
 
     def tick(self, now: float) -> None:
-        """Do what is due."""
+        """Run the timers of all parts."""
         self.session.tick(now)
         self._pass_on_news(now)
         self.runner.tick(now)
@@ -220,7 +220,7 @@ class Bridge:
             self._vehicle.tick(now)
 
     def next_deadline(self) -> float:
-        """Return when `tick` has something to do."""
+        """The time of the next `tick`."""
         deadlines = (
             self.session.next_deadline(),
             self.runner.next_deadline(),
@@ -233,12 +233,12 @@ class Bridge:
         return min((deadline for deadline in deadlines if deadline is not None), default=inf)
 
     def _say(self, news: tuple[Severity, str] | None) -> None:
-        # An autopilot that speaks for itself is not spoken for.
+        # The bridge sends nothing in the name of an autopilot that speaks MAVLink itself.
         if news is not None and self._incoming.routes is None:
             self.ground.say(*news)
 
     def _newcomer(self, peer: Peer) -> None:
-        # An autopilot that speaks for itself is not spoken for.
+        # The bridge sends nothing in the name of an autopilot that speaks MAVLink itself.
         if self._incoming.routes is None:
             self._vehicle.newcomer(peer)
 
@@ -259,11 +259,11 @@ class Bridge:
         self._incoming.routes = PassThrough(self.ground) if is_passed_through else None
         self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
-            # What it holds is known from the start: MISSION_CURRENT counts it, a first Read is answered at once.
+            # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
             self._watch.look(now)
 
     def _open_store(self, controller: FlightController | None) -> AnyFcMissionStore | Refusal:
-        """How missions are written to this flight controller, or why not."""
+        """The mission store of this flight controller, or the reason that it has none."""
         if controller is None:
             return NO_LINK
         profile = controller.profile
@@ -301,4 +301,4 @@ class Bridge:
 
 
 def _drop(_frames: Sequence[bytes]) -> None:
-    """The log of a bridge that keeps none."""
+    """The frame listener of a bridge without a log."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How one bridge is set up."""
+"""The configuration of one bridge."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,11 +13,11 @@ from bridge.gcs.guard import LinkAccess
 
 @dataclass(frozen=True, slots=True)
 class BridgeConfig:
-    """How one bridge is set up. `speeds`: what the port may run at, (None,) where it has no speed.
+    """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it has no speed.
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
-    `links`: who may write over which link, by its name; over others everyone may. `passes_everything`: an autopilot
-    that speaks MAVLink for itself gets commands over those others, too.
+    `links`: access rules by link name; every station may write over other links. `passes_everything`: an autopilot
+        that speaks MAVLink itself gets commands over those other links, too.
     """
 
     speeds: Sequence[int | None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much one ground station, and all together, may make the bridge do. Sans-IO: the time is passed in."""
+"""Rate limits for each ground station and for all of them together. Sans-IO: the time is passed in."""
 
 from collections.abc import Callable, Iterable
 
@@ -8,7 +8,7 @@ from bridge.gcs.station import Peer
 
 
 class TokenBucket:
-    """Allows `rate`, counted from when it was last full."""
+    """A token bucket for `rate`; the count restarts whenever the bucket is full."""
 
     def __init__(self, rate: Rate) -> None:
         self.rate = rate
@@ -16,7 +16,7 @@ class TokenBucket:
         self._counted_at = 0.0
 
     def has(self, now: float) -> bool:
-        """Whether one more is allowed now."""
+        """True if one more is allowed now."""
         self._tokens = min(self.rate.burst, self._tokens + max(0.0, now - self._counted_at) * self.rate.per_s)
         self._counted_at = now
         return self._tokens >= 1.0
@@ -27,21 +27,21 @@ class TokenBucket:
 
 
 class Budgets:
-    """Counts what each peer has cost.
+    """Counts the work that each peer causes.
 
-    `has_standing`: a peer that has proven who it is, or was there before the crowd. It is held to its own limit only,
-    so strangers cannot use up the pilot's share.
+    `has_standing`: True for a peer that has authenticated, or that connected before a link filled up. Only its own
+        limit applies to it, so strangers cannot use up the pilot's share.
     """
 
     def __init__(self, has_standing: Callable[[Peer], bool]) -> None:
         self._has_standing = has_standing
         self._peers: dict[tuple[Cost, Peer], TokenBucket] = {}
         self._totals = {cost: TokenBucket(limit.total) for cost, limit in LIMITS.items()}
-        #: How often each was not allowed.
+        #: How often each limit was exceeded.
         self.exceeded = dict.fromkeys(Cost, 0)
 
     def allows(self, cost: Cost, peer: Peer, now: float) -> bool:
-        """Count one for a peer; False if that would be too many."""
+        """Count one for a peer; False if that exceeds a limit."""
         own = self._peers.get((cost, peer))
         if own is None:
             own = self._peers[cost, peer] = TokenBucket(LIMITS[cost].each)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What ground stations may make the bridge do, and how often.
+"""The limits on the work that ground stations may cause.
 
-Each limit is far above what a ground station needs and far below what hurts the pilot or the board.
+Each limit is far above a ground station's needs and far below a load that would hurt the pilot or the board.
 """
 
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from enum import Enum, auto
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """So many a second in the long run, and so many at once."""
+    """A sustained rate per second, and a burst size."""
 
     per_s: float
     burst: float
 
 
 class Cost(Enum):
-    """What is limited.
+    """The limited kinds of work.
 
-    ANSWER: a message sent because it was asked for. Mission Planner asks for some twenty when it connects.
-    TRANSFER: a message of a mission transfer; an item that is asked for at once comes a thousand times a second.
-    TEXT: a STATUSTEXT that a station causes: a mission of 146 items may need one for each.
-    BOARD: a question to the flight controller, which has a few hundred bytes a second to spare.
-    PASSED: a frame for an autopilot that speaks MAVLink for itself, over a slow line.
-    FLASH: a write to the board's flash, of which its pages take 10,000.
-    STORED: a list that was not flown, kept in the store.
-    RECORDED: a frame from a ground station in the telemetry log, of which the flight itself needs most.
+    ANSWER: a message sent on request. Mission Planner requests about twenty when it connects.
+    TRANSFER: a message of a mission transfer; over a fast link there may be a thousand items a second.
+    TEXT: a STATUSTEXT that a station causes; a mission of 146 items may need one for each.
+    BOARD: a request to the flight controller, which has a few hundred bytes a second to spare.
+    PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.
+    FLASH: a write to the board's flash, which endures 10,000 per page.
+        STORED: a list in the store that did not reach the flight controller.
+        RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
 
     ANSWER = auto()
@@ -41,7 +41,7 @@ class Cost(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """For each peer, and for all peers together that have no standing of their own (bridge.gcs.budget)."""
+    """A rate for each peer, and one for all peers without standing together (bridge.gcs.budget)."""
 
     each: Rate
     total: Rate
@@ -58,5 +58,5 @@ LIMITS = {
     Cost.RECORDED: Limit(Rate(50, 400), Rate(100, 800)),
 }
 
-#: What a ground station is told that goes over Cost.FLASH.
+#: The text for a ground station that exceeds Cost.FLASH.
 TOO_MANY_WRITES = "Too many writes to the board: wait a minute"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ground stations' side: who is there, what they sent, and what is on its way to them. Sans-IO."""
+"""The ground side: connected stations, received frames, and the queue of datagrams to send. Sans-IO."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,17 +19,17 @@ _TEXT_SIZE = 50
 
 #: Returns the signature of a MAVLink 2 frame.
 Signer = Callable[[bytes], bytes]
-#: Is shown the frames that are sent to ground stations or taken from them, each once.
+#: A frame listener: called with all frames to and from ground stations, each once.
 Tap = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
-    """All ground stations together. Implements `Post`. `on_newcomer`: a peer was heard for the first time.
+    """All ground stations together. Implements `Post`. `on_newcomer` is called when a peer is heard for the first time.
 
-    `standing`: what a peer may do (bridge.gcs.guard). One that may only read gets telemetry and answers, but no texts
+    `standing`: a peer's rights (bridge.gcs.guard). One that may only read gets telemetry and answers, but no texts
     for everyone, and is not recorded.
 
-    On a link that has a signer, by its name, all that we say is signed, and so MAVLink 2.
+    `signers` by link name: on such a link everything the bridge sends is signed, and so MAVLink 2.
     """
 
     def __init__(
@@ -57,29 +57,29 @@ class Ground:
         self._datagrams: list[tuple[Peer, bytes]] = []
         self._texts = RecentTexts()
         self._now = 0.0
-        #: What each newcomer is told: a trouble that began before it came.
+        #: A text for each newcomer, about a problem that began before it connected.
         self.notice = ""
         #: Frames from ground stations whose checksum was wrong.
         self.bad_frames = 0
         #: Whole frames from ground stations, by link and message id.
         self.frames_received: Counter[tuple[str, int]] = Counter()
-        self._everyone: list[Peer] | None = None  # counted anew after each change
+        self._everyone: list[Peer] | None = None  # recomputed after each change
 
-    # Who is there.
+    # The connected stations.
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool) -> None:
-        """Send to `peer` before it was heard; `until_answered`: only while nobody is heard on its link (broadcast)."""
+        """Send to `peer` before it is heard; `until_answered`: only while no peer is heard on its link (broadcast)."""
         self._default_peers[peer] = until_answered
         self._everyone = None
 
     def remove_default_peer(self, peer: Peer) -> None:
-        """Stop that."""
+        """Stop sending to a default peer."""
         self._default_peers.pop(peer, None)
         self._everyone = None
         self._writers.pop(peer, None)
 
     def remove_link(self, name: str) -> list[Peer]:
-        """Forget everybody on a link, and return those who were heard."""
+        """Forget all peers on a link; returns those that were heard."""
         for peer in [peer for peer in self._default_peers if peer.link == name]:
             self.remove_default_peer(peer)
         heard = [peer for peer in self.peers() if peer.link == name]
@@ -88,11 +88,11 @@ class Ground:
         return heard
 
     def peers(self) -> list[Peer]:
-        """Return the ground stations that were heard."""
+        """The ground stations that were heard."""
         return self._stations.peers()
 
     def everyone(self) -> Sequence[Peer]:
-        """All peers that are sent what is for everyone."""
+        """All peers that receive broadcasts."""
         if self._everyone is None:
             self._everyone = self._count_everyone()
         return self._everyone
@@ -108,7 +108,7 @@ class Ground:
         return [*heard, *unheard]
 
     def moved_to(self, station: Station, now: float) -> list[Station]:
-        """Return from where a station is heard that fell silent where it was: as a rule nowhere."""
+        """The new addresses of a station that fell silent at its old one: usually none."""
         return self._stations.moved_to(station, now)
 
     def gone(self, peer: Peer) -> None:
@@ -117,7 +117,7 @@ class Ground:
         self._forget(peer)
 
     def expire(self, now: float) -> list[Peer]:
-        """Forget the silent, and return them."""
+        """Forget silent peers, and return them."""
         self._now = now
         silent = self._stations.expire(now)
         for peer in silent:
@@ -129,7 +129,7 @@ class Ground:
         return silent
 
     def next_deadline(self) -> float | None:
-        """Return when `expire` may have something to do."""
+        """The time of the next `expire`."""
         return self._stations.next_deadline()
 
     def _forget(self, peer: Peer) -> None:
@@ -137,10 +137,10 @@ class Ground:
         self._splitters.pop(peer, None)
         self._writers.pop(peer, None)
 
-    # What they send.
+    # Received from them.
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> list[MavlinkFrame]:
-        """Take bytes from a peer, return the whole frames in them. A datagram holds whole frames only."""
+        """Parse bytes from a peer into frames. A datagram holds whole frames only."""
         self._now = now
         splitter = self._splitters.get(peer)
         if splitter is None:
@@ -152,11 +152,11 @@ class Ground:
         if datagram:
             frames += splitter.reset()
         self.bad_frames += splitter.bad_frames - bad_before
-        # Our own frames come back from a broadcast, or from a router that sends everything everywhere.
+        # Our own frames come back from a broadcast, or from a router that floods.
         return [frame for frame in frames if (frame.sysid, frame.compid) != (self._sysid, self._compid)]
 
     def heard(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
-        """Note a whole frame from a peer, which is there from now on."""
+        """Note a frame from a peer, which counts as connected from now on."""
         self.frames_received[peer.link, frame.msgid] += 1
         station = Station(peer, frame.sysid, frame.compid)
         is_listener = self._standing(peer) is Standing.LISTENER
@@ -168,12 +168,12 @@ class Ground:
                 self.say(Severity.WARNING, self.notice, station)
 
     def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
-        """Record a frame that is served."""
+        """Pass an accepted frame to the frame listener."""
         if not self._stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
             self.tap([frame.raw])
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """Which of a full link's connections makes room: none that has proven itself, if there are others."""
+        """The connection of a full link to drop; one with standing only if there is no other."""
         others = {peer: at for peer, at in peers.items() if self._standing(peer) is not Standing.PROVEN}
         return displaced(others or peers)
 
@@ -183,20 +183,20 @@ class Ground:
 
     @property
     def is_recording(self) -> bool:
-        """True while a flight is logged at the default rates, whatever ground stations ask for."""
+        """True while a flight is logged at the default rates, independent of the stations' requests."""
         return RECORDER in self._default_peers
 
     def record_flight(self, *, on: bool) -> None:
-        """Log everything that a watching ground station would get, whether or not there is one."""
+        """Log everything that a connected ground station would get, even if there is none."""
         if on:
             self.add_default_peer(RECORDER, until_answered=False)
         else:
             self.remove_default_peer(RECORDER)
 
-    # What they are sent.
+    # Sent to them.
 
     def take_datagrams(self) -> list[tuple[Peer, bytes]]:
-        """Return what is to be sent, in order: whole frames."""
+        """The datagrams to send, in order; each holds whole frames."""
         datagrams, self._datagrams = self._datagrams, []
         return datagrams
 
@@ -208,11 +208,11 @@ class Ground:
             self.tap([frame])
 
     def allows(self, station: Station, cost: Cost) -> bool:
-        """Count something that a ground station makes the bridge do; False if that is too much."""
+        """Count work that a ground station causes; False if that exceeds its limit."""
         return self.budgets.allows(cost, station.peer, self._now)
 
     def to_as(self, sysid: int, compid: int, station: Station, message: Message) -> None:
-        """Send a message to one ground station in the name of who was asked."""
+        """Send a message to one ground station under the ids that it addressed."""
         peer = station.peer
         frame = FrameWriter(sysid, compid, self._signers.get(peer.link)).frame(pack(message), self._version(peer))
         self._datagrams.append((peer, frame))
@@ -220,7 +220,7 @@ class Ground:
             self.tap([frame])
 
     def greet(self, peer: Peer, heartbeat: Message) -> None:
-        """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it goes on."""
+        """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it continues."""
         self._write(peer, heartbeat, self._version(peer))
         self._introduce(peer, heartbeat)
 
@@ -229,7 +229,7 @@ class Ground:
         self.multicast(pack(message), self.everyone())
 
     def multicast(self, packed: Packed, peers: Iterable[Peer]) -> None:
-        """Send a packed message to some."""
+        """Send a packed message to several peers."""
         frame = None
         is_logged = not self.is_recording
         for peer in peers:
@@ -242,10 +242,10 @@ class Ground:
             self.tap([frame])
 
     def introduce(self, heartbeat: Message) -> None:
-        """Send the heartbeat in the other MAVLink version too, where it is not known which one is understood.
+        """Send the heartbeat in the other MAVLink version too, to peers whose version is unknown.
 
-        A ground station of MAVLink 1 only would not see the vehicle otherwise; Mission Planner speaks MAVLink 1
-        until it has seen MAVLink 2, which it reads from the start. So where all is signed it needs no MAVLink 1.
+        A ground station that knows only MAVLink 1 would not see the vehicle otherwise. Mission Planner sends MAVLink 1
+                until it has seen MAVLink 2, which it can always read; so signed links need no MAVLink 1.
         """
         for peer in self.everyone():
             self._introduce(peer, heartbeat)
@@ -269,7 +269,7 @@ class Ground:
         self._say(severity, text, [peer for peer in self._readers_of_texts() if peer != station.peer])
 
     def _say(self, severity: Severity, text: str, peers: Sequence[Peer]) -> None:
-        """Send a text in pieces that fit STATUSTEXT; a refusal once an attempt."""
+        """Send a text in pieces that fit STATUSTEXT; a refusal only once per attempt."""
         self._log_event("debug", "gcs.text", text=text)
         if severity is Severity.ERROR:
             peers = self._texts.new_to(peers, text, self._now)
@@ -281,7 +281,7 @@ class Ground:
         return [peer for peer in self.everyone() if self._standing(peer) is not Standing.LISTENER]
 
     def forward(self, frames: Sequence[bytes], peers: Iterable[Peer]) -> None:
-        """Send frames on as they came: `frames` are datagrams of one whole frame or more."""
+        """Send datagrams of one or more whole frames unchanged."""
         for peer in peers:
             for frame in frames:
                 self._datagrams.append((peer, frame))
@@ -295,7 +295,7 @@ class Ground:
         writer = self._writers.get(peer)
         if writer is None:
             writer = FrameWriter(self._sysid, self._compid, self._signers.get(peer.link))
-            # An answer may come after its peer has left, and would keep a writer for it for ever.
+            # A late answer to a peer that has left must not keep a writer for ever.
             if peer in self.everyone():
                 self._writers[peer] = writer
         return writer

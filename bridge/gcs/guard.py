@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who may write over which link: the one place that every frame from a ground station passes first. Sans-IO.
+"""Access control: the one place that every frame from a ground station passes first. Sans-IO.
 
-Reading is free for every peer that reaches a link. Everything else may change what the aircraft does, even a message
-that nobody has thought of yet: so the lists here name what passes unproven, not what needs proof.
+Every peer that reaches a link may read. Everything else may change what the aircraft does, even a message that does
+not exist yet: so the lists here name the messages that pass without proof, not those that need it.
 """
 
 from collections import Counter
@@ -21,8 +21,8 @@ from protocols.mavlink.ftp import refuse
 from protocols.mavlink.signing import Check, Signing
 from protocols.mission_item import MissionResult
 
-#: What only tells or asks. Among it is all that Mission Planner sends before it knows that a key is wanted: heartbeats,
-#: three STATUSTEXTs (one signed with an empty key) and questions.
+#: Messages that only report or ask. They include everything that Mission Planner sends before it knows that a key is
+#: needed: heartbeats, three STATUSTEXTs (one signed with an empty key) and requests.
 _READS = frozenset(
     {
         m.MAVLINK_MSG_ID_HEARTBEAT,
@@ -51,8 +51,8 @@ _QUESTIONS = frozenset(
         m.MAV_CMD_DO_SEND_BANNER,
     }
 )
-#: What an autopilot that speaks MAVLink for itself gets over an open link besides: neither arms, disarms, steers nor
-#: restarts. A message that nobody has thought of is not among it.
+#: Further messages that pass over an open link to an autopilot that speaks MAVLink itself: none of them arms, disarms,
+#: steers or restarts it. Unknown messages do not pass.
 _PASSES_OPEN = _READS | {
     m.MAVLINK_MSG_ID_RADIO,
     m.MAVLINK_MSG_ID_RADIO_STATUS,
@@ -100,7 +100,7 @@ _NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
 
 
 class Standing(Enum):
-    """What a peer has shown of itself."""
+    """The rights that a peer has proven."""
 
     LISTENER = "may only read"
     OPEN = "its link asks for nothing"
@@ -109,10 +109,10 @@ class Standing(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LinkAccess:
-    """What is asked of who writes over a link. `signing`: a signature with its key; `may_write`: the right address.
+    """The conditions for writing over a link. `signing`: a signature with its key; `may_write`: the right address.
 
-    None: it is not asked for. What we send over a link with `signing` is signed, too; `link_id` is the number that the
-    protocol gives a link.
+    None: not required. Everything the bridge sends over a link with `signing` is signed, too; `link_id` is the link's
+        number in the signature.
     """
 
     signing: Signing | None = None
@@ -124,10 +124,10 @@ _OPEN = LinkAccess()
 
 
 class GuardRefusal(NamedTuple):
-    """Why a frame is not let in.
+    """The reason for refusing a frame.
 
-    `is_first`: for this reason, of this peer. `is_forged`: the peer has the key, but this frame is not signed with it
-    or a copy. It gets no answer and has no effect, not even on when the peer was last heard.
+    `is_first`: the first one of this peer for this reason. `is_forged`: the peer has the key, but this frame is not
+        signed with it, or is a copy. It gets no answer and has no effect, not even on the time the peer was last heard.
     """
 
     why: str
@@ -136,9 +136,9 @@ class GuardRefusal(NamedTuple):
 
 
 class Guard:
-    """Decides what may come in from which peer, counts the rest, and logs it once for each peer and reason.
+    """Accepts or refuses frames; refusals are counted, and logged once for each peer and reason.
 
-    `passes_everything`: an autopilot that speaks MAVLink for itself gets all commands over open links, too.
+    `passes_everything`: an autopilot that speaks MAVLink itself gets all commands over open links, too.
     """
 
     def __init__(
@@ -149,11 +149,11 @@ class Guard:
         self._passes_everything = passes_everything
         self._signed: set[Peer] = set()
         self._told: dict[Peer, set[str]] = {}
-        #: How often something was refused: (link, why).
+        #: Refusals by (link, reason).
         self.refused: Counter[tuple[str, str]] = Counter()
 
     def standing(self, peer: Peer) -> Standing:
-        """What a peer may do, as far as it has shown."""
+        """The rights that a peer has proven so far."""
         access = self._links.get(peer.link, _OPEN)
         if access.signing is None and access.may_write is None:
             return Standing.OPEN
@@ -162,9 +162,9 @@ class Guard:
         return Standing.PROVEN if has_key and has_address else Standing.LISTENER
 
     def refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
-        """Why a frame is not let in; None: it is."""
+        """The reason for refusing a frame; None if it is accepted."""
         access = self._links.get(peer.link, _OPEN)
-        # Frames that only ask are checked, too: each valid one makes older recordings worthless.
+        # Read requests are checked, too: each valid one invalidates older recordings.
         check = Check.VALID if access.signing is None else access.signing.check(frame)
         was_signing = peer in self._signed
         if access.signing is not None and check is Check.VALID:
@@ -183,9 +183,9 @@ class Guard:
         return None
 
     def command_refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
-        """Why a frame is not passed to an autopilot that obeys it: it might arm, disarm, steer or restart.
+        """The reason for not passing a frame to an autopilot that might arm, disarm, steer or restart on it.
 
-        For frames that `refusal` let in. A link without a key or addresses proves nothing.
+        For frames that `refusal` accepted. A link without a key or addresses proves nothing.
         """
         if self._passes_everything or self.standing(peer) is Standing.PROVEN or not may_command(frame):
             return None
@@ -213,7 +213,7 @@ def only_reads(frame: MavlinkFrame) -> bool:
     if msgid in _COMMANDS:
         return _command(frame) in _QUESTIONS
     if msgid == m.MAVLINK_MSG_ID_MISSION_ACK:
-        # Thanks for a list that was read; any other result would end somebody's transfer.
+        # ACCEPTED ends a download; any other result would cancel a station's transfer.
         return not any(frame.payload[_RESULT_AT : _RESULT_AT + 1])
     return msgid in _READS
 
@@ -222,7 +222,7 @@ def may_command(frame: MavlinkFrame) -> bool:
     """True if a frame might arm, disarm, steer or restart an autopilot that obeys it."""
     msgid, payload = frame.msgid, frame.payload
     if _asks_for_rates(frame):
-        # They hold for all ground stations: one may ask for more, but not silence the vehicle.
+        # The rates apply to all ground stations: one may ask for more, but not silence the vehicle.
         return _silences(frame)
     if msgid in _COMMANDS:
         return _command(frame) not in _QUESTIONS
@@ -240,7 +240,7 @@ def _asks_for_rates(frame: MavlinkFrame) -> bool:
 
 
 def _silences(frame: MavlinkFrame) -> bool:
-    """True if a request for a rate asks for none: an interval below 0, a rate of 0, or a stream's end."""
+    """True if a rate request stops a message: an interval below 0, a rate of 0, or the end of a stream."""
     payload = frame.payload.ljust(_CURRENT_AT, b"\0")
     if frame.msgid in _COMMANDS:
         return bool(payload[_INTERVAL_SIGN_AT] & 0x80)
@@ -248,12 +248,12 @@ def _silences(frame: MavlinkFrame) -> bool:
 
 
 def _command(frame: MavlinkFrame) -> int:
-    # MAVLink 2 leaves trailing zeros out.
+    # MAVLink 2 omits trailing zeros.
     return int.from_bytes(frame.payload[_COMMAND_AT], "little")
 
 
 def denial(message: Message, station: Station) -> Message | None:
-    """Return the protocol's own answer to what is refused, if there is one."""
+    """The protocol's own negative reply to a refused message, if there is one."""
     match message.get_type():
         case "COMMAND_LONG" | "COMMAND_INT":
             denied = CommandResult.DENIED

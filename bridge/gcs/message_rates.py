@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often each ground station gets which message: its own wishes, else the defaults. Sans-IO."""
+"""Message rates of each ground station: as requested, else the defaults. Sans-IO."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf
@@ -10,42 +10,42 @@ from bridge.gcs.station import Peer
 
 #: Messages a second to all ground stations together; each has an equal share. The defaults are 55 a second.
 _MOST_PER_S = 2400
-#: A message that is due within this part of its interval goes out now: what carries it comes at a pace of its own.
+#: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
 
 
 class MessageRates:
-    """Intervals in seconds; infinity: never. `defaults` names the messages that there are, by their ids."""
+    """Intervals in seconds; infinity: never. `defaults` holds every known message id."""
 
     def __init__(self, defaults: Mapping[int, float]) -> None:
         self._defaults = defaults
-        self._wishes: dict[Peer, dict[int, float]] = {}
+        self._requested: dict[Peer, dict[int, float]] = {}
         self._due: dict[tuple[Peer, int], float] = {}
         self._shares: dict[Peer, TokenBucket] = {}
 
     def knows(self, msgid: int) -> bool:
-        """Tell whether there is such a message."""
+        """True if the vehicle has such a message."""
         return msgid in self._defaults
 
-    def wish(self, peer: Peer, msgid: int, interval_s: float | None) -> None:
-        """Note what a ground station wants; None: the default."""
+    def request(self, peer: Peer, msgid: int, interval_s: float | None) -> None:
+        """Set the interval that a ground station requests; None: the default."""
         self._due.pop((peer, msgid), None)
         if interval_s is None:
-            self._wishes.get(peer, {}).pop(msgid, None)
+            self._requested.get(peer, {}).pop(msgid, None)
         else:
-            self._wishes.setdefault(peer, {})[msgid] = interval_s
+            self._requested.setdefault(peer, {})[msgid] = interval_s
 
     def interval_s(self, peer: Peer, msgid: int) -> float:
-        """Return what a ground station wants, or the default."""
-        wishes = self._wishes.get(peer)
-        return self._defaults[msgid] if wishes is None else wishes.get(msgid, self._defaults[msgid])
+        """The interval requested by a ground station, or the default."""
+        requested = self._requested.get(peer)
+        return self._defaults[msgid] if requested is None else requested.get(msgid, self._defaults[msgid])
 
     def fastest_s(self, msgid: int, peers: Iterable[Peer]) -> float:
-        """Return the shortest interval that any of `peers` wants."""
+        """The shortest interval of `peers`."""
         return min((self.interval_s(peer, msgid) for peer in peers), default=inf)
 
     def take_due(self, msgid: int, peers: Sequence[Peer], now: float) -> list[Peer]:
-        """Those of `peers` to whom the message is to be sent now; the next time counts from here."""
+        """The peers for which the message is due now; schedules the next one for each."""
         taken = []
         share = Rate(_MOST_PER_S / max(1, len(peers)), _MOST_PER_S / max(1, len(peers)))
         for peer in peers:
@@ -60,16 +60,16 @@ class MessageRates:
             if not bucket.has(now):
                 continue
             bucket.spend()
-            # On from when it was due, so that the rate is kept; but what was missed is not made up for.
+            # Counted from the due time to keep the rate, but missed messages are not caught up.
             self._due[peer, msgid] = (due if now < due + interval_s else now) + interval_s
             taken.append(peer)
         return taken
 
     def keep(self, peers: Iterable[Peer]) -> None:
-        """Forget who is none of `peers`."""
+        """Forget all other peers."""
         present = set(peers)
-        for peer in [peer for peer in self._wishes if peer not in present]:
-            del self._wishes[peer]
+        for peer in [peer for peer in self._requested if peer not in present]:
+            del self._requested[peer]
         for peer in [peer for peer in self._shares if peer not in present]:
             del self._shares[peer]
         for key in [key for key in self._due if key[0] not in present]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames between an autopilot that speaks MAVLink for itself and its ground stations: routed, never changed. Sans-IO.
+"""Routes frames between an autopilot that speaks MAVLink itself and its ground stations, unchanged. Sans-IO.
 
 Routing as MAVLink describes it (https://mavlink.io/en/guide/routing.html): a frame without a target goes to everyone
-but its sender; one with a target only to where that system (and component) was heard. What is for somebody who was
-not heard yet goes to the autopilot.
+but its sender; one with a target only to where that system (and component) was heard. Frames for a system that was
+not heard yet go to the autopilot.
 """
 
 from collections.abc import Sequence
@@ -16,9 +16,9 @@ from protocols.mavlink.target import target_of, without_target
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
-#: Who is heard behind one peer: a router may carry a fleet, but who makes numbers up shall not fill the memory.
+#: Ids remembered behind one peer: a router may carry a fleet, but made-up ids must not fill the memory.
 _MAX_SPEAKERS = 64
-#: Carries a signing key in the clear. From ground stations the guard does not let it in.
+#: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
 
 
@@ -41,7 +41,7 @@ class PassThrough:
             self._send_alone(frame)
 
     def is_aboard(self, system: int) -> bool:
-        """Tell whether a system was heard on the autopilot's side."""
+        """True if a system was heard on the autopilot's side."""
         return any(system == sysid for sysid, _ in self._aboard)
 
     def addressed(self, system: int) -> int | None:
@@ -49,13 +49,13 @@ class PassThrough:
         return next((sysid for sysid, _ in self._aboard if system in (0, sysid)), None)
 
     def from_station(self, peer: Peer, frame: MavlinkFrame, *, to_stations: bool = True) -> bool:
-        """Send a frame that the guard has let in on to other stations; True if it is for the autopilot, too.
+        """Send a frame that the guard accepted on to other stations; True if it is for the autopilot, too.
 
-        `to_stations` False: its sender may only read, and speaks to no other station.
+        `to_stations` False: its sender may only read, and reaches no other station.
         """
         speaker = frame.sysid, frame.compid
         if speaker in self._aboard:
-            # The autopilot's own frame, come back by a router that sends everything everywhere.
+            # The autopilot's own frame, returned by a router that floods.
             return False
         if not to_stations:
             return target_of(frame)[0] == 0 or self.is_aboard(target_of(frame)[0])
@@ -98,7 +98,7 @@ class PassThrough:
 
 
 def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:
-    """Join frames that came together into datagrams of at most 280 bytes: a datagram has its price, bytes have none."""
+    """Join frames that arrived together into datagrams of at most 280 bytes: the cost is per datagram, not per byte."""
     joined = b"".join(frames)
     if len(joined) <= MAX_DATAGRAM_SIZE:
         return [joined]

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which refusals belong to one attempt: Mission Planner asks up to seven times, and one text is enough."""
+"""Groups refusals by attempt: Mission Planner repeats a request up to seven times, and one text is enough."""
 
 from collections.abc import Iterable
 
 from bridge.gcs.station import Peer
 
-#: A client repeats a request within 0.7 s; a pilot who tries again takes longer, and hears the reason again.
+#: A client repeats a request within 0.7 s; a pilot who tries again takes longer, and gets the reason again.
 _QUIET_S = 1.0
-#: More are not remembered: at worst a text is repeated.
+#: The limit only means that at worst a text is repeated.
 _MAX_TEXTS = 256
 
 
 class RecentTexts:
-    """Remembers texts for as long as they are asked for without a pause of 1 s."""
+    """Remembers each text until 1 s has passed without a repetition."""
 
     def __init__(self) -> None:
         self._told: dict[tuple[Peer, str], float] = {}  # oldest first

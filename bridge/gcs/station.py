@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground stations, and how the bridge speaks to them."""
+"""Ground stations, and the interface for sending to them."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ class Peer:
         return f"{self.link} {address}"
 
 
-#: The telemetry log as a reader of its own: it gets what a watching ground station gets, but no datagram is sent.
+#: The telemetry log as a peer: it is served like a ground station, but no datagram is sent.
 RECORDER = Peer("log", "flight")
 
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A ground station: who speaks (sysid, compid), and from where."""
+    """A ground station: its ids (sysid, compid) and its address."""
 
     peer: Peer
     sysid: int
@@ -59,7 +59,7 @@ class Post(Protocol):
         """Send to one ground station."""
 
     def allows(self, station: Station, cost: Cost) -> bool:
-        """Count something that a ground station makes the bridge do; False if that is too much."""
+        """Count work that a ground station causes; False if that exceeds its limit."""
 
     def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
         """Show a text (STATUSTEXT) on one ground station, or on every one."""

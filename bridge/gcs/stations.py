@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which ground stations are there, and in which MAVLink version each is spoken to."""
+"""The connected ground stations, and the MAVLink version for each."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -8,17 +8,17 @@ from math import inf
 
 from bridge.gcs.station import Peer, Station
 
-#: A UDP peer that is silent for so long has left; its TCP kind is ended by its connection.
+#: A UDP peer that is silent for this long has left; a TCP peer leaves with its connection.
 EXPIRY_S = 60.0
-#: The same for one whose every speaker is heard from elsewhere now: its Wi-Fi gave it another address.
+#: The same for a peer all of whose ids are now heard from elsewhere: its Wi-Fi gave it another address.
 MOVED_S = 5.0
-#: More on one link are not spoken to: every heartbeat costs a datagram for each.
+#: Peers on one link; every heartbeat costs a datagram for each.
 MAX_PEERS = 32
-#: The same for peers that may only read, so that they leave the places of those with the key alone.
+#: The same for peers that may only read, so that they take no slot from those with the key.
 MAX_LISTENERS = 8
-#: Who transfers a mission or is just there is not silent for so long.
+#: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
-#: Behind one peer: a radio or a router may carry several.
+#: Ids behind one peer: a radio or a router may carry several.
 _MAX_SPEAKERS = 16
 
 
@@ -28,16 +28,16 @@ class _Known:
     is_listener: bool
     came_at: float
     heard_at: float
-    #: When each (sysid, compid) was heard from there.
+    #: When each (sysid, compid) was last heard from there.
     speakers: dict[tuple[int, int], float] = field(default_factory=dict)
 
 
 def displaced(peers: Mapping[Peer, float]) -> Peer:
-    """The one of a full link's peers that makes room for another. `peers`: when each was last heard, oldest first.
+    """The peer of a full link that makes room for another. `peers`: when each was last heard, in order of arrival.
 
-    The half that came first keeps its places: a pilot is not displaced by a crowd that came later, not even after a
-    radio fade. Among the others it is the one of the busiest machine that was silent for longest, because a crowd is
-    often one machine, and changes its addresses faster than a pilot's ground station is silent.
+    The first half keeps its slots: a pilot is not displaced by a later crowd, not even after a radio fade. Of the
+        others, the longest-silent peer of the host with most peers goes: a crowd is often one host, which changes its
+        addresses faster than a pilot's ground station falls silent.
     """
     hosts = Counter(peer.host for peer in peers)
     later = list(peers)[len(peers) // 2 :]
@@ -45,13 +45,13 @@ def displaced(peers: Mapping[Peer, float]) -> Peer:
 
 
 class Stations:
-    """The peers that were heard. A peer is answered in the version that it speaks; MAVLink 2 once it showed it.
+    """The peers that were heard. Each is answered in its own version: MAVLink 2 once it has sent that.
 
-    A newcomer is always taken in: on a full link in the place of another.
+    A newcomer is always accepted; on a full link it replaces another peer.
     """
 
     def __init__(self) -> None:
-        self._known: dict[Peer, _Known] = {}  # in the order in which they came
+        self._known: dict[Peer, _Known] = {}  # in order of arrival
         self._displaced: list[Peer] = []
         self._expiry_due: float | None = None
 
@@ -82,7 +82,7 @@ class Stations:
         return added
 
     def is_senior(self, peer: Peer) -> bool:
-        """True if a peer was there before the half of its full link."""
+        """True if a peer belongs to the half of its full link that arrived first."""
         known = self._known.get(peer)
         if known is None:
             return False
@@ -90,11 +90,11 @@ class Stations:
         return peer in same[: MAX_PEERS // 2]
 
     def is_unknown(self, peer: Peer) -> bool:
-        """Tell whether nothing was heard from `peer`."""
+        """True if nothing was heard from `peer`."""
         return peer not in self._known
 
     def version(self, peer: Peer) -> int:
-        """Return the MAVLink version in which to answer."""
+        """The MAVLink version for answers."""
         known = self._known.get(peer)
         return 2 if known is None else known.version
 
@@ -103,7 +103,7 @@ class Stations:
         self._known.pop(peer, None)
 
     def expire(self, now: float) -> list[Peer]:
-        """Forget peers that fell silent, and return them and those who made room for others."""
+        """Forget silent peers; returns them and those displaced by others."""
         if self._expiry_due is None or now < self._expiry_due:
             return []
         silent = [peer for peer, known in self._known.items() if now >= self._expires_at(peer, known)]
@@ -115,22 +115,22 @@ class Stations:
         return silent
 
     def next_deadline(self) -> float | None:
-        """Return when the first may have expired: rather too early than looking at all of them each time."""
+        """The earliest time that a peer may expire; may be too early, which saves a search on each frame."""
         return self._expiry_due
 
     def peers(self) -> list[Peer]:
-        """All peers that are there."""
+        """All connected peers."""
         return list(self._known)
 
     def is_listener(self, peer: Peer) -> bool:
-        """True if a peer that is there may only read."""
+        """True if a connected peer may only read."""
         known = self._known.get(peer)
         return known is not None and known.is_listener
 
     def moved_to(self, station: Station, now: float) -> list[Station]:
-        """Return from where a station is heard that fell silent where it was: as a rule nowhere.
+        """The new addresses of a station that fell silent at its old one: usually none.
 
-        A second one with the same ids was heard before, or the first one goes on.
+        This excludes a second station with the same ids, heard earlier or alongside the first.
         """
         old = self._known.get(station.peer)
         if old is None or now < old.heard_at + _STILL_S:
@@ -151,7 +151,7 @@ class Stations:
         if speaker not in known.speakers:
             if len(known.speakers) >= _MAX_SPEAKERS:
                 return
-            # From now on somebody else may count as moved.
+            # From now on another peer may count as moved.
             self._expiry_due = now + MOVED_S if self._expiry_due is None else min(now + MOVED_S, self._expiry_due)
         known.speakers[speaker] = now
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions, whatever the flight controller: checking, storing, reading back."""
+"""Missions, independent of the flight controller: checking, storing, reading back."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The seam between missions and the flight controllers that store them.
+"""The interface between missions and the flight controllers that store them.
 
-A dialect is one kind of flight controller: by which rules a list is judged, how it is put there, proven and read back.
+A dialect is one kind of flight controller: its rules, and how a list is written, verified and read back.
 `bridge.controllers.harakiri.mission_store` and `bridge.controllers.harakiri.mavlink_missions` are two.
 """
 
@@ -18,7 +18,7 @@ from protocols.mission_record import ListIdentity
 
 
 class StoreState(Enum):
-    """Whether the flight controller would take a list now."""
+    """The flight controller's readiness for a list."""
 
     READY = "ready"
     ARMED = "armed"
@@ -27,7 +27,7 @@ class StoreState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StoreReport:
-    """What the flight controller says of its mission store. `stored` None: not known without reading the list."""
+    """The flight controller's report on its mission store. `stored` None: not known without reading the list."""
 
     state: StoreState
     rules: MissionRules
@@ -35,7 +35,7 @@ class StoreReport:
 
 
 class PushFailure(Enum):
-    """Why a list did not get there. The flight controller's old list is whole but in the cases of LIST_IS_GONE."""
+    """The reason that a write failed. The flight controller's old list is intact except for LIST_IS_GONE."""
 
     ARMED = "the flight controller is armed: disarm first"
     BUSY = "the flight controller is busy writing its configuration: try again"
@@ -52,7 +52,7 @@ class PushFailure(Enum):
     NOT_SAVED = "the mission is there but not saved: it is lost at power-off; write it again"
 
 
-#: What was there before is there no more, or may be.
+#: After these failures the old list is lost, or may be.
 LIST_IS_GONE = frozenset(
     (PushFailure.UNCERTAIN, PushFailure.INCOMPLETE, PushFailure.ARMED_MEANWHILE, PushFailure.NOT_SAVED)
 )
@@ -60,9 +60,9 @@ LIST_IS_GONE = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class PushResult(Generic[RecordT]):
-    """`failure` is None when the list was proven there. `unchanged`: it was there already.
+    """`failure` is None if the list was verified. `unchanged`: the same list was already there.
 
-    `held`: what is or would be there, if the flight controller cannot take the records exactly.
+    `held`: the list as the flight controller stores it, if it cannot hold the records exactly.
     """
 
     failure: PushFailure | None
@@ -70,58 +70,58 @@ class PushResult(Generic[RecordT]):
     held: tuple[RecordT, ...] | None = None
 
 
-#: Called with the number of records that the flight controller has.
+#: Called with the number of records written so far.
 PushProgress = Callable[[int], None]
 
 
 class FcMissionStore(Protocol[RecordT]):
-    """What the bridge asks of a flight controller that stores missions."""
+    """The operations of a flight controller that stores missions."""
 
     @property
     def wp_radius_cm(self) -> int | None:
-        """The least hit radius as last heard, cm; None if it cannot be known or set."""
+        """The minimum waypoint radius as last heard, cm; None if it cannot be read or set."""
 
     def report(self) -> Conversation[StoreReport | None]:
         """Ask the flight controller; None if it does not answer."""
 
     def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult[RecordT]]:
-        """Put the list there and prove it. The empty list clears."""
+        """Write the list and verify it. The empty list clears."""
 
     def pull(self) -> Conversation[tuple[RecordT, ...] | None]:
-        """Read the list that is there, and make sure that it was read right; None if that fails."""
+        """Read the list and verify the reading; None if that fails."""
 
     def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """Return what a ground station reads of a list, home first; `sent_as` is remembered from when it was sent."""
+        """A list as a ground station reads it, home first; `sent_as`: remembered commands, by record number."""
 
     def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
         """Set gps_wp_radius, 0..2000 cm; the value in force, None if there was no answer."""
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Return items that were read earlier with what changes by itself: home, where it is no part of the list."""
+        """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""
 
     def seq_of(self, records: Sequence[RecordT], number: int) -> int:
-        """Return the number of the item that record `number` (as NAV_STATUS counts, from 1) is shown as; 0: none."""
+        """The seq of the item for record `number` (as NAV_STATUS counts, from 1); 0: none."""
 
     @property
     def reads_armed(self) -> bool:
-        """Whether its list can be read while the craft is armed."""
+        """True if its list can be read while the craft is armed."""
 
     @property
     def others(self) -> tuple[tuple[RecordT, ...], ...]:
         """Further missions in its store, as last read. Only one mission at a time is loaded and flown."""
 
     def erased_by(self, records: Sequence[RecordT]) -> tuple[tuple[RecordT, ...], ...]:
-        """Those of `others` that do not fit beside a new list, and are erased when it is written."""
+        """The `others` that do not fit alongside a new list; writing it erases them."""
 
     def is_current(self) -> Conversation[bool]:
-        """Ask whether it still holds the list that was last read or written; True if it does not answer."""
+        """True if it still holds the list that was last read or written, or does not answer."""
 
     def reload(self) -> Conversation[bool | None]:
         """Make it load its saved mission if it holds none. True: done, False: no need, None: not while armed."""
 
 
 class OneMission:
-    """The part of the seam for a board that keeps one mission, which only the bridge changes."""
+    """Part of the interface for a board with one mission, which only the bridge changes."""
 
     reads_armed = False
 
@@ -140,10 +140,10 @@ class OneMission:
         return True
 
     def reload(self) -> Conversation[bool | None]:
-        """It never forgets its mission."""
+        """No need: the mission survives a restart."""
         yield from ()
         return False
 
 
-#: Whatever the present flight controller is.
+#: The mission store of any flight controller.
 AnyFcMissionStore = FcMissionStore[Any]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a mission list is judged, whatever the flight controller: item by item, by the rules that its dialect brings.
+"""The check of a mission list, item by item, by the rules of the flight controller's dialect.
 
 One controller's rules are a `MissionRules` and its `ListCheck`; `bridge.controllers.harakiri.check` is an example.
 """
@@ -23,7 +23,7 @@ TERRAIN_FRAMES = (Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT)
 
 
 class ListCheck(ABC):
-    """The check of one list. `count` items will come, in order; an item's number is its place in that order."""
+    """The check of one list of `count` items, given in order; an item's number is its place in that order."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -32,7 +32,7 @@ class ListCheck(ABC):
         self._rejection: Rejection | None = None
 
     def take(self, item: MissionItem) -> Rejection | None:
-        """Judge the next item; a rejection is final and comes with the first item that proves it."""
+        """Check the next item; a rejection is final and is returned as soon as it is certain."""
         if self._rejection is None:
             item = replace(item, seq=self._taken)
             self._taken += 1
@@ -40,7 +40,7 @@ class ListCheck(ABC):
         return self._rejection
 
     def finish(self) -> Verdict[Any]:
-        """Return the verdict, with the rules for what is kept; ValueError if items are still to come."""
+        """The verdict, after the rules for the kept list; ValueError if items are missing."""
         if self._rejection is None and self._taken < self._count:
             raise ValueError(f"{self._taken} of {self._count} items taken")
         rejection = self._rejection or self._refuse_kept_list()
@@ -48,15 +48,15 @@ class ListCheck(ABC):
 
     @abstractmethod
     def _judge(self, item: MissionItem) -> Rejection | None:
-        """Keep or drop the item, or find what rejects the list as soon as it is seen."""
+        """Keep or drop the item, or reject the list."""
 
     @abstractmethod
     def _refuse_kept_list(self) -> Rejection | None:
-        """Find what rejects the list now that all of it is there."""
+        """Apply the rules that need the whole list."""
 
     @abstractmethod
     def _conclude(self) -> Verdict[Any]:
-        """Return the verdict on a list that is not rejected."""
+        """The verdict on a list that is not rejected."""
 
     def _note(
         self,
@@ -72,7 +72,7 @@ class ListCheck(ABC):
         self._findings.append(Finding(item.seq, name, was, becomes, why, item.command, news))
 
     def _fit(self, item: MissionItem, name: str, allowed: Range, news: News = News.NOTICE) -> int:
-        """Make one field a whole number that can be stored."""
+        """Convert one field to a whole number that can be stored."""
         value: float = getattr(item, name)
         stored = allowed.fit(value)
         if stored != (0 if math.isnan(value) else value):
@@ -80,7 +80,7 @@ class ListCheck(ABC):
         return stored
 
     def _warn(self, item: MissionItem, name: str, why: str) -> None:
-        """Tell of a value that is stored as it was sent, and flown otherwise than a pilot would expect."""
+        """Report a value that is stored as sent, but flown differently than a pilot would expect."""
         value = given(getattr(item, name))
         self._note(item, name, value, value, why, News.WARNING)
 
@@ -90,20 +90,20 @@ class ListCheck(ABC):
                 self._note(item, name, value, 0, UNUSED.why, news)
 
     def _note_home(self, item: MissionItem) -> None:
-        """Item 0 is home; MAVSDK's `mission` plugin puts none in front, and its first waypoint would be missing."""
+        """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint would be taken for home."""
         if item.frame in RELATIVE_FRAMES:
             why = "first item became home, not flown to"
             self._note(item, "frame", item.frame, int(Frame.GLOBAL), why, News.WARNING)
 
     def _now_relative(self, item: MissionItem) -> None:
-        """Tell that a height counts from another level than the one that was sent."""
+        """Report that an altitude is relative to another level than the one sent."""
         level = "sea level" if item.frame in SEA_LEVEL_FRAMES else "terrain"
         why = f"Alt flown above home, not above {level}"
         self._note(item, "frame", item.frame, int(Frame.GLOBAL_RELATIVE_ALT), why, News.WARNING)
 
 
 class HomeOnly(ListCheck):
-    """The check of a list of one item: no mission, but in one case a client's way to clear.
+    """The check of a list of one item: not a mission, but some clients clear with it.
 
     MAVSDK clears an ARDUPILOTMEGA vehicle with one item of zeros; Mission Planner's empty Write sends home.
     """
@@ -126,18 +126,18 @@ _HOME_ONLY = reject_list(MissionResult.INVALID, 1, "only a home point, no comman
 
 
 class MissionRules(Protocol):
-    """What a flight controller can hold. A profile: it knows the list's limits, and begins the check of a list."""
+    """The mission rules of a flight controller: its limits, and the check of a list."""
 
     @property
     def max_items(self) -> int:
         """The longest list that may fit, home included."""
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> ListCheck:
-        """Begin a list of `count` items; `fallback_home` (lat_e7, lon_e7) stands in for a home without coordinates."""
+        """Begin the check of `count` items; `fallback_home` (lat_e7, lon_e7) replaces a home without coordinates."""
 
 
 def check_count(count: int, rules: MissionRules) -> Rejection | None:
-    """Judge a MISSION_COUNT; 0 clears the list and is no fault."""
+    """Check a MISSION_COUNT; 0 clears the list and is valid."""
     if count > rules.max_items:
         return reject_list(MissionResult.NO_SPACE, count, f"{count} items, but only {rules.max_items} fit")
     return None
@@ -151,7 +151,7 @@ def begin_check(count: int, rules: MissionRules, fallback_home: tuple[int, int] 
 def check_list(
     items: Sequence[MissionItem], rules: MissionRules, fallback_home: tuple[int, int] | None = None
 ) -> Verdict[Any]:
-    """Judge a whole list; without items it clears the flight controller's."""
+    """Check a whole list; an empty one clears the flight controller's."""
     if not items:
         return CLEARED_LIST
     if rejection := check_count(len(items), rules):
@@ -164,7 +164,7 @@ def check_list(
 
 
 def refuse_frame(item: MissionItem, *, needs_position: bool) -> Rejection | None:
-    """Refuse a frame in which no place can be understood; MISSION will do where none is used."""
+    """Reject frames without a usable position; frame MISSION is accepted for commands that need none."""
     known = item.frame in (*RELATIVE_FRAMES, *SEA_LEVEL_FRAMES, *TERRAIN_FRAMES)
     if known or (item.frame == Frame.MISSION and not needs_position):
         return None
@@ -172,7 +172,7 @@ def refuse_frame(item: MissionItem, *, needs_position: bool) -> Rejection | None
 
 
 def refuse_position(item: MissionItem) -> Rejection | None:
-    """Refuse coordinates that are nowhere on earth."""
+    """Reject coordinates out of range."""
     if abs(item.lat_e7 or 0) > MAX_LAT_E7:
         return reject(MissionResult.INVALID_PARAM5_X, item, "lat_e7", "latitude beyond 90 deg")
     if abs(item.lon_e7 or 0) > MAX_LON_E7:
@@ -181,7 +181,7 @@ def refuse_position(item: MissionItem) -> Rejection | None:
 
 
 def missing_coordinate(item: MissionItem) -> tuple[str, int | None] | None:
-    """Name the coordinate that is not given, and what stands in its place; None if both are there."""
+    """The missing coordinate: its field name and the value in its place; None if both are given."""
     if item.lat_e7 and item.lon_e7:
         return None
     return ("lon_e7", item.lon_e7) if item.lat_e7 else ("lat_e7", item.lat_e7)

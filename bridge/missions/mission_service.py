@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every way to a mission shares: one transfer at a time, the checks before, the delivery, the reading back.
+"""The mission operations shared by all clients: one transfer at a time, checks, delivery, read-back.
 
-Mission Planner over UDP (bridge.mission_upload, bridge.mission_download) and the command line go through this one desk.
+Ground stations (bridge.vehicle.mission_upload, mission_download) and the command line (local_missions) both use it.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,17 +26,17 @@ from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
 
-#: How long a flash write that is still running is waited for (docs/mission-rules.md).
-_BUSY_PATIENCE_S = 1.0
+#: The timeout for a running flash write (docs/mission-rules.md).
+_BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """How a mission ended. `number` is its number in the store, None if it could not be stored.
+    """The result of a mission. `number` is its number in the store, None if it could not be stored.
 
-    `is_lossy`: accepted, but an item was lost, the list erased, or a height changed its meaning. `change`: what has
-    changed on the aircraft; empty if nothing has.
+    `is_lossy`: accepted, but an item was lost, the list erased, or an altitude changed its meaning. `change`: the
+        change on the aircraft as text; empty if there is none.
     """
 
     ack: MissionResult
@@ -48,7 +48,7 @@ class Delivery:
 
 @dataclass(frozen=True, slots=True)
 class HeldMission:
-    """The list that the flight controller holds, as it was read from there."""
+    """The flight controller's list, as last read."""
 
     identity: ListIdentity
     records: tuple[Any, ...]
@@ -57,7 +57,7 @@ class HeldMission:
 
 @dataclass(frozen=True, slots=True)
 class MissionChange:
-    """A change of the flight controller's list that no ground station asked for, as a pilot reads it."""
+    """A change of the flight controller's list that no ground station requested, as text for the pilot."""
 
     text: str
     is_warning: bool = False
@@ -74,9 +74,9 @@ OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
 class MissionService:
-    """Holds the lock of the one transfer, the dialect of the present flight controller, and the list it holds.
+    """Holds the transfer lock, the dialect of the present flight controller, and its list.
 
-    `on_ending` is told of each mission that was dealt with. `is_armed`: as far as telemetry says.
+    `on_ending` is called with the result of each mission. `is_armed`: according to telemetry; None if unknown.
     """
 
     def __init__(
@@ -88,20 +88,20 @@ class MissionService:
         self._refusal = NO_LINK
         self._owner: object | None = None
         self._closed = False
-        #: False until the present flight controller's list was read, and after a push that broke off.
+        #: False until the present flight controller's list was read, and after an interrupted push.
         self._is_settled = False
         self._told_unloaded = False
-        #: Missions to be looked for when the list is next read.
+        #: Missions to compare with the list when it is next read.
         self._pending: list[PendingMission] = []
         self._has_asked_store = False
         self.held: HeldMission | None = None
-        #: Item 0 of the last list that was known: arming may change the protocol, and the list is unknown then.
+        #: Item 0 of the last known list: arming may change the protocol, and the list is unknown then.
         self.former_home: MissionItem | None = None
         #: Set while records are written and verified.
         self.writing: MissionTransfer | None = None
 
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
-        """Work with another flight controller from now on; with a Refusal, every attempt gets it as the reply."""
+        """Switch to another flight controller; a Refusal becomes the reply to every attempt."""
         self._dialect, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
         self.former_home = self.home_item()
         self.held = None
@@ -119,21 +119,21 @@ class MissionService:
 
     @property
     def dialect(self) -> AnyFcMissionStore | None:
-        """How the present flight controller stores missions; None if it does not."""
+        """The mission store of the present flight controller; None if it has none."""
         return self._dialect
 
     def home_item(self) -> MissionItem | None:
-        """Item 0 of the flight controller's list, as last known."""
+        """Item 0 of the last known list."""
         return self.held.items[0] if self.held is not None and self.held.items else self.former_home
 
     def seq_of(self, number: int) -> int:
-        """Return the number of the item that the flight controller's record `number` is shown as; 0: none is known."""
+        """The seq of the item for the flight controller's record `number`; 0: none is known."""
         if self._dialect is None or self.held is None:
             return 0
         return self._dialect.seq_of(self.held.records, number)
 
     def acquire(self, owner: object) -> Refusal | None:
-        """Take the lock of the one transfer, or say why not."""
+        """Take the transfer lock; a refusal if another client has it."""
         if self._closed:
             return _STOPPING
         if self._owner is not None and self._owner != owner:
@@ -142,25 +142,25 @@ class MissionService:
         return None
 
     def armed_refusal(self) -> Refusal | None:
-        """The refusal if the craft is known to be armed: the board need not be asked, and has other things to do."""
+        """The refusal if the craft is known to be armed; saves a request to a busy board."""
         return ARMED if self._dialect is not None and self._is_armed() else None
 
     @property
     def is_free(self) -> bool:
-        """Whether a transfer can begin."""
+        """True if a transfer can begin."""
         return self._owner is None
 
     def close(self) -> None:
-        """Begin no more transfers, because the bridge is about to end."""
+        """Accept no more transfers: the bridge is stopping."""
         self._closed = True
 
     def release(self, owner: object) -> None:
-        """Give the lock back."""
+        """Release the lock."""
         if self._owner == owner:
             self._owner = None
 
     def preflight(self) -> Conversation[StoreReport | Refusal]:
-        """Ask the flight controller whether it would take a list now."""
+        """Ask the flight controller if it can take a list now."""
         if (armed := self.armed_refusal()) is not None:
             return armed
         waited_s = 0.0
@@ -176,7 +176,7 @@ class MissionService:
                     return report
                 if report.state is StoreState.ARMED:
                     return ARMED
-                if waited_s >= _BUSY_PATIENCE_S:
+                if waited_s >= _BUSY_TIMEOUT_S:
                     return _BUSY
                 yield from pause(_BUSY_INTERVAL_S)
                 waited_s += _BUSY_INTERVAL_S
@@ -186,7 +186,7 @@ class MissionService:
             return NO_LINK
 
     def rules(self) -> Conversation[MissionRules | Refusal]:
-        """Return by which rules the present flight controller's lists are judged, armed or not."""
+        """The rules of the present flight controller, armed or not."""
         if self._dialect is None:
             return self._refusal
         try:
@@ -198,9 +198,9 @@ class MissionService:
     def deliver(
         self, arrived: ArrivedMission, progress: Callable[[int], None], *, is_kept: bool = True
     ) -> Conversation[Delivery]:
-        """Store the mission, bring it to the flight controller if the rules let it, store how that ended.
+        """Store the mission, write it to the flight controller if the rules accept it, and store the outcome.
 
-        `is_kept` False: too many lists came to store this one.
+        `is_kept` False: do not store it, because too many lists arrived.
         """
         delivery = yield from self._deliver(arrived, progress, is_kept=is_kept)
         self._on_ending(arrived, delivery)
@@ -284,7 +284,7 @@ class MissionService:
             self.writing = None
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
-        """Return what the flight controller holds; a copy answers only while it has the same checksum."""
+        """The flight controller's list; a cached copy is used only if the checksum is the same."""
         dialect = self._dialect
         if dialect is None:
             return self._refusal
@@ -309,14 +309,14 @@ class MissionService:
         sent_as = yield from recall(identity)
         held = HeldMission(identity, records, dialect.items(records, sent_as or {}))
         if dialect is self._dialect:
-            # The store may take its time, and another flight controller be there by then.
+            # By the time the store answers, another flight controller may be connected.
             self.held = held
         return held
 
     def watch(self) -> Conversation[MissionChange | None]:
-        """Look whether the flight controller still holds the list that was last read or written; what the pilot hears.
+        """Check that the flight controller still holds the last known list; returns the text for the pilot if not.
 
-        A new flight controller, or one on which a push broke off, is made to load its saved mission if it holds none.
+        After connecting or an interrupted push, the flight controller loads its saved mission if it holds none.
         """
         dialect, is_first, before = self._dialect, not self._is_settled, self.held
         if not self._has_asked_store:
@@ -346,7 +346,7 @@ class MissionService:
         return MissionChange(text, is_warning=True)
 
     def _settle(self, held: HeldMission) -> Conversation[MissionChange | None]:
-        """Look which of the pending missions the flight controller has; what the pilot hears of the newest."""
+        """Conclude the pending missions by the list found; returns the text about the newest for the pilot."""
         news = None
         pending, self._pending = self._pending, []
         for mission in pending:
@@ -366,7 +366,7 @@ class MissionService:
         return news
 
     def _copy_erased(self, dialect: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
-        """Store what the new list leaves no room for; False if that fails."""
+        """Store the missions that the new list will erase; False if that fails."""
         for mission in dialect.erased_by(records):
             items = dialect.items(mission, {})
             verdict = Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, mission, items)

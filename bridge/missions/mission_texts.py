@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a pilot reads of a mission that was written: one summary line first, then the findings, equal ones as one."""
+"""The texts for the pilot about a written mission: a summary line, then the findings with equal ones merged."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ _MOST_LINES = 10
 
 
 def summary(sent: int, verdict: Verdict[Any]) -> str | None:
-    """What became of `sent` items and the worst news; None if nothing was lost or changed its meaning."""
+    """A summary of `sent` items and the worst finding; None if nothing was lost or changed its meaning."""
     warnings = [finding for finding in verdict.findings if finding.news is News.WARNING]
     if not warnings:
         return None

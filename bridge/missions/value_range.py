@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a whole-number field of a flight controller's mission record can hold."""
+"""The range of a whole-number field in a mission record."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The whole numbers from `low` to `high`; `instead_of_zero` is stored where a 0 would mean nothing."""
+    """The whole numbers from `low` to `high`; `instead_of_zero` is stored where 0 has no meaning."""
 
     low: int
     high: int
@@ -15,11 +15,11 @@ class Range:
     instead_of_zero: int = 0
 
     def fit(self, value: float) -> int:
-        """Truncate toward zero, then clamp; a number that is not finite counts as 0."""
+        """Truncate toward zero, then clamp; NaN and infinities count as 0."""
         return min(max(_whole(value), self.low), self.high) or self.instead_of_zero
 
     def reason(self, value: float) -> str:
-        """Why `value` is not stored as it is."""
+        """The reason that `value` is not stored unchanged."""
         whole = _whole(value)
         if whole == 0 and self.instead_of_zero:
             return "0 not allowed"

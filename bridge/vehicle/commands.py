@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """COMMAND_LONG and COMMAND_INT: every one is acknowledged (https://mavlink.io/en/services/command.html).
 
-Nothing here may arm, steer or restart an aircraft; such commands are refused with a reason.
+No command may arm, steer or restart an aircraft; those that would are refused with a reason.
 """
 
 import math
@@ -32,7 +32,7 @@ _ASKS_FOR = {
 
 _FLY = "It is flown with the transmitter"
 _MOTORS = "Motors and servos are not driven from here"
-#: Commands that would act on the aircraft: command number -> what the pilot is told.
+#: Commands that would act on the aircraft: command number -> text for the pilot.
 _REFUSED = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: "Arm and disarm with the transmitter sticks",
     messages.MAV_CMD_DO_SET_MODE: "Modes are set with the transmitter switches",
@@ -72,7 +72,7 @@ _OUTCOMES = {
 
 
 class CommandService:
-    """Carries commands out and acknowledges them."""
+    """Executes commands and acknowledges them."""
 
     def __init__(self, post: Post, vehicle: OwnVehicle, actions: FcActions, banner: Callable[[], str]) -> None:
         self._post = post
@@ -81,12 +81,12 @@ class CommandService:
         self._banner = banner
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
-        """Do what a command asks for, and acknowledge it. `params`: param1..param7."""
+        """Execute a command and acknowledge it. `params`: param1..param7."""
         action = _action(command, params)
         if action is None:
             self._acknowledge(station, command, self._do(station, command, params))
         elif self._actions.present == action:
-            # Its user is impatient, or the network doubled it.
+            # Repeated by the user or duplicated by the network.
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
         elif not self._post.allows(station, Cost.FLASH):
             self._post.say(Severity.ERROR, TOO_MANY_WRITES, station)
@@ -95,7 +95,7 @@ class CommandService:
             self._actions.start(action, lambda outcome: self._acted(station, command, outcome), now)
 
     def refuse_mode(self, station: Station) -> None:
-        """SET_MODE has no acknowledgement; the text is all there is."""
+        """SET_MODE has no acknowledgement, so only a text is sent."""
         self._post.say(Severity.ERROR, _REFUSED[messages.MAV_CMD_DO_SET_MODE], station)
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
@@ -137,7 +137,7 @@ class CommandService:
                 return CommandResult.ACCEPTED
 
     def _set_interval(self, station: Station, msgid: int, interval_us: float) -> CommandResult:
-        """Obey SET_MESSAGE_INTERVAL: -1 never, 0 as by default."""
+        """SET_MESSAGE_INTERVAL: -1 never, 0 the default."""
         if interval_us == 0:
             interval_s = None
         elif interval_us == -1:
@@ -150,7 +150,7 @@ class CommandService:
         return CommandResult.ACCEPTED if is_known else CommandResult.UNSUPPORTED
 
     def _tell_interval(self, station: Station, msgid: int) -> CommandResult:
-        """Answer with MESSAGE_INTERVAL: -1 never, 0 there is no such message."""
+        """Answer with MESSAGE_INTERVAL: -1 never, 0 no such message."""
         interval_s = self._vehicle.interval_s(station.peer, msgid)
         interval_us = 0
         if interval_s is not None:
@@ -161,15 +161,15 @@ class CommandService:
 
 
 def _msgid(param: float) -> int:
-    """Return a message number, or -1: none."""
+    """A message number, or -1: none."""
     return int(param) if 0 <= param <= _MAX_MSGID else -1
 
 
 def _action(command: int, params: Sequence[float]) -> FcAction | None:
-    """Return what is to be done to the flight controller; None: it is another command, or asks for what it cannot do.
+    """The flight controller action for a command; None if there is none.
 
-    MAV_CMD_PREFLIGHT_CALIBRATION: one thing at a time; the compass by param2, the accelerometers by param5 (1, or 4 for
-    "simple"). MAV_CMD_PREFLIGHT_STORAGE: param1 = 1 writes.
+    MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time; param2 for the compass, param5 for the accelerometers (1, or 4
+        for "simple"). MAV_CMD_PREFLIGHT_STORAGE: param1 = 1 writes.
     """
     asked = {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
     if command == messages.MAV_CMD_PREFLIGHT_CALIBRATION:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames from ground stations on their way in. Sans-IO."""
+"""Frames received from ground stations. Sans-IO."""
 
 from collections.abc import Callable
 from functools import partial
@@ -48,7 +48,7 @@ class Incoming:
         self.routes: PassThrough | None = None
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        """Take bytes from a ground station. A datagram holds whole frames only."""
+        """Handle bytes from a ground station. A datagram holds whole frames only."""
         for frame in self._ground.received(peer, data, now, datagram=datagram):
             refused = self._guard.refusal(peer, frame)
             if refused is not None and refused.is_forged:
@@ -67,7 +67,7 @@ class Incoming:
                         self._router.take(station, message, now)
 
     def _pass_on(self, routes: PassThrough, station: Station, frame: MavlinkFrame, now: float) -> None:
-        """Send a frame on to its targets, as far as its sender may."""
+        """Send a frame on to its targets, within its sender's rights."""
         peer = station.peer
         if not self._ground.budgets.allows(Cost.PASSED, peer, now):
             return
@@ -83,7 +83,7 @@ class Incoming:
             self._answer_refused(refused, station, frame)
 
     def _answer_refused(self, refused: GuardRefusal, station: Station, frame: MavlinkFrame) -> None:
-        """Answer a frame that the guard refused, under the ids that it was sent to, if these are the vehicle's."""
+        """Answer a refused frame under the ids that it addressed, if these are the vehicle's."""
         system, component = target_of(frame)
         if self.routes is None:
             answers, is_vehicle = partial(self._ground.to, station), self._is_ours(system, component)
@@ -98,7 +98,7 @@ class Incoming:
         if answer is not None:
             answers(answer)
         elif message is not None and frame.msgid == messages.MAVLINK_MSG_ID_PARAM_SET and self.routes is None:
-            # The protocol's answer is the value that is in force.
+            # The protocol's answer is the current value.
             self._parameters.send_one(station, message.param_id, -1)
         if refused.is_first:
             answers(messages.MAVLink_statustext_message(Severity.WARNING, f"Refused: {refused.why}".encode()))

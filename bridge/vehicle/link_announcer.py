@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tells the pilot when the flight controller is lost and when it is back. Sans-IO.
+"""Texts for the pilot about a lost flight controller and its return. Sans-IO.
 
-A craft that arms may change protocol and speed, and is searched for a second or two. That is not a loss: Mission
-Planner reads warnings out loud.
+A craft that arms may change protocol and speed; finding it again takes a second or two. That is not reported as a
+loss: Mission Planner reads warnings out loud.
 """
 
 from bridge.fc.autosense import Spoken
@@ -15,7 +15,7 @@ _REPEAT_S = 10.0
 
 
 class LinkAnnouncer:
-    """Decides what to say. Each method returns a text to show, or None."""
+    """Each method returns a text to show, or None."""
 
     def __init__(self) -> None:
         self._known: str | None = None
@@ -55,5 +55,5 @@ class LinkAnnouncer:
         return Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s"
 
     def next_deadline(self) -> float | None:
-        """When `tick` has something to do."""
+        """The time of the next `tick`."""
         return None if self._silent_since is None else self._say_at

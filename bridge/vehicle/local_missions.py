@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions from the Pi itself: the command line, the status page and zenoh write, read and check them here. Sans-IO."""
+"""Mission operations for the command line, the status page and zenoh. Sans-IO."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -20,7 +20,7 @@ _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would 
 
 
 class LocalMissions:
-    """Does with a whole list what an upload by a ground station does item by item."""
+    """Writes, reads and checks whole lists, by the same rules as uploads from ground stations."""
 
     def __init__(
         self,
@@ -48,9 +48,9 @@ class LocalMissions:
         *,
         may_erase: bool = True,
     ) -> None:
-        """Write a list; without items, clear the flight controller's. `on_progress` gets the records written so far.
+        """Write a list; an empty one clears the flight controller's. `on_progress` gets the number of records written.
 
-        `may_erase` False: a list of which no item can be stored is refused.
+        `may_erase` False: a list without a storable item is refused.
         """
         owner = object()
         incident = self._incidents.begin("push")
@@ -92,7 +92,7 @@ class LocalMissions:
             done(refusal, now)
 
     def pull(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
-        """Read the list that the flight controller holds."""
+        """Read the flight controller's list."""
 
         def done(held: HeldMission | Refusal | LinkLost, _at: float) -> None:
             on_done(NO_LINK if isinstance(held, LinkLost) else held)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which message from a ground station is whose business: one table."""
+"""The dispatch table for messages from ground stations."""
 
 from collections.abc import Callable
 from math import inf
@@ -17,10 +17,10 @@ from protocols.mavlink.ftp import refuse
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import MissionItem, MissionResult
 
-#: MISSION_ITEM.current of what is no part of a list: Mission Planner's "Fly to here" and "Change altitude".
+#: MISSION_ITEM.current of items outside a list: Mission Planner's "Fly to here" and "Change altitude".
 _GUIDED = (2, 3)
 
-#: A mission transfer is as fast as both ends can be; other messages are seldom.
+#: Messages of a mission transfer, which may come at any rate; others are rare.
 _OF_A_TRANSFER = frozenset(
     {
         m.MAVLINK_MSG_ID_MISSION_COUNT,
@@ -36,7 +36,7 @@ _Handler = Callable[[Station, Message, float], None]
 
 
 class MessageRouter:
-    """Hands each message that the bridge understands to the part that answers it."""
+    """Passes each known message to the part that answers it."""
 
     def __init__(
         self,
@@ -89,11 +89,11 @@ class MessageRouter:
         }
 
     def understands(self, msgid: int) -> bool:
-        """Tell whether a message is worth decoding."""
+        """True if the message has a handler."""
         return msgid in self._handlers
 
     def take(self, station: Station, message: Message, now: float) -> None:
-        """Deal with a message that `understands` said yes to, unless its sender floods us."""
+        """Handle a message for which `understands` is True, unless its sender exceeds its limit."""
         msgid = message.get_msgId()
         if self._post.allows(station, Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
             self._handlers[msgid](station, message, now)
@@ -136,7 +136,7 @@ class MessageRouter:
             self._post.to(station, m.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer))
 
     def _ping(self, station: Station, message: Message, _now: float) -> None:
-        # A PING with targets is the answer to somebody's question.
+        # A PING with targets is itself an answer.
         if message.target_system == 0:
             self._post.to(
                 station, m.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid)

@@ -16,19 +16,19 @@ from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 
-#: Ground stations whose reading is remembered; the oldest is forgotten first.
+#: Downloads that are remembered; the oldest is forgotten first.
 _MAX_READERS = 16
-#: A reading that does not go on for so long is over, though its MISSION_ACK was lost: Mission Planner asks for an item
-#: for 15 s.
+#: A download without a request for this long has ended, even if its MISSION_ACK was lost: Mission Planner retries an
+#: item for 15 s.
 _READING_S = 20.0
-#: Questions that wait for the list to be read; more are not answered, and repeated by who asked.
+#: Requests that wait for the list to be read; further ones are dropped, and repeated by their senders.
 _MAX_QUESTIONS = 32
 _ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to read the mission")
 
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """What a ground station wants of the list: item `seq`, or how many there are."""
+    """A ground station's request: item `seq`, or the count if None."""
 
     station: Station
     seq: int | None
@@ -37,14 +37,14 @@ class _Question:
 
 @dataclass(slots=True)
 class _Snapshot:
-    """The list as it was when a ground station began to read it."""
+    """The list as of the start of a download."""
 
     items: tuple[MissionItem, ...]
     until: float
 
 
 class MissionDownloads:
-    """Every ground station reads its own snapshot: an upload in between cannot mix two lists in it."""
+    """Every ground station reads its own snapshot, so an upload in between cannot mix two lists."""
 
     def __init__(
         self,
@@ -95,18 +95,18 @@ class MissionDownloads:
         self._snapshots.pop(station, None)
 
     def forget_all(self) -> None:
-        """The flight controller is another one."""
+        """The flight controller has changed."""
         self._snapshots.clear()
 
     def _ask(self, question: _Question, now: float) -> None:
-        """Read the list once for all who wait for it: who hammers the bridge must not fill its queue."""
+        """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""
         if len(self._questions) < _MAX_QUESTIONS:
             self._questions[question] = None
         if self._is_reading:
             return
         held = self._missions.held
         if held is not None and (self._is_armed() or not self._post.allows(question.station, Cost.BOARD)):
-            # Armed it cannot have changed; and a station that asks too often gets the copy.
+            # While armed the list cannot change; a station that asks too often gets the copy, too.
             self._read(held, now)
         else:
             self._is_reading = True
@@ -120,7 +120,7 @@ class MissionDownloads:
         for question in questions:
             if isinstance(held, Refusal):
                 if question.seq == 0 and (self._is_armed() or self._home() is not None):
-                    # Mission Planner asks for it on arming, which may have changed the protocol just now.
+                    # Mission Planner requests it on arming, which may have just changed the protocol.
                     self._send_item(question.station, self._present_home(), as_int=question.as_int)
                 else:
                     self._refuse(question.station, held)
@@ -133,7 +133,7 @@ class MissionDownloads:
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...]) -> None:
         if question.seq is None:
-            # DroneKit takes home from a download, and waits for ever without one: an empty list has a home, if known.
+            # DroneKit takes home from a download, and waits for ever without one: so an empty list has home if known.
             self._send_count(question.station, len(items) or int(self._home() is not None))
         elif question.seq < len(items):
             self._send_item(question.station, items[question.seq], as_int=question.as_int)
@@ -151,7 +151,7 @@ class MissionDownloads:
         self._post.to(station, item_message(item, station.sysid, station.compid, as_int=as_int))
 
     def _present_home(self) -> MissionItem:
-        """Item 0 as last read, at the height of HOME_POSITION: Mission Planner takes its ground level from it."""
+        """Item 0 as last read, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
         known, home = self._missions.home_item(), self._home()
         if known is None:
             return self._home_item()
@@ -159,7 +159,7 @@ class MissionDownloads:
         return known if altitude_m is None else replace(known, alt_m=altitude_m)
 
     def _home_item(self) -> MissionItem:
-        """Item 0 of an empty list: home, as far as it is known."""
+        """Item 0 of an empty list: home, or zeros if unknown."""
         home = self._home() or Home(0, 0)
         return MissionItem(
             0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, home.lat_e7, home.lon_e7, home.altitude_m or 0.0

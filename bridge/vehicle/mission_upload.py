@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-Uploads are carried out one at a time, in the order of their MISSION_COUNT. Mission Planner eats its own packets and
-takes any ack to MISSION_COUNT as "go on"; most oddities below answer one of the habits in docs/ground-stations.md.
+Uploads run one at a time, in the order of their MISSION_COUNT. Mission Planner loses packets of its own and takes any
+ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed in docs/ground-stations.md.
 """
 
 from collections.abc import Callable
@@ -46,9 +46,9 @@ MISSION_TYPE_MISSION = 0
 MISSION_TYPE_ALL = 255
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "This upload is not known here: write it again")
-#: Mission Planner has told its user that "Write Fast" succeeded: that it did not is said three times, 2 s apart.
+#: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
 _REMINDERS_S = (2.0, 4.0)
-#: More uploads than this do not wait for their turn.
+#: The limit of running and waiting uploads.
 _MOST_UPLOADS = 8
 
 
@@ -61,7 +61,7 @@ class _Upload:
 
 
 class MissionUploads:
-    """All ground stations' uploads and clears. Time is passed in; messages go out through `post`."""
+    """All ground stations' uploads and clears. Messages go out through `post`."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class MissionUploads:
 
     @property
     def receiving(self) -> MissionTransfer | None:
-        """The upload whose items are coming in."""
+        """The upload that receives items."""
         for upload in self._uploads:
             if isinstance(upload.state, Receiving):
                 source, received = str(upload.station), len(upload.state.items)
@@ -140,7 +140,7 @@ class MissionUploads:
             return
         state = upload.state
         if not isinstance(state, Receiving):
-            # Its answer is on the way: a request, the final ack, or nothing.
+            # The next request or the final ack is on its way already.
             return
         if item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
@@ -150,7 +150,7 @@ class MissionUploads:
         if state.announced_again:
             state.announced_again = False
             if item.seq == 0:
-                # Two lists must never be mixed: nothing of the former one is kept.
+                # Two lists must never be mixed: the previous one is discarded.
                 self._forget(upload)
                 self._begin(station, upload.count, now)
                 return
@@ -183,25 +183,25 @@ class MissionUploads:
     # From the rest of the bridge.
 
     def armed(self, now: float) -> None:
-        """The craft was armed: an upload that is not yet with the flight controller ends."""
+        """The craft was armed: uploads that have not reached the flight controller end."""
         self._end(self._undelivered(), ARMED, now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
-        """A ground station's connection is closed: others need not wait for its upload to time out."""
+        """A ground station's connection is closed: its uploads end without waiting for the timeout."""
         gone = [upload for upload in self._undelivered() if upload.station.peer == peer]
         self._end(gone, _cancelled("ended by hanging up"), now)
 
     def stop(self, now: float) -> None:
-        """The bridge is about to end: a list that is not yet with the flight controller does not get there any more."""
+        """The bridge is stopping: uploads that have not reached the flight controller end."""
         self._end(self._undelivered(), _cancelled("ended: naze-bridge stops"), now)
 
     def link_lost(self, now: float) -> None:
-        """The flight controller is gone: so is the reason to go on receiving."""
+        """The flight controller is gone: uploads that still receive items end."""
         receiving = [upload for upload in self._uploads if isinstance(upload.state, Receiving)]
         self._end(receiving, Refusal(MissionResult.DENIED, "Flight controller lost during the upload"), now)
 
     def tick(self, now: float) -> None:
-        """Repeat a request, end a state whose time is up, begin the next upload."""
+        """Repeat a request, end a state at its deadline, begin the next upload."""
         for upload in self._uploads[:]:
             state = upload.state
             if now >= state.deadline:
@@ -222,7 +222,7 @@ class MissionUploads:
         times = [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
         return min(times, default=inf)
 
-    # What happens to an upload.
+    # State changes of an upload.
 
     def _begin(self, station: Station, count: int, now: float) -> None:
         self._answers.forget(station)
@@ -235,7 +235,7 @@ class MissionUploads:
         self._begin_next(now)
 
     def _begin_next(self, now: float) -> None:
-        """Give the turn to the first upload that waits for it."""
+        """Begin the first waiting upload."""
         for upload in self._uploads[:]:
             if isinstance(upload.state, Waiting):
                 refusal = self._missions.acquire(upload)
@@ -247,7 +247,7 @@ class MissionUploads:
                     self._handle(upload, Turn() if upload.count else Judged((), CLEARED_LIST), now)
 
     def _handle(self, upload: _Upload, event: Event, now: float) -> None:
-        """Go where the table says."""
+        """Change the state by the table."""
         before = upload.state
         if TRANSITIONS[type(before)][type(event)] is None:
             self._forget(upload)
@@ -278,13 +278,13 @@ class MissionUploads:
         self._missions.release(upload)
 
     def _is_for(self, upload: _Upload, count: int, now: float) -> bool:
-        """Take a MISSION_COUNT of a station whose upload runs; False if it announces another one."""
+        """Handle a MISSION_COUNT of a station whose upload runs; False if it announces a new one."""
         state = upload.state
         if isinstance(state, Delivering):
-            # The list before is being written. A cancel comes too late, a new list waits for its turn.
+            # The previous list is being written. A cancel comes too late, a new list waits for its turn.
             return count == 0
         if count == 0:
-            # Mission Planner's Cancel button. The pilot did not ask to lose the mission that is in the craft.
+            # Mission Planner's Cancel button, not a request to clear the mission on the craft.
             self._end([upload], _cancelled("cancelled"), now)
             return True
         if isinstance(state, Waiting):
@@ -299,7 +299,7 @@ class MissionUploads:
         return True
 
     def _ask(self, now: float) -> None:
-        """Ask the flight controller; one question serves all uploads that begin before it is answered."""
+        """Ask the flight controller; one request serves all uploads that begin before its reply."""
         if not self._is_asking:
             self._is_asking = True
             self._runner.start(self._missions.preflight(), self._asked, now)
@@ -325,7 +325,7 @@ class MissionUploads:
             self._handle(upload, Ready(check), now)
 
     def _request(self, upload: _Upload, state: Receiving, now: float) -> None:
-        """Ask for the lowest missing item; id 40, the only one that Mission Planner understands in both modes."""
+        """Request the lowest missing item, by id 40: the only one that Mission Planner understands in both modes."""
         state.request.asked(state.wanted, now)
         station = upload.station
         request = messages.MAVLink_mission_request_message(
@@ -346,7 +346,7 @@ class MissionUploads:
         )
 
     def _is_kept(self, upload: _Upload) -> bool:
-        """False if so many lists came from there that were not flown that this one is not stored."""
+        """False if a ground station sent too many lists that did not reach the flight controller."""
         return self._post.allows(upload.station, Cost.STORED)
 
     def _delivered(self, upload: _Upload, verdict: Verdict[Any], delivery: Delivery | LinkLost, now: float) -> None:
@@ -362,7 +362,7 @@ class MissionUploads:
         self._begin_next(now)
 
     def _tell(self, station: Station, verdict: Verdict[Any], delivery: Delivery) -> None:
-        """Tell the writer all of it, other ground stations what has changed on the aircraft."""
+        """Report everything to the sender, and the change on the aircraft to other ground stations."""
         if delivery.ack is not MissionResult.ACCEPTED:
             self._post.say(Severity.ERROR, delivery.text, station)
         else:
@@ -377,7 +377,7 @@ class MissionUploads:
             self._post.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
 
     def _refuse(self, upload: _Upload, state: State, refusal: Refusal, now: float) -> None:
-        """Tell why an upload has ended; the items that came are stored all the same."""
+        """Report the reason for the end of an upload; the received items are stored all the same."""
         if isinstance(state, Receiving) and state.items:
             items = tuple(state.items[seq] for seq in sorted(state.items))
             finding = Finding(None, "list", len(items), None, refusal.text)
@@ -402,9 +402,9 @@ class MissionUploads:
         return [upload for upload in self._uploads if not isinstance(upload.state, Delivering)]
 
     def _follow(self, station: Station, now: float) -> None:
-        """Go on with the upload of a ground station whose address has changed (Wi-Fi roaming), if this is it.
+        """Continue the upload of a ground station whose address has changed (Wi-Fi roaming).
 
-        One that was answered here has announced a list of its own: two lists must never be mixed.
+        Not if it was answered at this address: then it has announced another list, and lists must never be mixed.
         """
         if self._of(station) is not None or self._answers.was_said_to(station, now):
             return
@@ -414,9 +414,9 @@ class MissionUploads:
                 upload.station = station
 
     def _late_item(self, station: Station, seq: int, now: float) -> None:
-        """Answer an item of an upload that has ended, or of one that a killed daemon knew of.
+        """Answer an item of an upload that has ended, or that was lost when the daemon was killed.
 
-        A ground station whose address has just changed is neither.
+        A ground station whose address has just changed gets no answer.
         """
         answer = self._answers.to(station, now)
         if answer is not None:
@@ -447,4 +447,4 @@ def _cancelled(why: str) -> Refusal:
 
 
 def _ignore(_records: int) -> None:
-    """MAVLink has no message for progress."""
+    """No progress report: MAVLink has no message for it."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Notices that the flight controller's mission is no longer the one that was last read or written. Sans-IO."""
+"""Watches for mission changes by others than the bridge. Sans-IO."""
 
 from bridge.gcs.station import Post, Severity
 from bridge.line.conversation import LinkLost
@@ -7,12 +7,12 @@ from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionChange, MissionService
 from bridge.model.events import EventLog
 
-#: A pilot loads a mission with the sticks, another client writes one: both are noticed within two seconds.
+#: Short enough to notice a mission loaded with the sticks or written by another client within two seconds.
 _INTERVAL_S = 1.0
 
 
 class MissionWatch:
-    """Looks once a second while nothing else is asked about missions."""
+    """Checks once a second while no transfer runs."""
 
     def __init__(self, missions: MissionService, runner: Runner, post: Post, log_event: EventLog) -> None:
         self._missions = missions
@@ -23,14 +23,14 @@ class MissionWatch:
         self._due: float | None = None
 
     def look(self, now: float) -> None:
-        """Look now: a flight controller was found."""
+        """Check now: a flight controller was found."""
         self._due = now + _INTERVAL_S
         if not self._is_looking:
             self._is_looking = True
             self._runner.start(self._missions.watch(), self._looked, now)
 
     def tick(self, now: float) -> None:
-        """Look if it is time."""
+        """Check if it is time."""
         if self._due is None or now < self._due:
             return
         if self._missions.dialect is None:
@@ -41,7 +41,7 @@ class MissionWatch:
             self.look(now)
 
     def next_deadline(self) -> float | None:
-        """When `tick` has something to do."""
+        """The time of the next `tick`."""
         return self._due
 
     def _looked(self, news: MissionChange | LinkLost | None, _now: float) -> None:

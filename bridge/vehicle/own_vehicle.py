@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The vehicle that ground stations see while the flight controller does not speak for itself. Sans-IO.
+"""The vehicle that ground stations see while the flight controller does not represent itself. Sans-IO.
 
-It is there from the start and keeps its ids whatever the flight controller does: no ground station loses it because
-the craft was armed and speaks another protocol now.
+It exists from the start and keeps its ids, so when the craft arms and switches protocol, ground stations still see the
+same vehicle.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -25,7 +25,7 @@ from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 
-#: HEARTBEAT, and the messages that follow no reading.
+#: The interval of HEARTBEAT, and the clock for messages without a reading.
 _TICK_S = 1.0
 #: Mission Planner needs two heartbeats to connect.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
@@ -44,7 +44,7 @@ _DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | dict.fromkeys(_TI
 
 
 class OwnVehicle:
-    """Sends what is known of the vehicle, each ground station what and as often as it wishes."""
+    """Sends the vehicle's messages to each ground station at the rates that it requests."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class OwnVehicle:
         self._rows: dict[type[Reading], list[Row]] = {}
         self._rates = MessageRates(_DEFAULTS)
         self._progress = MissionProgress()
-        #: Messages that follow no reading.
+        #: Messages that are not triggered by a reading.
         self._ticked: Mapping[int, Callable[[], Message | None]] = {
             messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
             messages.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._nav_controller_output,
@@ -75,13 +75,13 @@ class OwnVehicle:
         self._announced_home: Home | None = None
         self._told_blockers: tuple[str, ...] = ()
         self._also_wanted: Mapping[type[Reading], float] = {}
-        #: New ground stations, and until when they get more heartbeats.
+        #: New ground stations, and the end of their faster heartbeats.
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
         self._announced: tuple[bool | None, FlightMode | str | None] | None = None
 
     def newcomer(self, peer: Peer) -> None:
-        """Greet a new ground station: it gets heartbeats faster so that it connects sooner, and must hear of home."""
+        """Greet a new ground station with faster heartbeats, so that it connects sooner, and with home."""
         self._announced_home = None
         self._told_blockers = ()
         self._newcomers[peer] = self._now + _NEWCOMER_S
@@ -90,7 +90,7 @@ class OwnVehicle:
         self._set_polls(self._ground.everyone())
 
     def tick(self, now: float) -> None:
-        """Send what is due by time."""
+        """Send the messages that are due."""
         self._now = now
         if now >= self._newcomers_due:
             self._greet(now)
@@ -112,7 +112,7 @@ class OwnVehicle:
         self._announce_home()
 
     def next_deadline(self) -> float:
-        """When `tick` has something to do."""
+        """The time of the next `tick`."""
         return min(self._tick_due, self._newcomers_due)
 
     def _greet(self, now: float) -> None:
@@ -123,7 +123,7 @@ class OwnVehicle:
                 self._ground.greet(peer, self._make_heartbeat())
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
-        """The vehicle has new readings: send the messages that they are for, where due."""
+        """Send the messages that follow from new readings, where due."""
         self._now = now
         everyone = self._ground.everyone()
         at: Moment | None = None
@@ -147,19 +147,19 @@ class OwnVehicle:
                 self._ground.multicast(pack(message), peers)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
-        """Poll for others than ground stations, too: seconds by reading."""
+        """Poll for consumers other than ground stations, too: seconds by reading."""
         self._also_wanted = readings
         self._set_polls(self._ground.everyone())
 
     def home(self) -> tuple[int, int] | None:
-        """Home, or else the present position, degrees * 1e7."""
+        """Home; if unknown the present position; degrees * 1e7."""
         home = self._session.vehicle.home_or_position()
         return None if home is None else (home.lat_e7, home.lon_e7)
 
-    # What ground stations ask for.
+    # Requests of ground stations.
 
     def send_once(self, station: Station, msgid: int) -> bool | None:
-        """Send one message to who asks for it; False: not enough is known, None: there is no such message."""
+        """Send one message to a ground station; False: its values are unknown, None: no such message."""
         makers = self._makers(msgid)
         sent = False
         for make in makers:
@@ -170,21 +170,21 @@ class OwnVehicle:
         return sent if makers else None
 
     def set_interval(self, peer: Peer, msgid: int, interval_s: float | None) -> bool:
-        """Send a message to one ground station every so often; None: as by default. False: no such message."""
+        """Set the interval of a message for one ground station; None: the default. False: no such message."""
         if not self._rates.knows(msgid):
             return False
-        self._rates.wish(peer, msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
+        self._rates.request(peer, msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
         self._set_polls(self._ground.everyone())
         return True
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
-        """Do the same with all messages of one of ArduPilot's streams."""
+        """Set the interval of all messages of one of ArduPilot's streams."""
         for msgid, its_stream in _STREAMS.items():
             if its_stream == stream or (stream == _ALL_STREAMS and its_stream != NO_STREAM):
                 self.set_interval(peer, msgid, interval_s)
 
     def interval_s(self, peer: Peer, msgid: int) -> float | None:
-        """Return how often a ground station gets a message at present; infinity: never, None: no such message."""
+        """The present interval of a message for a ground station; infinity: never, None: no such message."""
         if msgid == messages.MAVLINK_MSG_ID_HEARTBEAT:
             return _TICK_S
         if not self._rates.knows(msgid):
@@ -195,7 +195,7 @@ class OwnVehicle:
         return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
 
     def _set_polls(self, everyone: Sequence[Peer]) -> None:
-        """Poll as often as somebody wants to hear of it."""
+        """Set each poll to the highest rate requested."""
         wanted: dict[Msp, float] = {}
         for reading, interval_s in self._also_wanted.items():
             _want(wanted, reading, interval_s)
@@ -258,7 +258,7 @@ class OwnVehicle:
         return None if unix_s is None else vehicle_messages.system_time(self._moment(), unix_s)
 
     def _follow_mission(self) -> None:
-        """Tell at once what was reached and where it flies to next."""
+        """Report a reached waypoint and the next one at once."""
         leg = self._session.vehicle.last(MissionLeg)
         before = self._progress.number, self._progress.progress
         reached = None if leg is None else self._progress.take(leg.status)
@@ -269,7 +269,7 @@ class OwnVehicle:
             self._ground.broadcast(vehicle_messages.mission_item_reached(seq))
 
     def _tell_readiness(self) -> None:
-        """Tell why it will not arm, whenever the reasons change; in flight there are none."""
+        """Report what prevents arming, whenever that changes; nothing in flight."""
         readiness = self._session.vehicle.last(Readiness)
         if readiness is None or readiness.blockers == self._told_blockers:
             return
@@ -278,7 +278,7 @@ class OwnVehicle:
             self._ground.say(Severity.NOTICE, f"Not ready to arm: {', '.join(readiness.blockers)}")
 
     def _announce_home(self) -> None:
-        """HOME_POSITION whenever it is another one; who asks gets it at any time."""
+        """Broadcast HOME_POSITION whenever it changes; it can also be requested at any time."""
         home = self._session.vehicle.home
         if home == self._announced_home:
             return

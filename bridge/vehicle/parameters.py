@@ -12,7 +12,7 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.msp.mission import MAX_RADIUS_CM
 
 _REAL32 = 9
-#: Mission Planner's name for the radius in its plan screen; the unit that goes with this name is cm.
+#: Mission Planner's name for the radius in its plan screen; with this name it is in cm.
 WP_RADIUS = "WPNAV_RADIUS"
 SYSID = "SYSID_THISMAV"
 
@@ -40,7 +40,7 @@ class Parameters:
         self._send(station, name)
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
-        """PARAM_SET: answered by the value that is in force then, as the protocol wants."""
+        """PARAM_SET: answered with the value then in force, as the protocol requires."""
         dialect = self._missions.dialect
         if name != WP_RADIUS or dialect is None or dialect.wp_radius_cm is None:
             if name == WP_RADIUS:
@@ -54,11 +54,11 @@ class Parameters:
         # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
         wanted_cm = round(value)
         if wanted_cm == dialect.wp_radius_cm:
-            # An equal value is not written: the board's whole configuration would be erased for it.
+            # An equal value is not written: that would erase and rewrite the board's whole configuration.
             self._send(station, name)
             return
         if self._is_setting:
-            # Its answer is on the way; who asked for another value asks again.
+            # A change is pending; a station that requested another value repeats its request.
             return
         if self._missions.armed_refusal() is not None:
             self._post.say(Severity.ERROR, _stays(dialect.wp_radius_cm), station)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which message follows which reading, how often by default, and in which of ArduPilot's streams it is."""
+"""The table of telemetry messages: their reading, default interval and ArduPilot stream."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ EXTRA1, EXTRA2, EXTRA3 = 10, 11, 12
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One message id. It is sent as soon as `reading` is heard; `interval_s` infinite: only on request."""
+    """One message. It is sent as soon as `reading` is heard; `interval_s` infinite: only on request."""
 
     msgid: int
     reading: type[Reading]

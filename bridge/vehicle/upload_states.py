@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One upload, from MISSION_COUNT to the final MISSION_ACK: its states, what ends them, and the one table of both."""
+"""The states of an upload, from MISSION_COUNT to the final MISSION_ACK, their events and transitions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -13,35 +13,35 @@ from bridge.model.verdict import Verdict
 from bridge.vehicle.item_request import ItemRequest
 from protocols.mission_item import MissionItem, MissionResult
 
-#: Mission Planner's "Write Fast" has ended: for so long an item that the network delayed may still come, s.
+#: After the end of Mission Planner's "Write Fast", delayed items may arrive for this long.
 _LAST_ITEMS_S = 0.3
 
 
 class Event:
-    """What takes an upload from one state to the next."""
+    """An event that changes an upload's state."""
 
 
 class Turn(Event):
-    """No other transfer runs any more."""
+    """The previous transfer has ended."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ready(Event):
-    """The flight controller would take a list."""
+    """The flight controller can take a list."""
 
     check: ListCheck
 
 
 @dataclass(frozen=True, slots=True)
 class Judged(Event):
-    """The whole list is there, or enough of it to reject it."""
+    """The list is complete, or enough of it has arrived to reject it."""
 
     items: tuple[MissionItem, ...]
     verdict: Verdict[Any]
 
 
 class Delivered(Event):
-    """The flight controller holds the list, or does not: either way that was verified."""
+    """The write has ended, with the verified result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Ended(Event):
 
 
 class State(ABC):
-    """A state ends by itself at `deadline`, `seconds` after it began or went on, with `timeout` as the answer."""
+    """A state times out at `deadline`, `seconds` after its start or last progress, with `timeout` as the answer."""
 
     seconds: ClassVar[float]
 
@@ -62,10 +62,10 @@ class State(ABC):
     @property
     @abstractmethod
     def timeout(self) -> Refusal:
-        """The answer to the ground station if nothing happens until the deadline."""
+        """The answer to the ground station at the deadline."""
 
     def next_tick(self) -> float:
-        """When there is something to do."""
+        """The time of the next `tick`."""
         return self.deadline
 
 
@@ -77,14 +77,14 @@ class Waiting(State):
 
 
 class Asking(State):
-    """The flight controller is asked whether it would take a list."""
+    """The flight controller has been asked if it can take a list."""
 
     seconds = 5.0
     timeout = Refusal(MissionResult.DENIED, "The flight controller does not answer: try again")
 
 
 class Receiving(State):
-    """Items come in, each judged as soon as all before it are there."""
+    """Receives items; each is checked once all before it have arrived."""
 
     seconds = 5.0
 
@@ -93,15 +93,15 @@ class Receiving(State):
         self._count = count
         self._check = check
         self.items: dict[int, MissionItem] = {}
-        self._judged = 0  # items 0.._judged-1 are there and judged
+        self._judged = 0  # items 0.._judged-1 have arrived and are checked
         self.request = ItemRequest()
-        #: MISSION_COUNT came again, from a client that begins again or from the network: the next item tells.
+        #: MISSION_COUNT came again: the client restarted, or the network duplicated it. The next item shows which.
         self.announced_again = False
         self._is_closed = False
 
     @property
     def timeout(self) -> Refusal:
-        """Why the list is not written."""
+        """The refusal for missing items."""
         text = f"Upload silent for {self.seconds:.0f} s, old mission kept"
         if self._is_closed:
             missing = self._count - len(self.items)
@@ -110,7 +110,7 @@ class Receiving(State):
 
     @property
     def is_closed(self) -> bool:
-        """True once the ground station takes its list for written."""
+        """True once the ground station considers its list written."""
         return self._is_closed
 
     @property
@@ -119,11 +119,11 @@ class Receiving(State):
         return 0 if self.announced_again else self._judged
 
     def next_tick(self) -> float:
-        """When the request is repeated, or the upload given up."""
+        """The time to repeat the request, or to give up."""
         return min(self.deadline, self.request.due)
 
     def take(self, item: MissionItem, now: float) -> Judged | bool:
-        """Keep an item: the end of the list, or whether the next one is to be requested."""
+        """Keep an item; returns Judged at the end of the list, else True if the next item is to be requested."""
         if item.seq in self.items:
             return not self.request.is_copy(now)
         if item.seq == self._judged:
@@ -137,7 +137,7 @@ class Receiving(State):
         return self._end() if self._judged == self._count else True
 
     def close(self, now: float) -> None:
-        """The ground station says that it has ended: "Write Fast" does so whether or not every item has arrived."""
+        """The ground station ends the upload: "Write Fast" does so even if items were lost."""
         if self.items:
             self._is_closed = True
             self.deadline = now + _LAST_ITEMS_S

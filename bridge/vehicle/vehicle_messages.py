@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The MAVLink messages of the vehicle that the bridge represents: docs/telemetry.md, field by field.
+"""The MAVLink messages of the vehicle that the bridge represents (docs/telemetry.md).
 
-An unknown or stale value is MAVLink's "unknown"; a message whose fields have no such value is not made (None).
+An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields have no such value is not made (None).
 """
 
 import math
@@ -32,7 +32,7 @@ from bridge.model.vehicle import (
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 
-#: MultiWii's MULTITYPE (Harakiri: mw.h) -> MAV_TYPE. Ground stations choose their screens by it; the rest are copters.
+#: MultiWii's MULTITYPE (Harakiri: mw.h) -> MAV_TYPE, by which ground stations choose their screens. Others are copters.
 _TYPES = {
     1: messages.MAV_TYPE_TRICOPTER,
     6: messages.MAV_TYPE_HEXAROTOR,
@@ -47,7 +47,7 @@ _TYPES = {
     16: messages.MAV_TYPE_HELICOPTER,
     18: messages.MAV_TYPE_HEXAROTOR,
 }
-#: custom_mode of ArduCopter, and of ArduPlane for what has wings: there is no name for a hold of the height alone.
+#: custom_mode of ArduCopter, and of ArduPlane for planes, which has no mode that holds only the altitude.
 _COPTER_MODES = {
     FlightMode.STABILIZE: 0,
     FlightMode.ACRO: 1,
@@ -73,7 +73,7 @@ _SENSORS = {
 }
 #: Without motor outputs Mission Planner shows a safety switch that is on.
 _ALWAYS_THERE = messages.MAV_SYS_STATUS_SENSOR_3D_GYRO | messages.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
-#: There is no fence, but without this bit MAVProxy says "fence breach".
+#: There is no fence, but without this bit MAVProxy reports "fence breach".
 _NEVER_ILL = messages.MAV_SYS_STATUS_GEOFENCE
 
 _CAPABILITIES = (
@@ -84,7 +84,7 @@ _CAPABILITIES = (
 )
 _NO_MISSION = 1
 _NO_TOTAL = 0xFFFF
-#: Of a firmware that reports none: below 1.0 Mission Planner hides the choice of altitude frames.
+#: For firmware that reports no version: below 1.0 Mission Planner hides the choice of altitude frames.
 _UNKNOWN_VERSION = (1, 0, 0)
 _OFFICIAL = 255
 _UNKNOWN_U16 = 0xFFFF
@@ -92,7 +92,7 @@ _UNKNOWN_U8 = 0xFF
 _RAW_CHANNELS, _CHANNELS = 8, 18
 _MAX_RSSI = 254
 _UNKNOWN_RATES = (math.nan, math.nan, math.nan)
-#: An armed craft that is higher or faster than this is in the air.
+#: An armed craft above this height or speed is in the air.
 _FLYING_M, _FLYING_M_S = 1.0, 0.5
 _THROTTLE = 2
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
@@ -112,7 +112,7 @@ class Moment:
         return self.vehicle.fresh(kind, self.now, self.stale_s)
 
     def altitude_m(self, position: GlobalPosition) -> float:
-        """Above mean sea level: home's altitude plus the height above it, which is finer than GPS's whole metres."""
+        """Above mean sea level: home's altitude plus the height above it, finer than the GPS's whole metres."""
         home, height = self.vehicle.home, self.fresh(Height)
         if home is None or home.altitude_m is None or height is None:
             return position.altitude_m
@@ -159,7 +159,7 @@ def autopilot_version(vehicle: Vehicle) -> Message:
 
 
 def mission_current(count: int, seq: int = 0, progress: Progress = Progress.NOT_STARTED) -> Message:
-    """MISSION_CURRENT: `count` items are held (home included), item `seq` is flown to."""
+    """MISSION_CURRENT: `count` items (home included), the craft flies to item `seq`."""
     if not count:
         return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _NO_MISSION, 0)
     return messages.MAVLink_mission_current_message(seq, count - 1, progress.value, 0)
@@ -251,7 +251,7 @@ def vfr_hud(at: Moment) -> Message | None:
 
 
 def sys_status(at: Moment) -> Message | None:
-    """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads. A sensor that is not heard is not healthy."""
+    """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads. A silent sensor is not healthy."""
     health = at.vehicle.last(Health)
     if health is None:
         return None
@@ -288,7 +288,7 @@ def sys_status(at: Moment) -> Message | None:
 
 
 def battery_status(at: Moment) -> Message | None:
-    """BATTERY_STATUS: mV (Mission Planner reads the voltage only here), cA and mAh."""
+    """BATTERY_STATUS: mV (Mission Planner reads the voltage only from here), cA and mAh."""
     power = at.fresh(Power)
     if power is None or power.voltage_v is None:
         return None
@@ -320,7 +320,7 @@ def rc_channels_raw(at: Moment) -> Message | None:
 
 
 def raw_imu(at: Moment) -> Message | None:
-    """RAW_IMU: as the flight controller scales them."""
+    """RAW_IMU: in the flight controller's own scale."""
     imu = at.fresh(ImuSample)
     if imu is None:
         return None
@@ -375,7 +375,7 @@ def local_position_ned(at: Moment) -> Message | None:
 
 
 def nav_controller_output(at: Moment, target: Place, height_m: float | None) -> Message | None:
-    """NAV_CONTROLLER_OUTPUT: the way to a place, degrees and metres. The flight controller's own aims are unknown."""
+    """NAV_CONTROLLER_OUTPUT: direction and distance to a place, degrees and metres. The set points are unknown."""
     position, now, height = at.fresh(GlobalPosition), at.fresh(Orientation), at.fresh(Height)
     if position is None or now is None:
         return None
@@ -393,7 +393,7 @@ def system_time(at: Moment, unix_s: float) -> Message:
 
 
 def extended_sys_state(at: Moment) -> Message | None:
-    """EXTENDED_SYS_STATE: disarmed is on the ground; armed it depends on height, climb and speed."""
+    """EXTENDED_SYS_STATE: on the ground while disarmed; armed it depends on height, climb and speed."""
     state = at.fresh(FlightState)
     if state is None or state.armed is None:
         return None
@@ -409,7 +409,7 @@ def extended_sys_state(at: Moment) -> Message | None:
 
 
 def cycle_time(at: Moment) -> Message | None:
-    """NAMED_VALUE_INT: the main loop's time in microseconds."""
+    """NAMED_VALUE_INT: the main loop's cycle time, microseconds."""
     health = at.fresh(Health)
     if health is None or health.cycle_time_us is None:
         return None
@@ -417,7 +417,7 @@ def cycle_time(at: Moment) -> Message | None:
 
 
 def i2c_errors(at: Moment) -> Message | None:
-    """NAMED_VALUE_INT: sensor reads that failed since the flight controller's start."""
+    """NAMED_VALUE_INT: failed sensor reads since boot."""
     health = at.fresh(Health)
     if health is None or health.i2c_errors is None:
         return None
@@ -425,7 +425,7 @@ def i2c_errors(at: Moment) -> Message | None:
 
 
 def home_distance(at: Moment) -> Message | None:
-    """NAMED_VALUE_FLOAT: metres to home."""
+    """NAMED_VALUE_FLOAT: distance to home, metres."""
     position, home = at.fresh(GlobalPosition), at.vehicle.home
     if position is None or home is None:
         return None
@@ -463,6 +463,6 @@ def _scaled_u16(value: float | None, parts: int) -> int:
 
 
 def _fit(value: int, bits: int) -> int:
-    """Keep a value within a signed field: a damaged reply may say anything."""
+    """Clamp a value to a signed field: a damaged reply may hold any number."""
     limit = 1 << bits - 1
     return min(max(value, -limit), limit - 1)

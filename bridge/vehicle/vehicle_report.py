@@ -38,8 +38,8 @@ from bridge.model.vehicle_groups import (
 )
 from protocols.msp.telemetry import Sensor
 
-#: The readings that a group shows, and how often they are polled while the group is watched, seconds. A group is news
-#: when the first of its readings is.
+#: The readings of each group, and their poll intervals while the group is watched, seconds. A group is published when
+#: its first reading arrives.
 _SHOWS: Mapping[Group, Mapping[type[Reading], float]] = {
     Group.ATTITUDE: {Orientation: 0.1},
     Group.POSITION: {GlobalPosition: 0.2, Height: 0.2},
@@ -55,7 +55,7 @@ _NOTHING: frozenset[Group] = frozenset()
 
 
 class VehicleReporter:
-    """Makes groups on request. `want`: sets how often each reading is polled, seconds."""
+    """Makes groups on request. `want` sets the poll interval of each reading, seconds."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class VehicleReporter:
         self._missions = missions
         self._ground = ground
         self._want = want
-        #: Ages are counted to this time, monotonic s.
+        #: The time to which ages refer, monotonic s.
         self.now = 0.0
         self._fresh: set[Group] = set()
         self._watched: frozenset[Group] = frozenset()
@@ -80,7 +80,7 @@ class VehicleReporter:
             self._fresh.update(group for reading, group in _NEWS_OF.items() if reading in news)
 
     def watch(self, groups: Iterable[Group]) -> None:
-        """Poll for these groups from now on; `take_fresh` returns those with news."""
+        """Poll for these groups from now on; `take_fresh` returns the updated ones."""
         self._watched = frozenset(groups)
         wanted: dict[type[Reading], float] = {}
         for group in self._watched:
@@ -93,7 +93,7 @@ class VehicleReporter:
         return bool(self._watched)
 
     def take_fresh(self) -> frozenset[Group]:
-        """The watched groups with news since the last call."""
+        """The watched groups updated since the last call."""
         if not self._fresh:
             return _NOTHING
         fresh = self._watched & self._fresh
