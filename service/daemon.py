@@ -43,7 +43,7 @@ _SEARCH_REPORT_S = 60.0
 #: How long a stop waits: for a push to be done, for it to be given up, for the store. All of it is within 2 s.
 _FINISH_S = 1.0
 _ABORT_S = 0.6
-_STORE_PATIENCE_S = 0.2
+_STORE_TIMEOUT_S = 0.2
 _REST_INTERVAL_S = 0.02
 #: Frames come in over zenoh only if its transport is authenticated, or if the owner said that it need not be.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
@@ -174,7 +174,7 @@ class Daemon:
                 with suppress(asyncio.CancelledError):
                     await port
                 # Who sent a mission that ended with the port hears of it once that is stored.
-                await self.is_at_rest(_STORE_PATIENCE_S)
+                await self.is_at_rest(_STORE_TIMEOUT_S)
             for timer in (self._timer, self._search_report):
                 if timer is not None:
                     timer.cancel()

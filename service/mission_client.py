@@ -10,7 +10,7 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mission_messages import item_from_int_message, item_message
 from protocols.mission_item import MissionItem, MissionResult
 
-_PATIENCE_S = 1.0
+_REPLY_TIMEOUT_S = 1.0
 _TRIES = 8
 
 
@@ -55,7 +55,7 @@ class MissionClient:
         for _ in range(_TRIES):
             self._link.mav.send(message)
             while True:
-                answer = self._link.recv_match(type=[*answers, "STATUSTEXT"], blocking=True, timeout=_PATIENCE_S)
+                answer = self._link.recv_match(type=[*answers, "STATUSTEXT"], blocking=True, timeout=_REPLY_TIMEOUT_S)
                 if answer is None:
                     break
                 if answer.get_type() != "STATUSTEXT":

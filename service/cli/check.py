@@ -59,7 +59,13 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
 @click.option("--strict", is_flag=True, help="Changed values and dropped items count as rejection (exit code 1).")
-@click.option("--kind", type=click.Choice(list(_RULES)), default="harakiri", show_default=True, help="Whose rules.")
+@click.option(
+    "--kind",
+    type=click.Choice(list(_RULES)),
+    default="harakiri",
+    show_default=True,
+    help="The firmware whose rules apply.",
+)
 @click.option(
     "--wp-radius-cm",
     type=click.IntRange(0, 2000),
@@ -70,19 +76,19 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
 @click.option(
     "--capacity",
     type=click.IntRange(2, 65535),
-    help=f"Records that it holds; without: Harakiri {USUAL_CAPACITY}, home included, INAV {INAV_CAPACITY}, "
+    help=f"Records that it holds. Default: Harakiri {USUAL_CAPACITY}, home included, INAV {INAV_CAPACITY}, "
     f"MultiWii {MULTIWII_CAPACITY}.",
 )
 @click.option(
     "--takeoff-max-m",
     type=click.IntRange(2, 255),
     show_default=f"of this machine's daemon, else {TAKEOFF_MAX_M}",
-    help="Harakiri's greatest take-off height.",
+    help="Harakiri's maximum take-off altitude.",
 )
 @click.option(
-    "--home", metavar="LAT,LON", callback=_place, help="Where the craft is, for files whose home has no coordinates."
+    "--home", metavar="LAT,LON", callback=_place, help="The craft's position, for files whose home has no coordinates."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each file.")
 @click.pass_context
 def check(
     ctx: click.Context,
@@ -95,7 +101,7 @@ def check(
     home: tuple[int, int] | None,
     as_json: bool,
 ) -> None:
-    """Show what would become of mission files on the flight controller.
+    """Show how the flight controller would store mission files.
 
     Files: QGC WPL 110 (.waypoints), QGroundControl .plan, Mission Planner .mission.
 

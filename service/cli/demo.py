@@ -27,15 +27,15 @@ from service.mission_data import Json, mission_items
 
 #: A link to examples/ in the repository, a file in what is installed.
 _EXAMPLE = Path(__file__).parent / "naze-field.waypoints"
-_PATIENCE_S = 15.0
+_CONNECT_TIMEOUT_S = 15.0
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), default=_EXAMPLE)
-@click.option("--once", is_flag=True, help="End after the demonstration instead of staying up.")
+@click.option("--once", is_flag=True, help="Exit after the demonstration.")
 @click.option("--port", type=click.IntRange(1, 65535), default=14550, show_default=True, help="UDP port.")
 def demo(file: Path, once: bool, port: int) -> None:
-    """Start the daemon on a simulated Naze, write a mission FILE into it over UDP, show what became of it."""
+    """Start the daemon on a simulated Naze, write a mission FILE to it over UDP, and show the result."""
     console = Console(highlight=False)
     # The daemon is a child of this program: whoever ends the one ends the other, also by closing its terminal.
     for number in (signal.SIGTERM, signal.SIGHUP):
@@ -55,7 +55,7 @@ def demo(file: Path, once: bool, port: int) -> None:
 
 
 def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, console: Console) -> None:
-    with connect("127.0.0.1", port, _PATIENCE_S) as client:
+    with connect("127.0.0.1", port, _CONNECT_TIMEOUT_S) as client:
         console.print(f"Writing {file.name}, {len(items)} items, over UDP port {port} ...", markup=False)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
         with Progress(*columns, console=console) as bar:

@@ -33,17 +33,17 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--fc", metavar="FC", help="auto (the default), /dev/ttyAMA0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim")
-@click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; several at once. Default: {DEFAULT_GCS}")
+@click.option("--gcs", metavar="GCS", multiple=True, help=f"Ground stations; may be repeated. Default: {DEFAULT_GCS}")
 @click.option(
     "--config",
     type=click.Path(path_type=Path),
     envvar=CONFIG_VARIABLE,
-    help="TOML file with all settings; conf.d/*.toml beside it go over it.",
+    help="TOML file with all settings; conf.d/*.toml in its folder override it.",
 )
 @click.option("--state-dir", type=click.Path(path_type=Path), help="Folder for stored missions.")
 @click.option("--record-uart", type=click.Path(path_type=Path), help="File to record the port's traffic into.")
 @click.option("--verbose", is_flag=True, help="Show debug events too.")
-@click.option("--check-config", is_flag=True, help="Say whether the settings can be used, and end.")
+@click.option("--check-config", is_flag=True, help="Check the settings and exit.")
 def run(
     fc: str | None,
     gcs: tuple[str, ...],

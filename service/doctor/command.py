@@ -25,15 +25,15 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 
 
 @click.command()
-@click.option("--fc", metavar="FC", help="The flight controller's connection, as of `run`.")
+@click.option("--fc", metavar="FC", help="The flight controller's connection, as for `run`.")
 @click.option(
     "--config",
     type=click.Path(path_type=Path),
     envvar=CONFIG_VARIABLE,
-    help=f"The daemon's configuration. Default: {SERVICE_CONFIG}, if it is there.",
+    help=f"The daemon's configuration. Default: {SERVICE_CONFIG}, if it exists.",
 )
 @click.option("--state-dir", type=click.Path(path_type=Path), help="The daemon's folder for missions.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line for each check.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each check.")
 def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json: bool) -> None:
     """Look for what stands in the way of the bridge, and say what to do.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge fleet`: its commands, and what they print."""
+"""`naze-bridge fleet`: the commands, and their output."""
 
 import asyncio
 from dataclasses import asdict
@@ -35,7 +35,7 @@ _STANDARD_OUTPUT = Path("-")
 
 @click.group(cls=CommandGroup)
 def fleet() -> None:
-    """See and serve many vehicles at once, over Eclipse zenoh (docs/fleet.md)."""
+    """Monitor and manage many vehicles at once, over Eclipse zenoh (docs/fleet.md)."""
 
 
 for _command in (push_mission, verify_mission, enroll):
@@ -45,7 +45,7 @@ for _command in (push_mission, verify_mission, enroll):
 @fleet.command("list")
 @address_options
 @where_option
-@click.option("--limit", type=click.IntRange(1), help="At most so many vehicles.")
+@click.option("--limit", type=click.IntRange(1), help="The maximum number of vehicles.")
 @json_option
 def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition], **where: Any) -> None:
     """Show which vehicles are alive, and their state.
@@ -70,7 +70,7 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
 @fleet.command()
 @address_options
 @where_option
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON object a line for each change.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each change.")
 def watch(as_json: bool, conditions: list[Condition], **where: Any) -> None:
     """Show which vehicles are alive and their state, until Ctrl-C: armed ones and problems first."""
     with fleet_session(where) as (session, prefix), watching(session, prefix) as seen:
@@ -89,7 +89,7 @@ def watch(as_json: bool, conditions: list[Condition], **where: Any) -> None:
 @address_options
 @json_option
 def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **where: Any) -> None:
-    """Fetch the missions that the vehicles' flight controllers hold, of all that are alive or of those named.
+    """Read the missions of vehicles' flight controllers: of all that are alive, or of those named.
 
     PATH is a folder, in which each vehicle's mission becomes NAME.waypoints; for one named vehicle it may be a file, or
     - for standard output. Without it the missions are shown. Exit code 0: all were read, 1: one was not, or cannot be
@@ -115,22 +115,22 @@ def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **wh
 
 
 @fleet.command()
-@click.option("--vehicle", "name", metavar="NAME", required=True, help="Whose MAVLink.")
+@click.option("--vehicle", "name", metavar="NAME", required=True, help="The vehicle to connect with.")
 @click.option(
     "--gcs",
     metavar="ADDRESS",
     multiple=True,
     default=("udpout:127.0.0.1:14550",),
     show_default=True,
-    help="Where the ground station is, as for `run`; several at once.",
+    help="The ground station, as for `run`; may be repeated.",
 )
 @address_options
 def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
     """Connect a ground station (Mission Planner, QGroundControl) with one vehicle through zenoh, until Ctrl-C.
 
-    The vehicle must take MAVLink: mavlink_in = true in its [zenoh] table; without it the station can only watch.
+    The vehicle must accept MAVLink (mavlink_in = true in its [zenoh] table); otherwise the station can only watch.
     """
-    # Here, because the other commands need none of it.
+    # Imported here, because the other commands do not need them.
     from service.fleet.gcs_relay import GcsRelay
     from service.links.connection import parse_gcs
     from service.links.gcs_links import LinkError
@@ -176,7 +176,7 @@ def _show(held: Held, *, with_items: bool, to_error: bool) -> None:
         return
     click.echo(f"{held.vehicle}: {held.count} records, checksum {held.checksum}", err=to_error)
     if with_items and held.items:
-        # Here, because nothing else in the fleet's commands needs the names of MAVLink's commands.
+        # Imported here, because the other commands do not need the names of MAV_CMD.
         from service.cli.mission_table import mission_table
 
         print_table(mission_table(held.items, held.items, ()))

@@ -14,7 +14,7 @@ Condition = Callable[[Vehicle], bool]
 
 
 def _kind(hint: object) -> type:
-    """The type of a value that is known."""
+    """The type of a known value."""
     kinds = get_args(hint) or (hint,)
     return next(kind for kind in (bool, str, float) if kind in kinds or kind is float)
 
@@ -33,7 +33,7 @@ _TRUTH = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def parse_condition(text: str) -> Condition:
-    """Read one condition; ValueError says what is wrong. An unknown value fulfils none but !=."""
+    """Read one condition; ValueError explains what is wrong. An unknown value fulfils none but !=."""
     match = _FORM.fullmatch(text)
     if match is None:
         raise ValueError(f"{text!r} is not a condition: write one like armed=true or battery_v<10.5")
@@ -51,7 +51,7 @@ def parse_condition(text: str) -> Condition:
 
 
 def matching(fleet: Iterable[Vehicle], conditions: Sequence[Condition]) -> list[Vehicle]:
-    """Those that fulfil all conditions."""
+    """The vehicles that fulfil all conditions."""
     return [vehicle for vehicle in fleet if all(condition(vehicle) for condition in conditions)]
 
 

@@ -18,16 +18,16 @@ from service.zenoh_link.settings import DEFAULT_PREFIX, ZenohSettingsError
     type=click.Choice([each.value for each in Role]),
     default=Role.VEHICLE.value,
     show_default=True,
-    help="A vehicle speaks under its own name alone, a pilot may do everything, a guest only look.",
+    help="A vehicle publishes only under its own name, a pilot may do everything, a guest only watch.",
 )
-@click.option("--folder", type=PATH, default=Path("fleet"), show_default=True, help="Where the fleet's files are.")
+@click.option("--folder", type=PATH, default=Path("fleet"), show_default=True, help="Folder of the fleet's files.")
 @click.option("--prefix", default=DEFAULT_PREFIX, show_default=True, help="First part of the vehicles' keys.")
 @click.option(
     "--router",
     default="tcp/router.local:7447",
     show_default=True,
     metavar="ENDPOINT",
-    help="Where members reach the router: tls/... for certificates, tcp/... for passwords.",
+    help="The router's address for members: tls/... for certificates, tcp/... for passwords.",
 )
 def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None:
     """Add a vehicle or a person to a fleet: makes the login and the router's access control.

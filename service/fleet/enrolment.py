@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The members of a fleet, and the router's access control that follows from them: `fleet enroll`. Files are JSON5.
+"""The members of a fleet, and the router's access control made from them: `fleet enroll`. Files are JSON5.
 
 A folder holds `members.json` (names and roles), `passwords.txt` (the router's) or the certificates that
 examples/zenoh-tls/make_certificates.py makes, `router.json5`, and one `NAME.json5` for each member.
@@ -28,7 +28,7 @@ _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 
 
 class Role(Enum):
-    """What a member may do: be one vehicle, everything, or look."""
+    """What a member may do: be one vehicle, anything, or only watch."""
 
     VEHICLE = "vehicle"
     PILOT = "pilot"
@@ -41,7 +41,7 @@ class EnrolmentError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class FleetFolder:
-    """Where a fleet's files are. `tls`: members show certificates; else each has a password."""
+    """A fleet's files. `tls`: members have certificates; else each has a password."""
 
     path: Path
     prefix: str
@@ -79,7 +79,7 @@ class FleetFolder:
         return [own] if not self.is_tls else [own, *(self.path / f"{name}.{kind}" for kind in ("pem", "key"))]
 
     def router_config(self, members: Mapping[str, Role]) -> Json:
-        """The router's configuration: a rule for each vehicle, nothing for strangers."""
+        """The router's configuration: rules for each vehicle, nothing for unknown sessions."""
         scheme = self.router.partition("/")[0]
         port = self.router.rpartition(":")[2]
         return {
@@ -118,7 +118,7 @@ class FleetFolder:
         return session | {"transport": {"auth": {"usrpwd": {"user": name, "password": self._password(name)}}}}
 
     def _password(self, name: str) -> str:
-        """The member's password, a new one for a new member."""
+        """The member's password; a new member gets a new one."""
         path = self.path / "passwords.txt"
         lines = path.read_text().splitlines() if path.exists() else []
         known = dict(line.split(":", 1) for line in lines if ":" in line)
@@ -138,14 +138,14 @@ class FleetFolder:
 
 
 def access_control(prefix: str, members: Mapping[str, Role], *, by_certificate: bool) -> Json:
-    """Zenoh's access control: who may do what, and nothing else."""
+    """Zenoh's access control; everything not listed is denied."""
     everything = [
         f"{prefix}/{each}" if each[0] == "*" and each[1] == "*" else f"{prefix}/*/{each}" for each in _EXPRESSIONS
     ]
     viewed = [f"{prefix}/{each}" for each in _VIEWED]
     rules = [
         _rule("everything", ["ingress", "egress"], [*_LISTEN, *_SPEAK], everything),
-        # A guest's own messages are questions; what the router passes on to it are answers.
+        # A guest sends only queries; the router passes on only replies to it.
         _rule("ask", ["ingress"], _LISTEN, viewed),
         _rule("be answered", ["egress"], [*_LISTEN, *_SPEAK], viewed),
         _rule("be asked", ["egress"], ["put", "delete", *_LISTEN], everything),

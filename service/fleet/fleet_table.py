@@ -46,14 +46,14 @@ def fleet_table(fleet: Sequence[Vehicle]) -> Table:
 
 
 def complaints(fleet: Iterable[Vehicle]) -> list[str]:
-    """Say what is wrong with the fleet, a line each."""
+    """The problems of the fleet, a line each."""
     lines: dict[str, None] = {}
     for vehicle in fleet:
         if vehicle.bridges > 1:
             line = f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each one its own (zenoh.vehicle)"
             lines[line] = None
         if not vehicle.answers:
-            lines[f"{vehicle.name}: alive, but tells no state"] = None
+            lines[f"{vehicle.name}: alive, but sends no state"] = None
     return list(lines)
 
 

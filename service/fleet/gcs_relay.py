@@ -17,7 +17,7 @@ from service.zenoh_link.threads import post
 class GcsRelay:
     """Implements GcsEvents. Must be made on a running event loop; LinkError if a link cannot be opened.
 
-    Frames are passed on whole and unread, to every station that was heard or that the address names.
+    Frames are passed on whole and undecoded, to every station that was heard or that the address names.
     """
 
     def __init__(self, session: zenoh.Session, prefix: str, vehicle: str, gcs: Sequence[GcsAddress]) -> None:
@@ -35,7 +35,7 @@ class GcsRelay:
         self._output = session.declare_subscriber(full(prefix, vehicle, MAVLINK_OUT.suffix), self._heard)
 
     def close(self) -> None:
-        """End."""
+        """Undeclare the keys and close the links."""
         self._output.undeclare()  # type: ignore[no-untyped-call]
         for link in self._links.values():
             link.close()
@@ -50,15 +50,15 @@ class GcsRelay:
         self._peers.pop(peer, None)
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """Which of a full link's connections makes room."""
+        """The connection of a full link to close."""
         return displaced(peers)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        """Speak to a station before it was heard."""
+        """Send to a station before it is heard."""
         self._peers[peer] = None
 
     def remove_default_peer(self, peer: Peer) -> None:
-        """Stop that."""
+        """Stop sending to it."""
         self._peers.pop(peer, None)
 
     def _heard(self, sample: zenoh.Sample) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys that are pressed while something is shown: for scrolling."""
+"""Key presses for scrolling while something is displayed."""
 
 import os
 import select
@@ -16,7 +16,7 @@ _PAGES = {b" ": 1, b"\x1b[6~": 1, b"b": -1, b"\x1b[5~": -1}
 
 @contextmanager
 def scrolling() -> Iterator[None]:
-    """Have keys delivered as they are pressed, if standard input is a terminal."""
+    """Deliver keys as they are pressed, if standard input is a terminal."""
     if not sys.stdin.isatty():
         yield
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all fleet commands share: where the fleet is, which vehicles are meant, and the session."""
+"""The parts common to all fleet commands: the fleet's address, the choice of vehicles, and the session."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from service.fleet.conditions import FIELDS, parse_condition
 from service.fleet.session import DEFAULT_ENDPOINT, FleetAddress, FleetError, open_session
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError, check_name
 
-#: As a shell's, after Ctrl-C.
+#: The exit status of a shell after Ctrl-C.
 INTERRUPTED = 130
 PATH = click.Path(path_type=Path)
 
@@ -22,9 +22,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def address_options(command: F) -> F:
-    """Add the options that say where the fleet is."""
+    """Add the options for the fleet's address."""
     for option in (
-        click.option("--config", type=PATH, help="The daemon's configuration file: its [zenoh] table says the rest."),
+        click.option(
+            "--config", type=PATH, help="The daemon's configuration file; its [zenoh] table has the defaults."
+        ),
         click.option("--prefix", help="First part of the vehicles' keys.", show_default="fleet"),
         click.option("--zenoh-config", type=PATH, help="zenoh configuration file, for TLS, passwords and the like."),
         click.option(
@@ -32,7 +34,7 @@ def address_options(command: F) -> F:
             metavar="ENDPOINT",
             multiple=True,
             show_default=DEFAULT_ENDPOINT,
-            help="Router, or one vehicle that listens; of several the first that answers.",
+            help="Router, or one vehicle that listens; of several, the first that answers is used.",
         ),
     ):
         command = option(command)
@@ -41,7 +43,7 @@ def address_options(command: F) -> F:
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 vehicle_option = click.option(
-    "--vehicle", "names", metavar="NAME", multiple=True, help="This vehicle; several at once."
+    "--vehicle", "names", metavar="NAME", multiple=True, help="Only this vehicle; may be repeated."
 )
 all_option = click.option("--all", "to_all", is_flag=True, help="Every vehicle that is alive.")
 
@@ -59,14 +61,14 @@ where_option = click.option(
     metavar="CONDITION",
     multiple=True,
     callback=_conditions,
-    help=f"Only vehicles like this, as in armed=true, battery_v<10.5 or name=kite*; several: all of them. "
+    help=f"Only vehicles that match, as in armed=true, battery_v<10.5 or name=kite*; several must all match. "
     f"Fields: {', '.join(FIELDS)}.",
 )
 
 
 @contextmanager
 def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
-    """Join the fleet for one command. A failure ends the program with one sentence, Ctrl-C with none."""
+    """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C without any."""
     address = _address(**where)
     try:
         with open_session(address) as session:
@@ -80,7 +82,7 @@ def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
 def _address(
     connect: tuple[str, ...], zenoh_config: Path | None, prefix: str | None, config: Path | None
 ) -> FleetAddress:
-    """Where the fleet is: options go over the daemon's file."""
+    """The fleet's address: options override the daemon's file."""
     try:
         daemon = ZenohSettings() if config is None else _daemon_settings(config)
         address = FleetAddress(prefix or daemon.prefix, connect or daemon.connect, zenoh_config or daemon.config_file)
@@ -91,11 +93,11 @@ def _address(
 
 
 def _daemon_settings(config: Path) -> ZenohSettings:
-    # Here, because most commands do without them and without all that they load.
+    # Imported here, because most commands do not need the settings and their imports.
     from service.settings import SettingsError, load_settings
 
     try:
-        # Its flight controller is none of our business, but a file need not name one.
+        # The flight controller does not matter here, and a file need not name one.
         found = load_settings(config, "sim:", (), None).zenoh
     except SettingsError as error:
         raise ZenohSettingsError(str(error)) from error

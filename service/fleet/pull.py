@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the vehicles' flight controllers hold, brought home."""
+"""Reads the missions of many vehicles."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -14,13 +14,13 @@ from service.fleet.vehicle import BridgeState, replier
 from service.mission_data import mission_items
 from service.zenoh_link.keys import MISSION_CURRENT, full
 
-#: The bridge knows what is held, or reads it first: some seconds at 9600 baud.
+#: The bridge may have to read the mission first: some seconds at 9600 baud.
 _TIMEOUT_S = 15.0
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What one vehicle holds; `error` says why that is not known, and the rest is empty then."""
+    """One vehicle's mission; `error`: why it is not known, with the rest empty."""
 
     vehicle: str
     items: tuple[MissionItem, ...] = ()
@@ -30,10 +30,10 @@ class Held:
 
 
 def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeState]) -> list[Held]:
-    """Ask the vehicles what they hold; the answers by name, one for each. What a storage replies is not believed."""
+    """Read the missions; one result per vehicle, sorted by name. Replies of storages are ignored."""
     used = Counter(bridge.vehicle for bridge in bridges)
     held: dict[str, Held] = {}
-    # One question to all is as quick as one to the slowest.
+    # One query to all takes no longer than one to the slowest.
     only = next(iter(names)) if len(names) == 1 else "*"
     for reply in ask(session, full(prefix, only, MISSION_CURRENT.suffix), timeout_s=_TIMEOUT_S):
         bridge = replier(reply)
@@ -52,11 +52,11 @@ def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: C
 def _held(name: str, sample: zenoh.Sample) -> Held:
     data = decode(sample)
     if data is None:
-        return Held(name, error="it answers what this version does not understand")
+        return Held(name, error="this version does not understand its reply")
     count, checksum, items = whole(data, "count"), text(data, "checksum"), part(data, "items")
     if count is None or checksum is None:
         return Held(name, error="what its flight controller holds is not known")
     try:
         return Held(name, tuple(mission_items(items)), count, checksum)
     except ValueError as error:
-        return Held(name, error=f"it answers what this version does not understand: {error}")
+        return Held(name, error=f"this version does not understand its reply: {error}")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One mission to many vehicles at once; what happens to one is nothing to the others.
+"""One mission to many vehicles at once, each independent of the others.
 
-`FleetPush` is told what comes and knows how each vehicle stands; `push` lets zenoh tell it.
+`FleetPush` keeps the progress of each vehicle; `push` feeds it from zenoh.
 """
 
 import queue
@@ -18,19 +18,19 @@ from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
-_PATIENCE_S = 120.0
-_STATE_PATIENCE_S = 2.0
+_PUSH_TIMEOUT_S = 120.0
+_STATE_TIMEOUT_S = 2.0
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
-_LOOK = "`naze-bridge fleet list` tells what it holds"
-_LOST = f"it, or the router, went away before the end of the push was known; {_LOOK} when it is back"
+_LOOK = "`naze-bridge fleet list` shows what it holds"
+_LOST = f"it or the router disconnected before the result was known; {_LOOK} when it is back"
 _SILENT = "it takes no commands: they are off there (zenoh.commands), or the router's access control denies them to you"
 _TWO = "several bridges use this name, and the mission is for one: give each its own name (zenoh.vehicle)"
-_TOO_LATE = f"the end of the push was not known after {_PATIENCE_S:.0f} s; {_LOOK}"
+_TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
 
 @dataclass(slots=True)
 class PushState:
-    """How one vehicle stands. `records` of `total` are on its flight controller; `error` is why it failed."""
+    """The progress of one vehicle. `records` of `total` are written; `error` is the reason of a failure."""
 
     vehicle: str
     records: int = 0
@@ -41,12 +41,12 @@ class PushState:
 
     @property
     def is_done(self) -> bool:
-        """Whether it will not change any more."""
+        """True if this is final."""
         return self.result is not None or self.error is not None
 
     @property
     def has_failed(self) -> bool:
-        """Whether the vehicle does not hold the mission, as far as is known."""
+        """True if the vehicle is not known to hold the mission."""
         return self.error is not None
 
 
@@ -58,7 +58,7 @@ class FleetPush:
 
     @classmethod
     def of(cls, names: Iterable[str], bridges: Iterable[BridgeState]) -> "FleetPush":
-        """Make one for vehicles by name; a name that several bridges use fails at once."""
+        """Make one for vehicles by name; a name used by several bridges fails at once."""
         found = [bridge.vehicle for bridge in bridges]
         return cls({name: PushState(name, error=_TWO if found.count(name) > 1 else None) for name in names})
 
@@ -69,22 +69,22 @@ class FleetPush:
 
     @property
     def running(self) -> list[str]:
-        """The vehicles that were begun and are not done."""
+        """The vehicles that were started and are not done."""
         return [name for name, progress in self.vehicles.items() if progress.is_begun and not progress.is_done]
 
     @property
     def failed(self) -> list[PushState]:
-        """Those that do not hold the mission."""
+        """The vehicles that do not hold the mission."""
         return [progress for progress in self.vehicles.values() if progress.has_failed]
 
     def stop(self, why: str) -> None:
-        """Leave those alone that were not begun."""
+        """Skip the vehicles that were not started."""
         for progress in self.vehicles.values():
             if not progress.is_done and not progress.is_begun:
                 progress.error = f"not begun: {why}"
 
     def replied(self, vehicle: str, reply: Json | None) -> None:
-        """Take a reply: progress, or the result of a mission that was accepted."""
+        """Take a reply: progress, or the result of an accepted mission."""
         progress = self.vehicles[vehicle]
         if progress.is_done or reply is None:
             return
@@ -96,22 +96,22 @@ class FleetPush:
             if result.get("ack") == _ACCEPTED:
                 progress.result = result
             else:
-                progress.error = text(result, "text") or "it answers what this version does not understand"
+                progress.error = text(result, "text") or "this version does not understand its reply"
 
     def refused(self, vehicle: str, error: Json | None) -> None:
-        """Take an error; zenoh's own, that time is over, is no object."""
+        """Take an error reply; None stands for zenoh's own, a timeout."""
         progress = self.vehicles[vehicle]
         if not progress.is_done:
-            progress.error = _TOO_LATE if error is None else text(error, "error") or "it refuses without a reason"
+            progress.error = _TOO_LATE if error is None else text(error, "error") or "it gives no reason"
 
     def ended(self, vehicle: str, *, is_alive: bool) -> None:
-        """No more replies will come; one that is alive and never said a word did not take the question."""
+        """Take the end of the replies; `is_alive` without any reply means that the command is switched off."""
         progress = self.vehicles[vehicle]
         if not progress.is_done:
             progress.error = _SILENT if is_alive and progress.total is None else _LOST
 
     def gone(self, vehicle: str) -> None:
-        """Its liveliness token is no more."""
+        """Take the loss of a vehicle's liveliness token."""
         progress = self.vehicles.get(vehicle)
         if progress is not None and not progress.is_done:
             progress.error = _LOST
@@ -127,9 +127,9 @@ def push(
     *,
     staged: bool = False,
 ) -> None:
-    """Send the mission to all and wait until each is done; `show` is called whenever something has changed.
+    """Send the mission to all and wait until each is done; `show` is called after every change.
 
-    `staged`: a tenth of the vehicles first, then the others; after a failure no other one is begun.
+    `staged`: a tenth of the vehicles first, then the others; after a failure no other one is started.
     """
     events: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
 
@@ -146,9 +146,9 @@ def push(
 
     def ended(name: str) -> None:
         if not fleet.vehicles[name].is_done:
-            # Its token does not tell: that of a vehicle which has just died may still be there.
-            state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_PATIENCE_S)
-            # Neither does a storage, which goes on answering for a vehicle that has died.
+            # The token proves nothing: a vehicle that has just died may still have one.
+            state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_TIMEOUT_S)
+            # Nor does a reply from a storage, which goes on answering for a dead vehicle.
             fleet.ended(name, is_alive=any(replier(reply) in bridges for reply in state))
 
     def start(name: str) -> None:
@@ -159,7 +159,7 @@ def push(
             lambda reply: events.put(lambda: taken(name, reply)),
             lambda: events.put(lambda: ended(name)),
             mission,
-            _PATIENCE_S,
+            _PUSH_TIMEOUT_S,
         )
 
     with session.liveliness().declare_subscriber(full(prefix, "*", f"{ALIVE}/*"), token):

@@ -53,8 +53,8 @@ def push_mission(
 ) -> None:
     """Write a mission file to vehicles, each by its own rules, and verify it there.
 
-    A vehicle that fails does not stop the others, unless --staged. Exit code 0: all hold it (--dry-run: all would take
-    it), 1: one does not, 2: the file is unreadable.
+    A vehicle that fails does not stop the others, unless --staged. Exit code 0: all hold it (--dry-run: all would
+    accept it), 1: one does not, 2: the file is unreadable.
     """
     mission, item_count = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a push to the fleet goes, and how it went, for a terminal."""
+"""The progress and the result of a push to the fleet, for a terminal."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,7 +19,7 @@ from service.mission_data import Json
 
 @contextmanager
 def progress_bars(fleet: FleetPush, item_count: int) -> Iterator[Callable[[FleetPush], None]]:
-    """Show a bar for each vehicle on standard error, if that is a terminal, as long as the push runs."""
+    """Show a progress bar per vehicle on standard error, if that is a terminal."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
     console = Console(stderr=True)
     with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
@@ -34,11 +34,11 @@ def progress_bars(fleet: FleetPush, item_count: int) -> Iterator[Callable[[Fleet
 
 
 def push_table(fleet: FleetPush) -> Table:
-    """Make one row per vehicle: what came of it, and why."""
+    """One row per vehicle: its result, and the reason."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     table.add_column("Vehicle", overflow="fold")
     table.add_column("Push", no_wrap=True)
-    table.add_column("What it says")
+    table.add_column("Details")
     for progress in fleet.vehicles.values():
         table.add_row(Text(progress.vehicle), _result(progress), Text(_words(progress)))
     return table
@@ -53,13 +53,13 @@ def _result(progress: PushState) -> Text:
 
 
 def trial_table(trials: Sequence[Trial]) -> Table:
-    """Make one row per vehicle: what the mission would become there, and each correction below it."""
+    """One row per vehicle: its verdict on the mission, and each correction below it."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     table.add_column("Vehicle", overflow="fold")
     table.add_column("Records", justify="right", no_wrap=True)
     table.add_column("Checksum", no_wrap=True)
     table.add_column("Holds it", no_wrap=True)
-    table.add_column("What it says")
+    table.add_column("Details")
     for trial in trials:
         said = [trial.error] if trial.error else [_correction(finding) for finding in trial.findings]
         count = "" if trial.count is None else str(trial.count)
@@ -75,7 +75,7 @@ def _correction(finding: object) -> str:
 
 
 def push_data(fleet: FleetPush) -> Json:
-    """Return what came of it as plain data."""
+    """The results as plain data."""
     return {
         "vehicles": [
             {"vehicle": each.vehicle, "ok": not each.has_failed, "error": each.error, "result": each.result}
@@ -86,7 +86,7 @@ def push_data(fleet: FleetPush) -> Json:
 
 
 def push_summary(fleet: FleetPush) -> str:
-    """Return one line."""
+    """The summary, one line."""
     count, failed = len(fleet.vehicles), len(fleet.failed)
     return f"{count - failed} of {count} vehicles hold the mission, verified" + (f"; {failed} failed" if failed else "")
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Why a router that answers does not let us in: the wrong login, or no session left.
+"""The reason why a reachable router rejects the session: a wrong login, or no session left.
 
-zenoh tells the reason to its log alone, so a program of its own tries once more and its log is read.
+zenoh only logs the reason, so a separate program tries again and its log is read.
 """
 
 import subprocess
@@ -11,7 +11,7 @@ import zenoh
 
 _TRY = "import sys, zenoh; zenoh.init_log_from_env_or('error'); zenoh.open(zenoh.Config.from_json5(sys.stdin.read()))"
 _TIMEOUT_S = 6.0
-#: What zenoh 1.10 logs at either end of a refused handshake.
+#: The log messages of zenoh 1.10 on either side of a rejected handshake.
 _REASONS = {
     "reason INVALID": "the router takes no more sessions: raise transport/unicast/max_sessions in its configuration",
     "reason GENERIC": "the router does not accept this user and password",
@@ -20,9 +20,9 @@ _REASONS = {
 
 
 def refusal(config: zenoh.Config) -> str | None:
-    """The router's reason, in one line; None if it gave none. Blocks for some seconds at worst."""
+    """The router's reason, in one line; None if it gave none. Blocks for some seconds."""
     try:
-        tried = subprocess.run(  # noqa: S603  # this Python, and nothing of the user's in its arguments
+        tried = subprocess.run(  # noqa: S603  # this Python, without any user input
             [sys.executable, "-c", _TRY],
             input=str(config),
             capture_output=True,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How `naze-bridge fleet` joins the vehicles' zenoh: as a client of one router, or of one vehicle directly.
+"""The zenoh session of `naze-bridge fleet`: a client of one router, or of one vehicle directly.
 
-A client, because sessions in mode peer that meet at a router only do not see each other through it.
+Not a peer, because peers that have only a router in common do not see each other.
 """
 
 import json
@@ -20,19 +20,19 @@ from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.keys import full
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
-#: Vehicles that are asked or written to at the same time: each holds a mission file on the way.
+#: How many vehicles get a query at the same time: each such query may carry a mission file.
 AT_ONCE = 50
-#: Somebody who does not speak zenoh is given up after so long; zenoh's own patience is 10 s.
+#: For peers that do not speak zenoh; zenoh's own default is 10 s.
 _OPEN_TIMEOUT_MS = 3000
 
 
 class FleetError(Exception):
-    """What was asked of the fleet cannot be done; one sentence."""
+    """A fleet command failed; one sentence."""
 
 
 @dataclass(frozen=True, slots=True)
 class FleetAddress:
-    """Where the fleet is. Of several endpoints the first that answers serves.
+    """How to reach the fleet. Of several endpoints the first one that answers is used.
 
     `config_file`: a zenoh configuration to start from, for TLS, passwords and the like.
     """
@@ -43,7 +43,7 @@ class FleetAddress:
 
 
 def open_session(address: FleetAddress) -> zenoh.Session:
-    """Join; FleetError says why that is impossible."""
+    """Open the session; FleetError if that fails."""
     config = _config(address)
     endpoints = connect_endpoints(config)
     if not endpoints:
@@ -58,7 +58,7 @@ def open_session(address: FleetAddress) -> zenoh.Session:
 def ask(
     session: zenoh.Session, selector: str, payload: bytes | None = None, timeout_s: float = 2.0
 ) -> Iterator[zenoh.Reply]:
-    """Yield the replies to a query as they come, of every vehicle that is meant."""
+    """Yield the replies of all matching vehicles to a query as they arrive."""
     replies: queue.SimpleQueue[zenoh.Reply | None] = queue.SimpleQueue()
     send_query(session, selector, replies.put, lambda: replies.put(None), payload, timeout_s)
     while (reply := replies.get()) is not None:
@@ -73,7 +73,7 @@ def ask_each(
     timeout_s: float,
     payload: bytes | None = None,
 ) -> Iterator[tuple[str, zenoh.Reply]]:
-    """Ask vehicles one by one, some at a time, and yield each one's replies as they come."""
+    """Query vehicles individually, some at a time, and yield the replies of each as they arrive."""
     replies: queue.SimpleQueue[tuple[str, zenoh.Reply | None]] = queue.SimpleQueue()
     waiting, running = deque(names), 0
     while waiting or running:
@@ -113,7 +113,7 @@ def send_query(
     payload: bytes | None,
     timeout_s: float,
 ) -> None:
-    """Send a query; every reply comes (two vehicles of one name give two), and then `ended`, on zenoh's threads."""
+    """Send a query; gives all replies (two vehicles of one name send two), then `ended`, on zenoh's threads."""
     session.get(
         selector,
         zenoh.handlers.Callback(replied, ended),
@@ -125,7 +125,7 @@ def send_query(
 
 
 def is_connected(session: zenoh.Session) -> bool:
-    """Whether the router (or the one vehicle) is there at this moment."""
+    """True if the router (or the one vehicle) is connected at this moment."""
     return bool(session.info.routers_zid() or session.info.peers_zid())
 
 
@@ -152,7 +152,7 @@ def _config(address: FleetAddress) -> zenoh.Config:
 
 def _from_file(path: Path) -> zenoh.Config:
     try:
-        path.open("rb").close()  # zenoh's own words for a file that is not there are long
+        path.open("rb").close()  # zenoh's own message for a missing file is long
         return zenoh.Config.from_file(str(path))
     except OSError as error:
         raise FleetError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a mission would become on each vehicle, by its own rules: `fleet push --dry-run` and `fleet verify`."""
+"""Each vehicle's verdict on a mission, by its own rules: `fleet push --dry-run` and `fleet verify`."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ _SILENT = "it takes no commands: they are off there (zenoh.commands), or the rou
 
 @dataclass(slots=True)
 class Trial:
-    """One vehicle's answer. `checksum`: of the records that the mission would become; `held`: of those it holds.
+    """One vehicle's reply. `checksum`: of the records that the mission would become; `held`: of those it holds.
 
-    `error`: why nothing is known, or why it would reject the mission.
+    `error`: why there is no verdict, or why it would reject the mission.
     """
 
     vehicle: str
@@ -31,12 +31,12 @@ class Trial:
 
     @property
     def is_held(self) -> bool:
-        """True if the vehicle holds the mission, as far as the checksum tells."""
+        """True if the vehicle holds the mission, by its checksum."""
         return self.error is None and self.checksum is not None and self.checksum == self.held
 
 
 def try_mission(session: zenoh.Session, prefix: str, names: Iterable[str], mission: bytes) -> list[Trial]:
-    """Have each vehicle check the mission, and ask what it holds."""
+    """Have each vehicle check the mission, and get the checksum of its own."""
     trials = {name: Trial(name) for name in names}
     for name, reply in ask_each(session, prefix, trials, CHECK.suffix, _TIMEOUT_S, mission):
         _take(trials[name], reply)
@@ -54,7 +54,7 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
         return
     result = part(data, "result")
     if reply.ok is None or not isinstance(result, dict):
-        trial.error = text(data, "error") or "it refuses without a reason"
+        trial.error = text(data, "error") or "it gives no reason"
         return
     findings = part(result, "findings")
     trial.findings = tuple(findings) if isinstance(findings, list) else ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A vehicle of the fleet, as its `state` tells."""
+"""A vehicle of the fleet, made from its `state`."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ from service.zenoh_link.settings import ZenohSettingsError, check_name
 
 @dataclass(frozen=True, slots=True, order=True)
 class BridgeState:
-    """Who says that he is alive: a vehicle's name, and zenoh's id of the session, which no two bridges share."""
+    """A bridge that is alive: the vehicle's name, and zenoh's id of the session, which no two bridges share."""
 
     vehicle: str
     session_id: str
@@ -23,9 +23,9 @@ class BridgeState:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """What is known of one vehicle; None: not known.
+    """The known data of one vehicle; None: not known.
 
-    `answers`: whether its bridge told its state. `bridges`: how many use this name: 1 as it should be.
+    `answers`: True if its bridge sent its state. `bridges`: how many use this name, normally 1.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Vehicle:
 
 
 def bridge_of(key: str, prefix: str) -> BridgeState | None:
-    """Return whose liveliness token a key is; None if it is none that a bridge of ours has."""
+    """The bridge that a liveliness token's key belongs to; None for other keys."""
     match key.split("/"):
         case [first, name, *middle, session_id] if first == prefix and "/".join(middle) == ALIVE:
             try:
@@ -57,14 +57,14 @@ def bridge_of(key: str, prefix: str) -> BridgeState | None:
 
 
 def replier(reply: zenoh.Reply) -> BridgeState | None:
-    """The bridge that sent a reply: its key names the vehicle, its sender the session. A storage is none."""
+    """The bridge that sent a reply: the key names the vehicle, the sender the session. None for a storage."""
     if reply.ok is None or reply.replier_id is None:
         return None
     return BridgeState(vehicle_in(reply.ok.key_expr), str(reply.replier_id.zid))
 
 
 def vehicle_of(bridge: BridgeState, state: Json | None) -> Vehicle:
-    """Make a vehicle of the payload of its `state`; None: it told nothing."""
+    """Make a vehicle from the payload of its `state`; None: it sent none."""
     if state is None:
         return Vehicle(bridge.vehicle, bridge.session_id)
     return Vehicle(
@@ -85,7 +85,7 @@ def vehicle_of(bridge: BridgeState, state: Json | None) -> Vehicle:
 
 
 def as_fleet(vehicles: Iterable[Vehicle]) -> list[Vehicle]:
-    """Sort vehicles by name, and count who shares one."""
+    """Sort vehicles by name, and count the bridges per name."""
     found = list(vehicles)
     bridges = Counter(vehicle.name for vehicle in found)
     counted = [replace(vehicle, bridges=bridges[vehicle.name]) for vehicle in found]

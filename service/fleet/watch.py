@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fleet as it changes: who is alive, and everybody's newest state."""
+"""The fleet as it changes: the vehicles that are alive, and the newest state of each."""
 
 import threading
 import time
@@ -15,13 +15,13 @@ from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, rep
 from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, full, vehicle_in
 
-_PATIENCE_S = 2.0
-#: No queue holds samples for longer: then the vehicle's clock was set.
+_STATE_TIMEOUT_S = 2.0
+#: No queue delays samples for longer: beyond this the vehicle's clock was set.
 _CLOCK_WAS_SET_S = 60.0
 
 
 class Watch:
-    """What was heard; zenoh's threads fill it, the one that prints looks at it. Times are `clock`'s, seconds."""
+    """The fleet as heard so far: filled on zenoh's threads, read by the printing one. Times are `clock`'s, seconds."""
 
     def __init__(self, prefix: str, clock: Callable[[], float] = time.monotonic) -> None:
         self._prefix = prefix
@@ -31,7 +31,7 @@ class Watch:
         self._states: dict[str, _Heard] = {}
 
     def token(self, sample: zenoh.Sample) -> None:
-        """Take note that somebody came or went."""
+        """Take a liveliness token: a bridge appeared or disappeared."""
         bridge = bridge_of(str(sample.key_expr), self._prefix)
         if bridge is None:
             return
@@ -46,7 +46,7 @@ class Watch:
         self._take(sample, None)
 
     def reply(self, reply: zenoh.Reply) -> None:
-        """Take the state that a bridge replied with. A storage's may be of a vehicle that is long gone."""
+        """Take a bridge's reply. A storage's is ignored: it may be of a vehicle that is long gone."""
         bridge = replier(reply)
         if reply.ok is not None and bridge is not None:
             self._take(reply.ok, bridge)
@@ -85,8 +85,8 @@ class Watch:
 class _Heard:
     """`made_at`: when the vehicle made the state, by our clock.
 
-    `offset_s`: the least difference seen between our clock and its own. What a sample took beyond that, it spent in
-    queues: a backlog is shown as old as it is, whatever the clocks say.
+    `offset_s`: the least difference seen between our clock and its own. Any delay beyond that was spent in queues, so
+    a backlog is shown with its true age, even if the clocks differ.
     """
 
     state: Json
@@ -97,12 +97,12 @@ class _Heard:
 
 @contextmanager
 def watching(session: zenoh.Session, prefix: str) -> Iterator[Watch]:
-    """Hear the fleet: those who are there already at once, and then what changes."""
+    """Subscribe to the fleet, including the vehicles that are alive already."""
     watch = Watch(prefix)
     states = full(prefix, "*", STATE.suffix)
     with (
         session.liveliness().declare_subscriber(full(prefix, "*", f"{ALIVE}/*"), watch.token, history=True),
         session.declare_subscriber(states, watch.sample),
     ):
-        send_query(session, states, watch.reply, lambda: None, None, _PATIENCE_S)
+        send_query(session, states, watch.reply, lambda: None, None, _STATE_TIMEOUT_S)
         yield watch

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What `fleet watch` shows: a screen for a person, lines for a program."""
+"""The output of `fleet watch`: a screen for a person, lines for a program."""
 
 import time
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from service.fleet.watch import Watch
 _REFRESH_S = 0.5
 #: The slowest profile sends the state every 15 s.
 SILENT_S = 40.0
-#: Lines that are no vehicle's: counts, column titles and rule, the last line, one that stays empty.
+#: Lines without a vehicle: counts, column titles and rule, the last line, and an empty one.
 _OTHER_LINES = 5
 _LINKED = ("MSP", "MAVLink")
 
@@ -35,7 +35,7 @@ class Row:
 
     @property
     def problem(self) -> str:
-        """Why it needs a look; empty if it does not."""
+        """The reason why it needs attention; empty if it does not."""
         if self.vehicle.bridges > 1:
             return f"{self.vehicle.bridges} bridges use this name"
         if not self.vehicle.answers:
@@ -76,7 +76,7 @@ def screen(rows: Sequence[Row], top: int, page: int, *, is_connected: bool) -> G
 
 
 def print_changes(seen: Watch, conditions: Sequence[Condition]) -> None:
-    """Print a line for each vehicle that comes, changes or goes, until KeyboardInterrupt."""
+    """Print a line for each vehicle that appears, changes or disappears, until KeyboardInterrupt."""
     known: dict[str, Vehicle] = {}
     while True:
         now = {row.vehicle.session_id: row.vehicle for row in _rows(seen, conditions)}

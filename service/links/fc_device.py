@@ -14,7 +14,7 @@ import serial
 from service.links.connection import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 from service.links.port_holder import explain_port_error, find_console
 
-_TCP_PATIENCE_S = 3.0
+_TCP_TIMEOUT_S = 3.0
 
 
 class Device(Protocol):
@@ -87,7 +87,7 @@ async def _open_tcp(host: str, port: int) -> socket.socket:
     connection.setblocking(False)
     loop = asyncio.get_running_loop()
     try:
-        async with asyncio.timeout(_TCP_PATIENCE_S):
+        async with asyncio.timeout(_TCP_TIMEOUT_S):
             found = await loop.getaddrinfo(host, port, family=family, type=socket.SOCK_STREAM)
             await loop.sock_connect(connection, found[0][4])
     except (OSError, TimeoutError) as error:

@@ -20,17 +20,17 @@ _ADDRESS_OF_HOTSPOT = "10.42.0.1"
 
 
 @click.command()
-@click.option("--fc", default="auto", show_default=True, metavar="FC", help="The flight controller, as of `run`.")
-@click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name; without: keep the present one.")
+@click.option("--fc", default="auto", show_default=True, metavar="FC", help="The flight controller, as for `run`.")
+@click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name. Default: keep the present one.")
 @click.option("--password-file", type=click.Path(path_type=Path, exists=True), help="File with the hotspot's password.")
-@click.option("--country", metavar="CC", help="Wi-Fi country, as DE: the radio stays off without one.")
+@click.option("--country", metavar="CC", help="Wi-Fi country, such as DE: the radio stays off without one.")
 @click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
 @click.option("--no-page", is_flag=True, help="Do not serve the status page.")
 @click.option(
     "--key-file", type=click.Path(path_type=Path, exists=True), help="File with a MAVLink signing passphrase."
 )
-@click.option("--yes", is_flag=True, help="Ask nothing: the options and their defaults are the answers.")
-@click.option("--dry-run", is_flag=True, help="Show what would be changed, and end.")
+@click.option("--yes", is_flag=True, help="Ask no questions: use the options and their defaults.")
+@click.option("--dry-run", is_flag=True, help="Show the changes without making them.")
 @click.option("--root", type=click.Path(path_type=Path), default="/", hidden=True)
 def setup(
     fc: str,

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The status page: what a browser on the Pi's Wi-Fi sees of the daemon. Imported only if it is configured."""
+"""The status page, for browsers on the Pi's Wi-Fi. Imported only if it is configured."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every request must be like, and what every answer says to the browser.
+"""The check of every request, and the security headers of every response.
 
-Reading needs no token, so another site's page must not read through the pilot's browser: by its own name, turned to our
-address (DNS rebinding), or in a frame. Hence the check of the name asked for, and the headers. What is not reading
-needs the token in a header, which no other site can make a browser send.
+Reading needs no token, so another site's page must not read through the pilot's browser: under its own name resolved
+to our address (DNS rebinding), or in a frame. Hence the check of the Host header, and the response headers. Everything
+else needs the token in a header, which no other site can make a browser send.
 """
 
 import ipaddress
@@ -22,7 +22,7 @@ from service.web.token import Token
 
 Handler = Callable[[Request], Awaitable[Response]]
 
-#: The connection carries no second request (service.web.door).
+#: The connection carries no second request (service.web.connection_limit).
 _HEADERS = {
     b"content-security-policy": b"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self';"
     b" connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -35,7 +35,7 @@ _HEADERS = {
 }
 #: The largest mission file accepted: 500 items of a .plan are about 200 KiB.
 MAX_FILE = 256 << 10
-#: Names below these are given in a local network; nobody can buy one.
+#: Domains of local networks, which cannot be registered.
 _LOCAL = (".local", ".lan", ".home.arpa", ".internal", ".localhost")
 _HOST = re.compile(r"(?P<name>\[[^\]]*\]|[^:\[\]]+)(:[0-9]*)?")
 _WRONG_NAME = "Open this page by the Pi's address in numbers, or by its local name."
@@ -44,7 +44,7 @@ _log = structlog.get_logger()
 
 
 class Refused(Exception):
-    """A request that is not done: an HTTP status, and one sentence."""
+    """The request is refused: an HTTP status, and one sentence."""
 
     def __init__(self, status: HTTPStatus, text: str) -> None:
         super().__init__(text)
@@ -52,7 +52,7 @@ class Refused(Exception):
 
 
 def is_local_name(host: str) -> bool:
-    """Tell whether a Host header can only mean this machine: an address, a name without dots, or a local one."""
+    """True if a Host header can only mean this machine: an address, a name without dots, or a local one."""
     named = _HOST.fullmatch(host)
     if named is None:
         return False
@@ -65,7 +65,7 @@ def is_local_name(host: str) -> bool:
 
 
 def check_token(request: Request, token: Token | None) -> None:
-    """Refuse who does not show the token."""
+    """Refuse a request without the token."""
     if token is None:
         raise Refused(HTTPStatus.FORBIDDEN, "The Pi has no token, so this page is read-only; its log says why.")
     if not token.is_shown_by(request.headers.get("authorization")):
@@ -75,7 +75,7 @@ def check_token(request: Request, token: Token | None) -> None:
 
 
 def guarded(handler: Handler, max_body: int = 0) -> Handler:
-    """Check a request before its handler gets it, and turn every outcome into an answer. `max_body`: bytes."""
+    """Check a request before its handler, and turn every outcome into a response. `max_body`: bytes."""
 
     async def answer(request: Request) -> Response:
         try:
@@ -94,25 +94,25 @@ def guarded(handler: Handler, max_body: int = 0) -> Handler:
 
 def _check_body(request: Request, max_body: int) -> None:
     length = request.headers.get("content-length", "0")
-    # h11 has checked that it is a number. Its digits are counted first: int() of a very long one is slow.
+    # h11 has checked that it is a number; int() of a very long one is slow.
     if "transfer-encoding" in request.headers or len(length) > len(str(MAX_FILE)) or int(length) > max_body:
         limit = f"at most {max_body >> 10} KiB" if max_body else "no data"
         raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"This request may carry {limit}.")
 
 
 async def not_found(_request: Request, error: Exception) -> Response:
-    """Answer what no handler is there for."""
+    """The response to an unknown path."""
     assert isinstance(error, HTTPException)
     return error_answer(HTTPStatus(error.status_code), error.detail, error.headers)
 
 
 def error_answer(status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None) -> Response:
-    """Say in one sentence why something is not done."""
+    """An error response with one sentence."""
     return Response(to_json({"error": text}), status, headers, "application/json")
 
 
 class SafeHeaders:
-    """Tells the browser with every answer what it must not do."""
+    """Adds the security headers to every response."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -53,7 +53,7 @@ _LISTED = 50
 
 
 class Api:
-    """Answers from MissionJobs and the bridge's report. `token` None: nothing that needs it is possible."""
+    """Answers from MissionJobs and the bridge's report. `token` None: everything that needs it is refused."""
 
     def __init__(self, daemon: Daemon, settings: WebSettings, token: Token | None) -> None:
         self._daemon = daemon
@@ -71,11 +71,11 @@ class Api:
         self._host = Host()
 
     def start(self) -> None:
-        """Begin the history of the serial line."""
+        """Start the history of the serial line."""
         self._history.start()
 
     async def close(self) -> None:
-        """End what runs in the background."""
+        """Stop the background tasks."""
         self._history.close()
         await self._writer.close()
 
@@ -128,7 +128,7 @@ class Api:
         )
 
     async def _held(self, _request: Request) -> Response:
-        """Tell what was last read: a stranger who asks keeps the flight controller's line free."""
+        """The mission as last read: an unauthenticated request must not use the flight controller's line."""
         held = self._daemon.bridge.missions.held
         if held is None:
             return _json({"count": None, "checksum": None, "items": []})
@@ -225,7 +225,7 @@ def _sent(mission: Json) -> list[MissionItem]:
 
 
 async def _told(asked: Awaitable[Json]) -> Json:
-    """Wait for the store; what it cannot tell becomes a refusal."""
+    """Wait for the store; its errors become refusals."""
     try:
         return await asked
     except ControlError as error:

@@ -10,14 +10,14 @@ from protocols.mavlink.command_name import command_name
 from protocols.mission_item import MissionItem
 from service.mission_data import Json, mission_items
 
-#: No flight controller holds more; a longer list was refused, and its end tells nothing new.
+#: No flight controller holds more; a longer list was rejected, and its end is of no interest.
 MAX_ROWS = 500
 
 _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
 
 
 def stored_mission(mission: Json) -> Json:
-    """Return a mission of the store (MissionJobs.show_mission) with its rows, as sent beside as stored."""
+    """A mission of the store (MissionJobs.show_mission) with rows that compare items as sent and as stored."""
     received = mission["received"]
     findings = [Finding(**finding) for finding in received["findings"]]
     sent, stored = mission_items(received["items"]), mission_items(received["stored_items"])
@@ -38,7 +38,7 @@ def stored_mission(mission: Json) -> Json:
 
 
 def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
-    """What would become of a list, with rows like those of `stored_mission`. verdict: of MissionJobs.check."""
+    """The verdict on a list, with rows like those of `stored_mission`. verdict: of MissionJobs.check."""
     findings = [Finding(**finding) for finding in verdict["findings"]]
     stored = mission_items(verdict["items"])
     return {
@@ -53,13 +53,13 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
 def sent_and_stored(
     sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]
 ) -> list[Json]:
-    """Return one row per item sent. `stored`: empty for a list that was rejected or cleared."""
+    """One row per item sent. `stored`: empty for a list that was rejected or cleared."""
     dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}
     rejected = {finding.seq: finding.why for finding in findings if finding.becomes == REJECTED}
     reasons = {(finding.seq, finding.field): finding.why for finding in findings}
     left = iter(stored)
     rows = []
-    for seq, item in enumerate(sent):  # findings go by the place in the list, whatever number an item says it has
+    for seq, item in enumerate(sent):  # findings use the place in the list, not the item's seq
         if seq in dropped:
             rows.append(_row("dropped", item, None, {"command": dropped[seq]}))
         elif seq in rejected:
@@ -73,7 +73,7 @@ def sent_and_stored(
 
 
 def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[Json]:
-    """Return one row per item of either list; items that are new or gone stand alone."""
+    """One row per item of either list; an item in only one of them has its own row."""
     rows = []
     for before, after in _pairs(first[:MAX_ROWS], second[:MAX_ROWS]):
         if before is None or after is None:
@@ -86,7 +86,7 @@ def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> l
 
 
 def shown(item: MissionItem) -> Json:
-    """Return an item for the page: numbers, None for what is not given, and the command's name."""
+    """An item for the page: numbers, None for values not given, and the command's name."""
     return {"seq": item.seq, "name": command_name(item.command), **dict(zip(_VALUES, _key(item), strict=True))}
 
 
@@ -99,7 +99,7 @@ def _pairs(
 
 
 def _key(item: MissionItem) -> tuple[float | None, ...]:
-    """Return an item's values but for its number, comparable: what is not given is equal to itself."""
+    """An item's values without its number, comparable: values not given are equal."""
     values = (getattr(item, name) for name in _VALUES)
     return tuple(None if value is None or value != value else value for value in values)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where ground stations and other browsers connect, and the page's address as a QR code."""
+"""The addresses for ground stations and other browsers, and the page's address as a QR code."""
 
 import ipaddress
 from collections.abc import Iterable, Sequence
@@ -11,7 +11,7 @@ from service.links.connection import GcsAddress
 from service.mission_data import Json
 from service.web.settings import ListenAddress
 
-#: How Mission Planner calls the connection that it must open.
+#: Mission Planner's name for the connection type to choose.
 _CONNECTIONS = {"udpin": "UDPCl", "tcpin": "TCP"}
 
 
@@ -37,7 +37,7 @@ def connect_help(listen: ListenAddress, links: Sequence[GcsAddress], own: list[s
 
 
 def qr_code(text: str) -> bytes:
-    """An SVG image, dark on white as scanners expect it, whatever the page's colours are."""
+    """An SVG image, always dark on white, as scanners expect."""
     image = BytesIO()
     segno.make(text, error="m").save(image, kind="svg", scale=4, border=4, dark="#000", light="#fff")
     return image.getvalue()

@@ -1,36 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who may connect to the status page, and for how long: a hostile browser must cost the flight controller nothing.
+"""Limits the connections to the status page, so that a hostile browser costs the flight controller nothing.
 
-A connection carries one request and is cut off after a few seconds, so that a peer who sends or reads slowly holds
-nothing for long. There are few at a time, and few a second from one address and from all.
+A connection carries one request and is cut off after a few seconds, so that a slow peer holds nothing for long. The
+number of connections is limited, and so is their rate, per address and in total.
 """
 
 import asyncio
 from collections import Counter, deque
 from collections.abc import Callable
 
-#: An answer is a few kilobytes, and none takes long to make.
+#: Responses are a few kilobytes and quick to make.
 LIFETIME_S = 15.0
 MAX_CONNECTIONS = 48
-#: One phone does not lock out the others. A page that is opened takes six at once.
+#: One phone must not lock out the others. A page opens six at once.
 MAX_FROM_ONE = 16
-#: An open page asks once a second, one that is loaded a dozen times at once. A request costs about a millisecond.
+#: An open page sends a request per second, a loading one a dozen at once. A request costs about a millisecond.
 MAX_IN_A_SECOND = 100
 MAX_IN_A_SECOND_FROM_ONE = 50
 
 
 class Door:
-    """Counts connections. `lifetime_s`: after so long each is cut off."""
+    """Counts connections; each is cut off after `lifetime_s`."""
 
     def __init__(self, lifetime_s: float = LIFETIME_S) -> None:
         self.lifetime_s = lifetime_s
-        #: Connections that were let in.
+        #: The open connections.
         self.transports: set[asyncio.Transport] = set()
         self._inside: Counter[str] = Counter()
         self._lately: deque[tuple[float, str]] = deque(maxlen=MAX_IN_A_SECOND)
 
     def admit(self, address: str, now: float) -> bool:
-        """Let a connection in, or not; now: seconds. Who was let in leaves by `leave`."""
+        """True if there is room for a connection; now: seconds. Each admitted one must `leave`."""
         while self._lately and self._lately[0][0] <= now - 1:
             self._lately.popleft()
         lately = sum(one == address for _, one in self._lately)
@@ -46,19 +46,19 @@ class Door:
         return True
 
     def leave(self, address: str) -> None:
-        """A connection that was let in is over."""
+        """Count an admitted connection as closed."""
         self._inside[address] -= 1
         if not self._inside[address]:
             del self._inside[address]
 
     def close(self) -> None:
-        """Hang up on everybody who is inside."""
+        """Close all connections."""
         for transport in list(self.transports):
             transport.abort()
 
 
 class BoundedConnection(asyncio.Protocol):
-    """Stands between a connection and the HTTP protocol that `serve` makes for it."""
+    """The connection's side of the HTTP protocol that `serve` makes for it."""
 
     def __init__(self, door: Door, serve: Callable[[], asyncio.Protocol]) -> None:
         self._door = door
@@ -70,7 +70,7 @@ class BoundedConnection(asyncio.Protocol):
         self._end: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Serve it if there is room."""
+        """Pass on the connection if there is room; else abort it."""
         assert isinstance(transport, asyncio.Transport)
         peer = transport.get_extra_info("peername")
         if peer is None or not self._door.admit(peer[0], self._loop.time()):
@@ -84,7 +84,7 @@ class BoundedConnection(asyncio.Protocol):
         self._inner.connection_made(transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Make room."""
+        """Free its place."""
         if self._inner is not None and self._transport is not None and self._end is not None:
             self._end.cancel()
             self._door.transports.discard(self._transport)

@@ -38,7 +38,7 @@ class LinkHistory:
         lost = 0 if link is None else link.requests_lost
         lost_before, damaged_before = self._before
         self._before = lost, damaged
-        # Both counters begin at 0 again with another flight controller.
+        # Both counters restart with another flight controller.
         self._samples.append(
             Sample(
                 None if link is None else round(link.round_trip_s * 1000, 1),
@@ -49,7 +49,7 @@ class LinkHistory:
         self._timer = self._loop.call_later(INTERVAL_S, self.start)
 
     def close(self) -> None:
-        """Take no more."""
+        """Stop sampling."""
         if self._timer is not None:
             self._timer.cancel()
 

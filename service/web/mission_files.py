@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission file that the browser sends: checked by the rules of the present flight controller, or written to it.
+"""A mission file sent by the browser: checked by the rules of the present flight controller, or written to it.
 
 The check needs no token, because it changes nothing. It costs the flight controller one request and this machine some
 milliseconds, so checks run one at a time with a pause after each.
@@ -21,7 +21,7 @@ from service.web.mission_writer import MissionWriter
 
 _PAUSE_S = 0.25
 _MAX_NAME = 80
-#: A page of another site cannot send this type without asking first, and it is not allowed to.
+#: A page of another site cannot send this type without a preflight request, which is refused.
 _CONTENT_TYPE = "application/octet-stream"
 
 
@@ -34,7 +34,7 @@ class MissionFiles:
         self._turn = asyncio.Lock()
 
     async def check(self, request: Request) -> Json:
-        """What the flight controller would hold after a write."""
+        """The mission as the flight controller would hold it."""
         async with self._turn:
             _, items = await _read(request)
             try:

@@ -21,17 +21,17 @@ from service.web.settings import WebSettings
 from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
 
-#: An access point's address may come up after the daemon: it is waited for.
+#: An access point's address may come up after the daemon: binding is retried.
 _RETRY_S = 2.0
-#: Connections that come at once are taken a few at a time; in between the links are served.
+#: New connections are accepted a few at a time; in between the links are served.
 _BACKLOG = 16
 _log = structlog.get_logger()
 
 
 class WebServer:
-    """The page of one daemon. A page that cannot be served is said in the log and tried again; the bridge goes on.
+    """The page of one daemon. If it cannot be served, that is logged and retried while the bridge goes on.
 
-    Of uvicorn it takes the protocol alone: its server would take signals and the loop into its own hands.
+    Only the protocol of uvicorn is used: its server would handle signals and run the loop itself.
     """
 
     def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
@@ -44,12 +44,12 @@ class WebServer:
         self._server: asyncio.Server | None = None
 
     def start(self) -> None:
-        """Begin to listen."""
+        """Start to listen."""
         self._api.start()
         self._listening = asyncio.get_running_loop().create_task(self._listen())
 
     async def close(self) -> None:
-        """Hang up on everybody."""
+        """Stop listening, and close all connections."""
         if self._listening is not None:
             self._listening.cancel()
             with suppress(asyncio.CancelledError):
@@ -89,7 +89,7 @@ class WebServer:
 def _config(api: Api) -> Config:
     routes = [*api.routes(), *(Route(path, guarded(handler)) for path, handler in static_files())]
     app = SafeHeaders(Starlette(routes=routes, exception_handlers={HTTPException: not_found}))
-    # What uvicorn itself would log are the mistakes of browsers; ours are logged by `guarded`.
+    # uvicorn would log only the errors of browsers; ours are logged by `guarded`.
     return Config(
         app,
         lifespan="off",

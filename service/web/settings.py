@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the status page is served: the `[web]` table of the configuration file."""
+"""The `[web]` table of the configuration file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ _FORMS = 'write "0.0.0.0:8080" for everybody on the network, "127.0.0.1:8080" fo
 
 @dataclass(frozen=True, slots=True)
 class ListenAddress:
-    """Where browsers connect. Only this machine's own can reach 127.0.0.1."""
+    """The address to listen on. 127.0.0.1 serves only this machine's own browsers."""
 
     host: str = "127.0.0.1"
     port: int = 8080
@@ -31,5 +31,5 @@ class WebSettings:
 
 
 def parse_listen(text: str) -> ListenAddress:
-    """Read "HOST:PORT"; AddressError says what is wrong with it."""
+    """Read "HOST:PORT"; AddressError explains what is wrong."""
     return ListenAddress(*parse_host_port(f"web.listen {text}", text, _FORMS))

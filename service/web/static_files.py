@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page's own files, held in memory: a browser makes nobody wait for the SD card."""
+"""The page's own files, held in memory: no request waits for the SD card."""
 
 import hashlib
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ def static_files() -> Iterator[tuple[str, Handler]]:
 def _handler(file: Path) -> Handler:
     body, kind = file.read_bytes(), _TYPES[file.suffix]
     etag = f'"{hashlib.sha256(body).hexdigest()[:16]}"'
-    # Asked for anew each time, so that a page never runs on the files of two versions.
+    # Never cached, so that a page does not mix files of two versions.
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
 
     async def serve(request: Request) -> Response:

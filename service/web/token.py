@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The token that a browser must show for anything that is not reading."""
+"""The token that every request except reading must carry."""
 
 import hmac
 import secrets
@@ -10,7 +10,7 @@ from service.bounded_file import read_bounded
 from storage.atomic_file import replace_file
 
 DEFAULT_NAME = "web-token"
-#: Letters and digits that a phone's keyboard has and nobody confuses: 16 of them are 78 bits.
+#: Letters and digits that are easy to type on a phone and to tell apart: 16 of them are 78 bits.
 _ALPHABET = "23456789abcdefghjkmnpqrstuvwxyz"
 _LENGTH = 16
 _LEAST_LENGTH = 12
@@ -18,18 +18,18 @@ _MAX_FILE = 4096
 
 
 class TokenError(Exception):
-    """There is no token that could be shown; one sentence."""
+    """No token is available; one sentence."""
 
 
 class Token:
-    """The secret in a file, made there if there is none."""
+    """The secret in a file, which is created if it is missing."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._secret = _read(path) or _make(path)
 
     def is_shown_by(self, authorization: str | None) -> bool:
-        """Tell whether an Authorization header holds it ("Bearer TOKEN")."""
+        """True if an Authorization header holds it ("Bearer TOKEN")."""
         kind, _, shown = (authorization or "").partition(" ")
         is_right = hmac.compare_digest(shown.strip().encode(errors="replace"), self._secret)
         return kind.lower() == "bearer" and is_right

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P<port>\d+)(?:[?#].*)?")
-_PATIENCE_S = 2.0
+_CONNECT_TIMEOUT_S = 2.0
 #: How long to wait for a rejection of our own certificate: in TLS 1.3 it comes after the handshake.
 _REFUSAL_S = 0.5
 _OVER_TCP = ("tcp", "tls", "ws")
@@ -41,7 +41,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
         return "no answer"
     host, port = match["host"].strip("[]"), int(match["port"])
     try:
-        with socket.create_connection((host, port), _PATIENCE_S) as connection:
+        with socket.create_connection((host, port), _CONNECT_TIMEOUT_S) as connection:
             if match["protocol"] == "tls":
                 return _tls_trouble(connection, host, files)
     except ssl.SSLCertVerificationError as error:

@@ -102,7 +102,7 @@ def test_the_router_stops_in_the_middle_of_a_push(fleet: Fleet) -> None:
     command = long_push(fleet, "--json")
     fleet.router.stop()
     snail = outcomes(command.end())["snail"]
-    assert (snail["ok"], "router, went away" in snail["error"]) == (False, True), snail
+    assert (snail["ok"], "router disconnected" in snail["error"]) == (False, True), snail
     until(
         lambda: fleet.boards["snail"].records() == records_of(judge(plain_plan(_COUNT))),
         "the end of the push on the vehicle",
@@ -122,7 +122,7 @@ def test_a_vehicle_vanishes_in_the_middle_of_a_push(fleet: Fleet) -> None:
     fleet.daemons["snail"].end(signal.SIGKILL)
     found = outcomes(command.end())
     assert found["kite"]["ok"]
-    assert "went away" in found["snail"]["error"]
+    assert "disconnected" in found["snail"]["error"]
     assert list(fleet.listed()) == ["kite"]
 
 
@@ -164,7 +164,7 @@ def test_a_bridge_that_hangs_is_listed_as_such(fleet: Fleet) -> None:
         until(lambda: not fleet.listed()["kite"]["answers"], "the silence of the one that hangs")
         vehicles = fleet.listed()
         assert (vehicles["kite"]["answers"], vehicles["snail"]["answers"]) == (False, True)
-        assert "kite: alive, but tells no state" in fleet.ask("list").stdout
+        assert "kite: alive, but sends no state" in fleet.ask("list").stdout
     finally:
         kite.send_signal(signal.SIGCONT)
     fleet.wait("kite", "snail")
@@ -242,7 +242,7 @@ def test_a_router_that_hangs_is_no_empty_fleet(fleet: Fleet) -> None:
     with zenoh.open(config) as session:
         router.send_signal(signal.SIGSTOP)
         try:
-            with pytest.raises(FleetError, match="the router did not say within 2 s"):
+            with pytest.raises(FleetError, match="the router did not list the vehicles within 2 s"):
                 roll_call(session, "fleet")
         finally:
             router.send_signal(signal.SIGCONT)

@@ -25,7 +25,7 @@ def test_one_that_fails_leaves_the_others_alone() -> None:
     assert fleet.waiting == []
     assert [each.vehicle for each in fleet.failed] == ["b", "c"]
     assert fleet.vehicles["b"].error == "Armed: disarm to change the mission"
-    assert "went away" in str(fleet.vehicles["c"].error)
+    assert "disconnected" in str(fleet.vehicles["c"].error)
     assert fleet.vehicles["a"].result == ACCEPTED["result"]
 
 
@@ -43,7 +43,7 @@ def test_silence_has_three_reasons() -> None:
     fleet.ended("b", is_alive=False)
     fleet.refused("c", None)
     reasons = [str(each.error) for each in fleet.failed]
-    assert ["takes no commands" in reasons[0], "went away" in reasons[1], "not known after" in reasons[2]] == [True] * 3
+    assert ["takes no commands" in reasons[0], "disconnected" in reasons[1], "no result after" in reasons[2]] == [True] * 3
 
 
 def test_a_name_that_two_bridges_use_gets_nothing() -> None:
