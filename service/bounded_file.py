@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that a person names: read to their end, but not for ever."""
+"""Files named by a person: read to their end, but bounded in size."""
 
 import errno
 from pathlib import Path
 
 
 def read_bounded(path: Path, most: int) -> bytes:
-    """Return what is in the file; OSError if it cannot be read, or is larger than `most` bytes (as /dev/zero is)."""
+    """The contents; OSError if the file cannot be read, or is larger than `most` bytes (as /dev/zero is)."""
     with path.open("rb") as file:
         data = file.read(most + 1)
     if len(data) > most:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a daemon's control socket is: as a service of systemd in its runtime directory, else in its state directory."""
+"""The path of a daemon's control socket: a systemd service's runtime directory, else the state directory."""
 
 import os
 from pathlib import Path
@@ -9,12 +9,12 @@ from zlib import crc32
 from service.settings import SettingsError, default_state_dir
 
 SOCKET_NAME = "control.sock"
-#: The unit's RuntimeDirectory=. A service's state directory is closed to everybody else (DynamicUser=).
+#: The unit's RuntimeDirectory=. A service's state directory is closed to other users (DynamicUser=).
 _SERVICE_FOLDER = "/run/naze-bridge"
 
 
 def socket_of_daemon(state_dir: Path) -> Path:
-    """Return where the daemon of this process listens."""
+    """The socket of this process's own daemon."""
     given = _runtime_directory()
     if given is None:
         given = state_dir if os.access(state_dir, os.W_OK) else _stand_in(state_dir)
@@ -22,9 +22,9 @@ def socket_of_daemon(state_dir: Path) -> Path:
 
 
 def find_socket(state_dir: Path | None) -> Path:
-    """Return where the daemon that is meant listens: on `state_dir`, else the user's own, else the service's.
+    """The socket of a running daemon: on `state_dir`, else the user's own, else the service's.
 
-    SettingsError if this is a user without a home, and there is no service.
+    SettingsError if the user has no home and there is no service.
     """
     if state_dir is not None:
         own, stand_in = state_dir / SOCKET_NAME, _stand_in(state_dir) / SOCKET_NAME
@@ -40,7 +40,7 @@ def find_socket(state_dir: Path | None) -> Path:
 
 
 def _stand_in(state_dir: Path) -> Path:
-    """The folder for the socket where the state directory cannot be written: this user's, and closed to others."""
+    """The folder for the socket if the state directory cannot be written: private to this user."""
     base = os.environ.get("XDG_RUNTIME_DIR") or gettempdir()
     return Path(base) / f"naze-bridge-{os.getuid()}-{crc32(bytes(state_dir.absolute())):08x}"
 

@@ -38,14 +38,14 @@ from service.settings import PassThroughRule, Settings
 from service.store_worker import StoreWorker
 from service.version import version
 
-#: How often it is said that nobody is found: a log that says nothing looks like a program that hangs.
+#: The interval of messages about an unsuccessful search: a silent log looks like a hang.
 _SEARCH_REPORT_S = 60.0
-#: How long a stop waits: for a push to be done, for it to be given up, for the store. All of it is within 2 s.
+#: Timeouts of a stop: for a push to finish, for its abort, for the store. Together they stay within 2 s.
 _FINISH_S = 1.0
 _ABORT_S = 0.6
 _STORE_TIMEOUT_S = 0.2
 _REST_INTERVAL_S = 0.02
-#: Frames come in over zenoh only if its transport is authenticated, or if the owner said that it need not be.
+#: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
 _FLIGHT = {"vehicle.armed": True, "vehicle.disarmed": False}
 _WHO_MAY_WRITE = f"anyone who reaches it may write missions and parameters; to restrict it: {page('docs/signing.md')}"
@@ -55,7 +55,7 @@ _log = structlog.get_logger()
 
 @dataclass(slots=True)
 class Traffic:
-    """What went over one port or link since the start: bytes, and pieces (reads and writes, datagrams)."""
+    """The traffic on one port or link since the start: bytes, and pieces (reads and writes, or datagrams)."""
 
     pieces_received: int = 0
     bytes_received: int = 0
@@ -64,29 +64,29 @@ class Traffic:
 
 
 class Follower(Protocol):
-    """Somebody in this process who wants to know what happens. Nothing here may wait."""
+    """A part of this process that follows the daemon's events. Its methods must not block."""
 
     def telemetry(self, groups: frozenset[Group]) -> None:
-        """There is news of these groups, which were asked for with `bridge.report.watch`."""
+        """New values in these groups, which were requested with `bridge.report.watch`."""
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
         """An event was logged."""
 
     def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
-        """A mission that came in was dealt with."""
+        """A received mission was completed or rejected."""
 
     def status(self) -> Json:
-        """What `naze-bridge status` is to tell of it."""
+        """The follower's part of `naze-bridge status`."""
 
 
 class Daemon:
-    """Feeds the bridge and carries out what it wants. Must be made on a running event loop."""
+    """Feeds the bridge and carries out its outputs. Must be made on a running event loop."""
 
     def __init__(self, settings: Settings, host: Host | None = None) -> None:
         self._loop = asyncio.get_running_loop()
         self._loop.set_exception_handler(self._fault)
         self.settings = settings
-        #: On the loop's clock; `found_at` None: no flight controller is there; `lost_at` None: none was lost since.
+        #: On the loop's clock; `found_at` None: no flight controller; `lost_at` None: none was lost since.
         self.started_at = self._loop.time()
         self.found_at: float | None = None
         self.lost_at: float | None = None
@@ -117,7 +117,7 @@ class Daemon:
         open_device = device_opener(settings.fc) if self._finder is None else self._finder.open
         self._port = self._recording.port(open_device, self._fc_opened, self._fc_data, self._fc_closed)
         self._links: dict[str, GcsLink] = {}
-        #: By link; the flight controller's port has the name "fc".
+        #: Per link; the flight controller's port is named "fc".
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
         self._fc_traffic = self.traffic["fc"]
         self._shares: list[Share] = []
@@ -137,12 +137,12 @@ class Daemon:
 
     @property
     def fc_where(self) -> str:
-        """The flight controller's port or address; while no port is open, what is searched."""
+        """The flight controller's port or address; while no port is open, the kinds of port searched."""
         return str(self.settings.fc) if self._finder is None else self._finder.where
 
     @property
     def recording(self) -> list[str]:
-        """What is recorded, and where."""
+        """The files being recorded, or the reasons why recording stopped."""
         return self._recording.describe()
 
     async def run(self) -> None:
@@ -173,7 +173,7 @@ class Daemon:
                 port.cancel()
                 with suppress(asyncio.CancelledError):
                     await port
-                # Who sent a mission that ended with the port hears of it once that is stored.
+                # The sender of a mission that ended with the port gets its answer once that is stored.
                 await self.is_at_rest(_STORE_TIMEOUT_S)
             for timer in (self._timer, self._search_report):
                 if timer is not None:
@@ -189,19 +189,19 @@ class Daemon:
             self._recording.close()
 
     def add_follower(self, follower: Follower) -> None:
-        """Tell somebody of everything from now on."""
+        """Subscribe a follower."""
         self._followers.append(follower)
 
     def followers_status(self) -> Json:
-        """Return what the followers tell of themselves."""
+        """The followers' parts of the status."""
         return {key: value for follower in self._followers for key, value in follower.status().items()}
 
     def add_link(self, link: GcsLink) -> None:
-        """Serve ground stations over one more link; it is closed with the others."""
+        """Serve ground stations over another link; it is closed with the others."""
         self._links[link.name] = link
 
     def change_links(self, gcs: Sequence[GcsAddress]) -> None:
-        """Serve these links to ground stations from now on; those that were there before go on undisturbed."""
+        """Serve ground stations over these links; those that stay are not interrupted."""
         wanted = {str(address): address for address in gcs}
         for name in map(str, self.settings.gcs):
             if name not in wanted and name in self._links:
@@ -220,7 +220,7 @@ class Daemon:
         self.settings = replace(self.settings, gcs=tuple(gcs))
 
     def flush(self) -> None:
-        """Carry out what the bridge wants after it was told something."""
+        """Carry out the outputs that the bridge has after an input."""
         bridge = self.bridge
         self._port.set_speed(bridge.speed)
         self._port.may_gather = bridge.is_passing_through
@@ -236,7 +236,7 @@ class Daemon:
         deadline = bridge.next_deadline()
         if self._timer is not None:
             if self._timer.when() <= deadline:
-                # A deadline moves on with every byte that comes. A tick that is too early costs less than a new timer.
+                # Every received byte moves the deadline. An early tick costs less than a new timer.
                 return
             self._timer.cancel()
         self._timer = self._loop.call_at(deadline, self._tick)
@@ -249,7 +249,7 @@ class Daemon:
             traffic.bytes_sent += len(data)
 
     async def finish(self) -> None:
-        """Begin no more transfers; what is under way comes to a good end if that is soon, else to a clean one."""
+        """Start no more transfers; the present one finishes soon, or is aborted cleanly."""
         self.bridge.stop_missions(self._loop.time())
         self.flush()
         if await self.is_at_rest(_FINISH_S):
@@ -259,14 +259,14 @@ class Daemon:
         await self.is_at_rest(_ABORT_S)
 
     async def is_at_rest(self, seconds: float) -> bool:
-        """Wait until nothing is under way, but not longer than that; tell whether it is so."""
+        """Wait for the end of all conversations, with a timeout; True if there are none."""
         for _ in range(int(seconds / _REST_INTERVAL_S)):
             if not self.bridge.is_conversing:
                 break
             await asyncio.sleep(_REST_INTERVAL_S)
         return not self.bridge.is_conversing
 
-    # What the ground station links tell (service.gcs_events.GcsEvents).
+    # The methods of service.links.gcs_events.GcsEvents.
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
         """Take bytes from a ground station."""
@@ -276,29 +276,29 @@ class Daemon:
         try:
             self.bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram)
         except Exception:
-            # A ground station must not be able to reset the line to the flight controller: only its data is dropped.
+            # A ground station must not be able to reset the flight controller's line: only its data is dropped.
             _log.exception("gcs.fault", peer=str(peer))
         self.flush()
 
     def gcs_gone(self, peer: Peer) -> None:
-        """Forget a ground station."""
+        """Remove a ground station."""
         self.bridge.gcs_gone(peer, self._loop.time())
         self.flush()
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """Choose which of a full link's connections makes room."""
+        """The connection of a full link to close."""
         return self.bridge.ground.displaced(peers)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        """Speak to `peer` unasked."""
+        """Send to `peer` before it is heard."""
         self.bridge.ground.add_default_peer(peer, until_answered=until_answered)
 
     def remove_default_peer(self, peer: Peer) -> None:
-        """Stop that."""
+        """Stop sending to an unheard peer."""
         self.bridge.ground.remove_default_peer(peer)
 
     def _shared_request(self, frame: MspFrame, answer: Callable[[MspFrame], None], *, may_write: bool) -> None:
-        """Carry another program's MSP request to the flight controller, or refuse it with the reason in the log."""
+        """Forward another program's MSP request, or refuse it and log the reason."""
         why = self.bridge.sharing.request(frame, answer, self._loop.time(), may_write=may_write)
         if why:
             self.share_refused[why] += 1
@@ -322,7 +322,7 @@ class Daemon:
             self._finder.received(data)
         bridge.fc_received(data, self._loop.time())
         if bridge.is_passing_through:
-            # Then it makes datagrams and nothing else: no more is looked at, thousands of times a second.
+            # Pass-through makes only datagrams; the rest of flush() would cost too much thousands of times a second.
             self._send_datagrams()
             if self._followers:
                 self._tell_followers()
@@ -366,13 +366,13 @@ class Daemon:
         self.flush()
 
     def _fault(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """A callback of the loop raised: log it, and set up the line to the flight controller again.
+        """A callback of the loop raised: log it, and restart the flight controller's line.
 
-        asyncio would write to standard error, and block there if nobody reads it.
+        asyncio would write to standard error, and block if its pipe is full.
         """
         error = context.get("exception")
         if isinstance(error, OSError) and "accept" in context["message"]:
-            # No file descriptor is left for a client; asyncio tries again every second.
+            # No file descriptor is left for a new client; asyncio retries every second.
             if not self._complained_of_accept:
                 self._complained_of_accept = True
                 _log.warning("daemon.cannot_accept", why=error.strerror)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A thread for work on a disk that may hang: the event loop never waits for it, and neither does the end."""
+"""A thread for work on a disk that may hang: neither the event loop nor the end of the process waits for it."""
 
 import threading
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from queue import SimpleQueue
 
 
 class DiskThread:
-    """Does what it is given, in order. A daemon thread: one that hangs in the kernel ends with the process."""
+    """Runs jobs in order. A daemon thread, so that one that hangs in the kernel ends with the process."""
 
     def __init__(self, name: str) -> None:
         self._work: SimpleQueue[Callable[[], object] | None] = SimpleQueue()
@@ -15,11 +15,11 @@ class DiskThread:
         self._thread.start()
 
     def submit(self, work: Callable[[], object]) -> None:
-        """Have something done; it must not raise."""
+        """Queue a job, which must not raise."""
         self._work.put(work)
 
     def close(self, timeout_s: float) -> bool:
-        """Have the rest done, and end; False if that takes longer."""
+        """Run the remaining jobs and end; False on timeout."""
         self._work.put(None)
         self._thread.join(timeout_s)
         return not self._thread.is_alive()

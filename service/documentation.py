@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a page of the documentation is on this machine."""
+"""The location of documentation pages on this machine."""
 
 from pathlib import Path
 
@@ -8,5 +8,5 @@ _IN_PACKAGE = Path(__file__).is_relative_to("/usr/lib/naze-bridge")
 
 
 def page(name: str) -> str:
-    """The file to name in a message: `name` is its path in the repository, "docs/signing.md"."""
+    """The path to give in a message for `name`, a path in the repository such as "docs/signing.md"."""
     return str(_INSTALLED / name) if _IN_PACKAGE else name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The machine as doctor, setup and the search for a port see it: files below a root, which tests make."""
+"""The machine, for doctor, setup and the port search: files below a root, which tests create."""
 
 import fcntl
 import os
@@ -14,7 +14,7 @@ _SIOCGIFADDR = 0x8915
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """A program that runs, its arguments first to last."""
+    """A running program; `arguments` includes its name."""
 
     pid: int
     arguments: tuple[str, ...]
@@ -26,7 +26,7 @@ class Process:
 
     @property
     def is_naze_bridge(self) -> bool:
-        """Whether it is a daemon of ours, whichever Python runs it."""
+        """True for a naze-bridge daemon, under any Python."""
         return any("naze-bridge" in argument for argument in self.arguments[:4])
 
 
@@ -37,39 +37,39 @@ class Host:
         self.root = root
 
     def path(self, path: str | Path) -> Path:
-        """Return where a file of the machine is."""
+        """The real path of one of the machine's files."""
         return self.root / str(path).lstrip("/")
 
     def resolve(self, path: str | Path) -> Path:
-        """Return what a link of the machine leads to, as the machine names it."""
+        """The target of a symbolic link, as a path on the machine."""
         named = self.path(path)
         if not named.is_symlink():
             return Path(path)
         return Path(os.path.normpath(Path(path).parent / os.readlink(named)))
 
     def read(self, path: str) -> str:
-        """Return a file's text; nothing if it cannot be read."""
+        """A file's text; empty if it cannot be read."""
         try:
             return self.path(path).read_text(errors="replace")
         except OSError:
             return ""
 
     def names(self, folder: str, pattern: str = "*") -> list[str]:
-        """Return the names in a folder, sorted."""
+        """The names in a folder, sorted."""
         return sorted(path.name for path in self.path(folder).glob(pattern))
 
     def processes(self) -> Iterator[Process]:
-        """Yield the programs that run, as far as we may see them."""
+        """Yield the running programs, as far as permissions show them."""
         for name in self.names("/proc", "[0-9]*"):
             words = self.read(f"/proc/{name}/cmdline").split("\0")
             yield Process(int(name), tuple(words[:-1]))
 
     def holder(self, link: str) -> Process | None:
-        """Return who has a file or socket open, by what its descriptor leads to ("/dev/ttyS0", "socket:[4711]")."""
+        """The program that has a file or socket open, by its descriptor's target ("/dev/ttyS0", "socket:[4711]")."""
         return next((process for process in self.processes() if self.has_open(process, link)), None)
 
     def has_open(self, process: Process, link: str) -> bool:
-        """Whether a program has it open, as far as we may see it."""
+        """True if a program has it open, as far as permissions show."""
         try:
             open_files = list(self.path(f"/proc/{process.pid}/fd").iterdir())
             return any(os.readlink(descriptor) == link for descriptor in open_files)
@@ -77,13 +77,13 @@ class Host:
             return False
 
     def ipv4_addresses(self) -> list[str]:
-        """Return this machine's IPv4 addresses but the loopback's, Wi-Fi first."""
+        """The machine's IPv4 addresses except the loopback's, Wi-Fi first."""
         cards = [name for name in self.names("/sys/class/net") if name != "lo"]
         cards.sort(key=lambda name: not self.path(f"/sys/class/net/{name}/wireless").exists())
         return [address for name in cards if (address := self.address(name)) is not None]
 
     def address(self, interface: str) -> str | None:
-        """Return a network card's IPv4 address. This is the kernel's word, not a file's."""
+        """A network interface's IPv4 address, asked of the kernel."""
         request = struct.pack("256s", interface.encode()[:15])
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
             try:

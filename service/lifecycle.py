@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon from its start to a signal, and what systemd hears meanwhile."""
+"""The life of a daemon from its start to a signal, reported to systemd."""
 
 import asyncio
 import signal
@@ -13,7 +13,7 @@ from service.notify import Notifier
 from service.reload import reload_when_told
 from service.settings import Settings
 
-#: How often the line for `systemctl status` is looked at, and at least how often within the watchdog's time it is fed.
+#: The interval of status updates, and the minimum number of watchdog messages per watchdog timeout.
 _INTERVAL_S = 2.0
 _FEEDS = 3
 
@@ -21,9 +21,9 @@ _log = structlog.get_logger()
 
 
 async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]) -> None:
-    """Run the daemon until SIGINT or SIGTERM. A second signal does not wait for a mission under way.
+    """Run the daemon until SIGINT or SIGTERM. A second signal does not wait for a transfer.
 
-    On SIGHUP the settings are read again by `load`.
+    SIGHUP reloads the settings with `load`.
     """
     loop = asyncio.get_running_loop()
     running = loop.create_task(daemon.run())
@@ -62,13 +62,13 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
 
 
 async def _tell_ready(daemon: Daemon, notifier: Notifier) -> None:
-    """The flight controller may come at any time: nobody waits for it."""
+    """Ready when ground stations can connect: the flight controller may appear at any time."""
     await daemon.started.wait()
     notifier.ready()
 
 
 class _Reporting:
-    """Feeds the watchdog and tells the link, by timers of the loop that owns the links: a thread would never stop."""
+    """Feeds the watchdog and reports the status, by timers of the links' own loop: a thread would hide a hung loop."""
 
     def __init__(self, daemon: Daemon, notifier: Notifier) -> None:
         self._daemon = daemon
@@ -78,7 +78,7 @@ class _Reporting:
         self._timer: asyncio.Handle = asyncio.get_running_loop().call_soon(self._report)
 
     def end(self) -> None:
-        """Say no more."""
+        """Stop the timers."""
         self._timer.cancel()
 
     def _report(self) -> None:
@@ -88,7 +88,7 @@ class _Reporting:
 
 
 def link_line(daemon: Daemon) -> str:
-    """Say in one line who is at either end."""
+    """The flight controller and the ground stations in one line."""
     bridge = daemon.bridge
     session = bridge.session
     if daemon.fc_trouble:

@@ -16,29 +16,29 @@ from typing import Any
 import structlog
 from structlog.typing import EventDict, Processor
 
-#: The levels by rising weight, and syslog's priority of each.
+#: The levels in ascending order, with their syslog priorities.
 _PRIORITIES = {"debug": 7, "info": 6, "warning": 4, "error": 3}
 _WEIGHTS = {level: weight for weight, level in enumerate(_PRIORITIES)}
-#: An event that comes more often than this is left out for the rest of the time, and counted.
+#: Beyond this rate the same event is suppressed and counted.
 _MOST, _WITHIN_S = 20, 10.0
 
 _log = structlog.get_logger()
 
 
 class _StandardError:
-    """Prints a line, or loses it: a full disk behind a log, or a pipe that nobody reads, must not stop the bridge."""
+    """Prints a line, or drops it: a full disk or pipe behind the log must not stop the bridge."""
 
     def __init__(self) -> None:
         self._is_broken_off = False
 
     def msg(self, line: str) -> None:
-        if sys.stderr is None:  # closed by who started us, as daemons of old were started
+        if sys.stderr is None:  # closed by the parent process, as for old daemons
             return
         start = "\n" if self._is_broken_off else ""
         rest = f"{start}{line}\n".encode(errors="backslashreplace")
         with suppress(OSError):
             descriptor = sys.stderr.fileno()
-            # A pipe that takes anything takes so much without waiting.
+            # A pipe that is writable takes this much without blocking.
             while rest and select.select([], [descriptor], [], 0)[1]:
                 self._is_broken_off = True
                 rest = rest[os.write(descriptor, rest[: select.PIPE_BUF]) :]
@@ -48,7 +48,7 @@ class _StandardError:
 
 
 class _LeastLevel:
-    """Drops what is below the level; it may change while the program runs."""
+    """Drops events below the level, which may change at run time."""
 
     def __init__(self) -> None:
         self.level = "info"
@@ -60,7 +60,7 @@ class _LeastLevel:
 
 
 class _RateLimit:
-    """Keeps a fault that repeats itself from filling the log; before the next line it is told what was left out."""
+    """Keeps repeated events from flooding the log; the number of suppressed ones is logged with the next line."""
 
     def __init__(self) -> None:
         self._seen: dict[str, tuple[float, int]] = {}
@@ -81,7 +81,7 @@ class _RateLimit:
 
 
 class _JournalLines:
-    """Renders JSON behind the priority, without the time: journald has its own."""
+    """Renders JSON after the priority, without the time: journald adds its own."""
 
     def __init__(self) -> None:
         self._render = structlog.processors.JSONRenderer()
@@ -94,7 +94,7 @@ _least_level = _LeastLevel()
 
 
 class _FromLibraries(logging.Handler):
-    """Sends what libraries log (asyncio above all) the same way; by itself it would wait for a full pipe."""
+    """Routes the logs of libraries (mainly asyncio) the same way; their own handler would block on a full pipe."""
 
     def emit(self, record: logging.LogRecord) -> None:
         level = _log.error if record.levelno >= logging.ERROR else _log.warning

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Prometheus' text of a daemon: what it counts anyway, read when somebody asks for it.
+"""A daemon's metrics in Prometheus' text format, read at the moment of a scrape.
 
-Imported only where it is served: the client library costs several megabytes.
+Imported only if it is used: the client library takes several megabytes.
 """
 
 import time
@@ -23,12 +23,12 @@ from service.mission_data import Json
 from service.version import version
 from service.zenoh_link.settings import host_name
 
-#: What /metrics is answered with.
+#: The content type of /metrics.
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 _PREFIX = "naze_bridge_"
-#: An upload takes a second on a good link, and is given up after some more.
+#: An upload takes a second on a good link; a failing one times out after some more.
 _UPLOAD_S = (0.25, 0.5, 1, 2, 4, 8, 16, 32, 64)
-#: Followers' figures that only ever grow.
+#: The followers' values that only grow.
 _COUNTED = {"zenoh_dropped"}
 _FIXES = {"none": 0, "2D": 2, "3D": 3}
 _BEGINS = {"mission.upload_started", "mission.push_started"}
@@ -36,7 +36,7 @@ _ENDS = {"mission.upload_ended", "mission.refused", "mission.push_ended"}
 
 
 class Metrics:
-    """Follows a daemon from now on. Implements service.daemon.Follower."""
+    """Collects from a daemon. Implements service.daemon.Follower."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._registry = CollectorRegistry()
@@ -59,14 +59,14 @@ class Metrics:
         daemon.add_follower(self)
 
     def render(self) -> bytes:
-        """Return the text."""
+        """The metrics as text."""
         return generate_latest(self._labelled)
 
     def telemetry(self, groups: frozenset[Group]) -> None:
-        """It is read when somebody asks."""
+        """Not used: telemetry is read at the scrape."""
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        """Count it."""
+        """Count an event."""
         self._events.labels(event, level).inc()
         incident = facts.get("incident")
         if event in _BEGINS:
@@ -76,13 +76,13 @@ class Metrics:
             self._durations.labels(facts["ack"]).observe(elapsed_s)
 
     def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
-        """Count it."""
+        """Count a mission."""
         self._missions.labels(delivery.ack.name).inc()
         for finding in mission.verdict.findings:
             self._findings.labels(finding.field).inc()
 
     def status(self) -> Json:
-        """There is nothing to tell of it."""
+        """Adds nothing to the status."""
         return {}
 
     def _counter(self, name: str, meaning: str, *labels: str) -> Counter:
@@ -90,18 +90,18 @@ class Metrics:
 
 
 class _OfVehicle(Collector):
-    """Every metric of a registry, with the vehicle's name as a label: a fleet's metrics meet in one database."""
+    """All metrics of a registry with the vehicle's name as a label, for a fleet in one database."""
 
     def __init__(self, registry: CollectorRegistry, vehicle: str) -> None:
         self._registry = registry
         self._vehicle = vehicle
 
     def describe(self) -> list[Metric]:
-        """Names are checked by the registry within."""
+        """Not needed: the inner registry checks the names."""
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Read everything."""
+        """Read all metrics."""
         for family in self._registry.collect():
             family.samples = [
                 sample._replace(labels={**sample.labels, "vehicle": self._vehicle}) for sample in family.samples
@@ -110,17 +110,17 @@ class _OfVehicle(Collector):
 
 
 class _State(Collector):
-    """What the daemon and its bridge know at the moment of a scrape."""
+    """The state of the daemon and its bridge at the moment of a scrape."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
 
     def describe(self) -> list[Metric]:
-        """Collecting is cheap and needs no rehearsal."""
+        """Not needed."""
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Read everything."""
+        """Read all metrics."""
         yield _gauge("build_info", "The version that runs.", {"version": version()}, 1)
         yield from self._links()
         yield from self._flight_controller()
@@ -164,7 +164,7 @@ class _State(Collector):
         for each in TRANSITIONS:
             state.add_metric([each.name], float(type(session.state) is each))
         yield state
-        # These begin anew with each flight controller that is found, as Prometheus lets counters do.
+        # Restart at 0 with each flight controller found, which Prometheus permits for counters.
         damaged = _counters("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.")
         damaged.add_metric([], session.bad_checksums or 0)
         yield damaged

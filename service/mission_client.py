@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small MAVLink ground station: writes and reads a mission over UDP, as the demonstration and a script would."""
+"""A small MAVLink ground station that writes and reads missions over UDP, for the demonstration."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,11 +15,11 @@ _TRIES = 8
 
 
 class ClientError(Exception):
-    """The vehicle did not do what was asked; one sentence."""
+    """The vehicle did not carry out a request; one sentence."""
 
 
 class MissionClient:
-    """Speaks to one vehicle. `texts` collects the STATUSTEXTs that came meanwhile."""
+    """A connection to one vehicle. `texts` collects received STATUSTEXTs."""
 
     def __init__(self, link: Message, sysid: int, compid: int) -> None:
         self._link = link
@@ -28,7 +28,7 @@ class MissionClient:
         self.texts: list[str] = []
 
     def write(self, items: Sequence[MissionItem], progress: Callable[[int], None]) -> MissionResult:
-        """Upload a list; the vehicle's final answer."""
+        """Upload a list; returns the type of the final MISSION_ACK."""
         count = messages.MAVLink_mission_count_message(self._sysid, self._compid, len(items), 0)
         answer = self._ask(count, "MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
         while answer.get_type() != "MISSION_ACK":
@@ -39,7 +39,7 @@ class MissionClient:
         return MissionResult(answer.type)
 
     def read(self) -> list[MissionItem]:
-        """Download what the flight controller holds."""
+        """Download the mission of the flight controller."""
         request_list = messages.MAVLink_mission_request_list_message(self._sysid, self._compid, 0)
         count = self._ask(request_list, "MISSION_COUNT").count
         items: list[MissionItem] = []
@@ -66,7 +66,7 @@ class MissionClient:
 
 @contextmanager
 def connect(host: str, port: int, patience_s: float) -> Iterator[MissionClient]:
-    """Connect to the vehicle behind a UDP port; ClientError if no heartbeat comes in time."""
+    """Connect to the vehicle behind a UDP port; ClientError if no heartbeat arrives in time."""
     link = mavutil.mavlink_connection(f"udpout:{host}:{port}", source_system=255, source_component=190)
     try:
         for _ in range(max(int(patience_s / 0.2), 1)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions as plain data: on the control socket and in what --json prints."""
+"""Missions as plain data, on the control socket and in the output of --json."""
 
 import json
 import math
@@ -17,12 +17,12 @@ _NUMBERS = ("p1", "p2", "p3", "p4", "alt_m")
 
 
 def to_json(value: object) -> str:
-    """Return one line of JSON as every language reads it: "not given" (NaN) is null, an infinite number a string."""
+    """One line of strict JSON: NaN ("not given") becomes null, infinity a string."""
     return json.dumps(_strict(value), allow_nan=False)
 
 
 def mission_items(data: object) -> list[MissionItem]:
-    """Return the items of a list that came as plain data; ValueError says what is wrong with it."""
+    """Read the items of a list from plain data; ValueError explains what is wrong."""
     if not isinstance(data, list):
         raise ValueError("items must be a list")
     return [_item(entry) for entry in data]
@@ -43,7 +43,7 @@ def verdict_data(verdict: Verdict[Any]) -> Json:
 
 
 def whole_number(data: Json, key: str, least: int, most: int) -> int:
-    """Return data[key]; ValueError if it is no whole number from `least` to `most`."""
+    """data[key]; ValueError if it is not a whole number from `least` to `most`."""
     value = data.get(key)
     if not _is_whole(value) or not least <= value <= most:
         raise ValueError(f"{key} must be a whole number from {least} to {most}")
@@ -74,7 +74,7 @@ def _place(entry: Json, key: str) -> int | None:
 
 
 def _is_whole(value: object) -> TypeGuard[int]:
-    """True for any int, so for a Command too, but not for a bool: JSON's true is no number."""
+    """True for an int, so for a Command too, but not for a bool."""
     return isinstance(value, int) and not isinstance(value, bool)
 
 

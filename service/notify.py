@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What systemd is told, and how often it wants to hear from us: sd_notify(3).
+"""Messages to systemd, and its watchdog interval: sd_notify(3).
 
-Own code, because the protocol is one datagram: the packages for it that have a wheel know nothing of STOPPING and
-RELOADING, and can wait for a slow systemd, which the loop that owns the links must not.
+Own code, because the protocol is one datagram: the packages for it that have a wheel lack STOPPING and RELOADING, and
+may block on a slow systemd, which the links' loop must not.
 """
 
 import os
@@ -13,7 +13,7 @@ from contextlib import suppress
 
 
 class Notifier:
-    """Speaks to the service manager; where there is none nothing is said. Never waits, never fails."""
+    """Sends to the service manager, if there is one. Never blocks, never fails."""
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         address = environment.get("NOTIFY_SOCKET", "")
@@ -24,29 +24,29 @@ class Notifier:
         self._status = ""
 
     def ready(self) -> None:
-        """The daemon runs, or runs on with the settings that it was told to read again."""
+        """The daemon is ready, or ready again after a reload."""
         self._say("READY=1")
 
     def reloading(self) -> None:
-        """The settings are read again; `ready` ends that."""
+        """A reload of the settings has begun; `ready` ends it."""
         self._say(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
 
     def stopping(self) -> None:
-        """The daemon is about to end."""
+        """The daemon is stopping."""
         self._say("STOPPING=1")
 
     def alive(self) -> None:
-        """The loop turns: the watchdog can wait for another `watchdog_s`."""
+        """The loop is alive: restarts the watchdog's `watchdog_s`."""
         self._say("WATCHDOG=1")
 
     def status(self, text: str) -> None:
-        """Tell `systemctl status` in one line how it stands; the same line is not told twice."""
+        """Set the line shown by `systemctl status`; an unchanged line is not sent again."""
         if text != self._status:
             self._status = text
             self._say(f"STATUS={text}")
 
     def close(self) -> None:
-        """Say no more."""
+        """Close the socket."""
         if self._socket is not None:
             self._socket.close()
 
@@ -57,7 +57,7 @@ class Notifier:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float | None:
-    """Return how long the watchdog waits for us, seconds; None if it is not meant for this process."""
+    """The watchdog's timeout, seconds; None if it is not meant for this process."""
     for_us = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     microseconds = environment.get("WATCHDOG_USEC", "")
     return int(microseconds) / 1e6 if for_us and microseconds.isdecimal() else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Raspberry Pi models: which device is the UART on GPIO 14 and 15, and which line of config.txt switches it on."""
+"""Raspberry Pi models: the device of the UART on GPIO 14 and 15, and the config.txt line that enables it."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ BOOT_FOLDERS = ("/boot/firmware", "/boot")
 
 @dataclass(frozen=True, slots=True)
 class PiModel:
-    """`name` as the device tree has it; `header_uart`: the device on pins 8 and 10; `config_line`: switches it on."""
+    """`name`: from the device tree; `header_uart`: the device on pins 8 and 10; `config_line`: enables it."""
 
     name: str
     header_uart: str
@@ -19,7 +19,7 @@ class PiModel:
 
 
 def pi_model(host: Host) -> PiModel | None:
-    """The Raspberry Pi this is; None on other machines.
+    """The machine's Raspberry Pi model; None on other machines.
 
     On a Pi 5 /dev/serial0 is the debug socket between the HDMI plugs (ttyAMA10); the header has ttyAMA0. On earlier
     models serial0 is the header's: ttyS0 where Bluetooth has the better UART, else ttyAMA0.

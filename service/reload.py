@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""SIGHUP: the settings are read again, and what can be taken over in flight is."""
+"""SIGHUP: reloads the settings and applies those that can change at run time."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,12 +18,12 @@ _log = structlog.get_logger()
 async def reload_when_told(
     told: asyncio.Event, daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]
 ) -> None:
-    """Take over what `load` returns each time that `told` is set; settings that cannot be used change nothing."""
+    """Apply the result of `load` each time `told` is set; invalid settings change nothing."""
     while await told.wait():
         told.clear()
         notifier.reloading()
         try:
-            # Files are read beside the loop: a slow disk must not hold the links up.
+            # In a thread: a slow disk must not delay the links.
             _take_over(daemon, await asyncio.to_thread(load))
         except SettingsError as error:
             _log.error("config.rejected", why=[str(problem) for problem in error.problems], what="nothing is changed")
@@ -39,7 +39,7 @@ def _take_over(daemon: Daemon, new: Settings) -> None:
         daemon.settings = replace(daemon.settings, log_level=new.log_level)
         live.add("log_level")
     if "access" in changed:
-        # Keys are held by what guards and signs: who may write is not changed under a running transfer.
+        # Keys are held by the parts that guard and sign: write access is not changed during a transfer.
         changed = changed - {"access"} | {"gcs"}
     elif "gcs" in changed:
         daemon.change_links(new.gcs)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mission store on a thread of its own: a slow SD card never holds the links up."""
+"""The mission store on its own thread: a slow SD card never delays the links."""
 
 import asyncio
 import time
@@ -19,7 +19,7 @@ from service.disk_thread import DiskThread
 from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store, store_in_memory
 
 DATABASE_NAME = "missions.db"
-#: At the end: a disk that hangs must not keep the daemon from ending.
+#: For the last jobs: a hanging disk must not keep the daemon from ending.
 _CLOSE_TIMEOUT_S = 2.0
 T = TypeVar("T")
 _log = structlog.get_logger()
@@ -28,7 +28,7 @@ _log = structlog.get_logger()
 class StoreWorker:
     """Carries out the bridge's store effects in order. Without a `directory` nothing is stored.
 
-    In a directory that cannot be used missions are kept in memory; `on_trouble` is told why, on the event loop.
+    In an unusable directory missions are kept in memory; `on_trouble` gets the reason, on the event loop.
     """
 
     def __init__(self, directory: Path | None, on_trouble: Callable[[str], None] = lambda _why: None) -> None:
@@ -41,7 +41,7 @@ class StoreWorker:
             self._thread.submit(partial(self._open, directory))
 
     def carry_out(self, effect: StoreEffect, answer: Callable[[object], None]) -> None:
-        """Do it on the worker's thread; `answer` is called on the event loop."""
+        """Run an effect on the worker's thread; `answer` is called on the event loop."""
 
         def work() -> None:
             self._tell(answer, self._do(effect))
@@ -49,7 +49,7 @@ class StoreWorker:
         self._thread.submit(work)
 
     async def ask(self, question: Callable[[MissionStore], T]) -> T:
-        """Ask the store something; StoreError if there is no store or it fails."""
+        """Run a query on the store; StoreError if there is no store or it fails."""
         answered: asyncio.Future[T] = self._loop.create_future()
 
         def work() -> None:
@@ -66,13 +66,13 @@ class StoreWorker:
         return await answered
 
     def close(self) -> None:
-        """Finish what was begun, then close; a disk that hangs is not waited for."""
+        """Finish the queued jobs, then close; gives up on a hanging disk."""
         self._thread.submit(self._close)
         if not self._thread.close(_CLOSE_TIMEOUT_S):
             _log.error("store.hangs", what="the disk does not answer; the last outcome may be missing")
 
     def _tell(self, answer: Callable[..., None], *arguments: object) -> None:
-        with suppress(RuntimeError):  # the loop is closed: a disk that hung answers too late
+        with suppress(RuntimeError):  # the loop is closed: a hanging disk answered too late
             self._loop.call_soon_threadsafe(answer, *arguments)
 
     def _open(self, directory: Path) -> None:

@@ -43,7 +43,8 @@ def test_silence_has_three_reasons() -> None:
     fleet.ended("b", is_alive=False)
     fleet.refused("c", None)
     reasons = [str(each.error) for each in fleet.failed]
-    assert ["takes no commands" in reasons[0], "disconnected" in reasons[1], "no result after" in reasons[2]] == [True] * 3
+    words = ("takes no commands", "disconnected", "no result after")
+    assert [word in reason for word, reason in zip(words, reasons, strict=True)] == [True] * 3
 
 
 def test_a_name_that_two_bridges_use_gets_nothing() -> None:
