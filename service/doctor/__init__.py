@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge doctor`: looks at the machine and says what is in the way of the bridge, and what to do.
+"""`naze-bridge doctor`: finds problems of the machine that affect the bridge, with remedies.
 
-Each check is a function of the `Host` that returns what it found; `examination.py` has the list of them.
+Each check is a function of the `Host`; `examination.py` lists them.
 """

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a check found."""
+"""The result of a check."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Grade(Enum):
-    """`NOTE` is worth knowing, but nothing that keeps the bridge from flying."""
+    """`NOTE`: worth knowing, but the bridge works."""
 
     OK = "ok"
     NOTE = "note"
@@ -15,7 +15,7 @@ class Grade(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """One line: what was looked at, what was found, and what to do about it if it is not ok."""
+    """One line: the subject, the finding, and a remedy if it is not OK."""
 
     check: str
     grade: Grade
@@ -24,15 +24,15 @@ class Checked:
 
 
 def ok(check: str, found: str) -> Checked:
-    """It is as it should be."""
+    """A result without a problem."""
     return Checked(check, Grade.OK, found)
 
 
 def note(check: str, found: str, remedy: str) -> Checked:
-    """It may be in the way some day."""
+    """A result that may become a problem."""
     return Checked(check, Grade.NOTE, found, remedy)
 
 
 def problem(check: str, found: str, remedy: str) -> Checked:
-    """It is in the way."""
+    """A problem for the bridge."""
     return Checked(check, Grade.PROBLEM, found, remedy)

@@ -20,7 +20,7 @@ from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG
 from storage.store_error import StoreError
 
-#: What the service is started with, and where it keeps its missions.
+#: The service's configuration file and state directory.
 _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 
 
@@ -35,9 +35,9 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 @click.option("--state-dir", type=click.Path(path_type=Path), help="The daemon's folder for missions.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each check.")
 def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json: bool) -> None:
-    """Look for what stands in the way of the bridge, and say what to do.
+    """Diagnose problems of the bridge's machine, with remedies.
 
-    Nothing is changed, and a daemon that runs is not disturbed. Exit code 0: no problem, 1: a problem was found.
+    Changes nothing, and does not disturb a running daemon. Exit code 0: no problem, 1: a problem was found.
     """
     if not diagnose(fc, config, state_dir, as_json=as_json):
         raise SystemExit(1)
@@ -46,8 +46,8 @@ def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json:
 def diagnose(
     fc: str | None = None, config: Path | None = None, state_dir: Path | None = None, *, as_json: bool = False
 ) -> bool:
-    """Print what each check finds; False if there is a problem."""
-    # A service's control socket is not in its state directory: only what was named is asked there.
+    """Print the result of each check; False if there is a problem."""
+    # A service's control socket is not in its state directory; with explicit options only that directory counts.
     asked = partial(ask_daemon, state_dir, STATUS)
     if config is None and fc is None and SERVICE_CONFIG.exists():
         config = SERVICE_CONFIG

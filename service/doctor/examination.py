@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of checks, in the order in which a pilot mends things."""
+"""The list of checks, in the order in which their problems should be fixed."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -33,12 +33,12 @@ _ON_PORT = (check_port, check_permission, check_console, check_holder)
 def examine(
     host: Host, settings: Settings, ask_running: Callable[[], Json], ask_port: Callable[[], Json]
 ) -> Iterator[Checked]:
-    """Yield what each check finds. The port is listened to only if nothing stands in the way of that."""
+    """Yield the result of each check. The port is listened to only if the checks before found no problem with it."""
     fc = settings.fc
     ports: Sequence[FcAddress] = check_candidates(host) if isinstance(fc, AutoFc) else [fc]
     told = [found for port in ports for check in _ON_PORT if (found := check(host, port)) is not None]
     if len(ports) > 1:
-        # A flight controller on one of them is enough.
+        # One port with a flight controller is enough.
         told = [replace(found, grade=Grade.NOTE) if found.grade is Grade.PROBLEM else found for found in told]
     told.append(check_modem_manager(host, ports[0]) if ports else check_no_port(host))
     yield check_versions(host)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The check of the flight controller: a running daemon is asked, and else the port listened to."""
+"""The check of the flight controller: asks a running daemon, else listens on the port."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB sock
 def check_flight_controller(
     fc: FcAddress, ask_running: Callable[[], Json], ask_port: Callable[[], Json] | None
 ) -> list[Checked]:
-    """Find out who is there. Both return a status or raise ControlError; without `ask_port` the port is left alone."""
+    """Find the flight controller. Both callables return a status or raise ControlError; `ask_port` may be None."""
     try:
         status = ask_running()
     except ControlError:
@@ -23,7 +23,13 @@ def check_flight_controller(
     else:
         return [ok("daemon", "runs, and was asked"), _who(fc, status)]
     if ask_port is None:
-        return [note("flight controller", f"{fc} was not listened to", "mend its port first, and ask again with sudo")]
+        return [
+            note(
+                "flight controller",
+                f"{fc} was not listened to",
+                "fix its port first, then run `sudo naze-bridge doctor`",
+            )
+        ]
     try:
         return [_who(fc, ask_port())]
     except ControlError as error:
@@ -35,7 +41,7 @@ def _who(fc: FcAddress, status: Json) -> Checked:
     if status["state"] == Closed.name:
         return note("flight controller", f"{fc} cannot be opened yet", "see the port, and the daemon's log")
     if name is None:
-        return problem("flight controller", f"nobody answers on {fc}: {status['state']}", _WIRING)
+        return problem("flight controller", f"no reply on {fc}: {status['state']}", _WIRING)
     speed = "" if status["speed_baud"] is None else f" at {status['speed_baud']} baud"
     armed = {True: ", ARMED", False: ", disarmed", None: ""}[status["armed"]]
     return ok("flight controller", f"{name}, {status['state']}{speed}{armed}")

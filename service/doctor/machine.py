@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the machine: its clock, its disk, the missions on it, and what runs there."""
+"""Checks of the machine: its clock, disk, stored missions and software versions."""
 
 import os
 import platform
@@ -18,14 +18,14 @@ from service.version import version
 
 _SYNCED = "/run/systemd/timesync/synchronized"
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
-#: A Pi without a clock begins in 1970, or when it was last switched off; no release is older than this.
+#: A Pi without a clock starts in 1970, or at its last shutdown; no release is older than this.
 _EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
 _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pymavlink", "pyserial", "eclipse-zenoh")
 
 
 def check_versions(host: Host) -> Checked:
-    """Tell what runs here, for a bug report."""
+    """The versions, for a bug report."""
     system = next((line for line in host.read("/etc/os-release").splitlines() if line.startswith("PRETTY_NAME=")), "")
     libraries = [f"{name} {_version_of(name)}" for name in _LIBRARIES]
     where = system.partition("=")[2].strip('"') or platform.system()
@@ -37,7 +37,7 @@ def check_versions(host: Host) -> Checked:
 
 
 def check_clock(host: Host, now: datetime) -> Checked:
-    """Look whether the time is right: logs and signatures go by it."""
+    """Check the clock, which logs and signatures depend on."""
     told = f"{now:%Y-%m-%d %H:%M} UTC"
     if now < _EPOCH:
         return problem("clock", f"it is {told}, years ago", f"set it: sudo date --set '{_EPOCH:%Y-%m-%d} 12:00'")
@@ -51,7 +51,7 @@ def check_clock(host: Host, now: datetime) -> Checked:
 
 
 def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: shutil.disk_usage(path).free) -> Checked:
-    """Look whether missions and logs can be written."""
+    """Check the space for missions and logs."""
     folder = state_dir
     try:
         while not folder.exists():
@@ -72,7 +72,7 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
 
 
 def check_database(state_dir: Path) -> list[Checked]:
-    """Look whether the stored missions are whole."""
+    """Check the integrity of the stored missions."""
     path = state_dir / DATABASE_NAME
     found = []
     try:

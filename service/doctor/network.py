@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the network: where ground stations find the bridge, and whether its ports are free."""
+"""Checks of the network: the bridge's address for ground stations, and its free ports."""
 
 import re
 from collections.abc import Sequence
@@ -9,12 +9,12 @@ from service.documentation import page
 from service.host import Host
 from service.links.connection import GcsAddress
 
-#: Of /proc/net/tcp, where only a listening socket has a port to itself.
+#: In /proc/net/tcp, where only a listening socket has a port to itself.
 _LISTENS = "0A"
 
 
 def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
-    """Look for an address that Mission Planner can be given."""
+    """Check for an address to enter in Mission Planner."""
     blocked = [
         name
         for name in host.names("/sys/class/rfkill")
@@ -45,7 +45,7 @@ def _card(host: Host, card: str, gcs: Sequence[GcsAddress]) -> Checked:
 
 
 def check_ports(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
-    """Look whether the ports that the bridge listens on are free, or its own."""
+    """Check that the bridge's listening ports are free, or its own."""
     return [_check_port(host, link) for link in gcs if link.kind in ("udpin", "tcpin")]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the flight controller's serial port: is it there, may the bridge use it, and who else does."""
+"""Checks of the flight controller's serial port: it exists, the bridge may use it, and no other program does."""
 
 import grp
 import re
@@ -22,7 +22,7 @@ _RULE = "60-naze-bridge.rules"
 
 
 def check_port(host: Host, fc: FcAddress) -> Checked:
-    """Look whether it is there."""
+    """Check that the port exists."""
     if not isinstance(fc, SerialFc):
         return ok("port", f"{fc}, no serial port")
     device = host.resolve(fc.path)
@@ -38,25 +38,25 @@ def check_port(host: Host, fc: FcAddress) -> Checked:
     else:
         remedy = "plug the flight controller in"
     if there:
-        remedy += f"; or set fc to a port that is there: {', '.join(there)}"
+        remedy += f"; or set fc to a port that exists: {', '.join(there)}"
     return problem("port", f"{fc.path} is missing", remedy)
 
 
 def check_candidates(host: Host) -> list[SerialFc]:
-    """The ports on which `fc = "auto"` looks; on a Pi without a USB port the UART on the header even if it is off."""
+    """The ports tried by `fc = "auto"`; on a Pi without a USB port the UART on the header, even if it is off."""
     ports = [SerialFc(port.path, None) for port in serial_ports(host)]
     model = pi_model(host)
     return ports or ([SerialFc(model.header_uart, None)] if model else [])
 
 
 def check_no_port(host: Host) -> Checked:
-    """Say that there is none at all."""
+    """The problem that there is no port at all."""
     remedy = "plug the flight controller into USB, or name its port: fc in the settings"
     return problem("port", "there is no serial port on which a flight controller may be", remedy)
 
 
 def check_permission(host: Host, fc: FcAddress) -> Checked | None:
-    """Look whether the group dialout may use it, in which the service is."""
+    """Check that the service's group, dialout, may use the port."""
     device = _device(host, fc)
     if device is None:
         return None
@@ -74,12 +74,12 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
 
 
 def check_console(host: Host, fc: FcAddress) -> Checked | None:
-    """Look for a login console on it: both would read, and each eat half of what the flight controller says."""
+    """Check for a login console on the port: both programs would read, and each lose half of the input."""
     device = _device(host, fc)
     if device is None:
         return None
     names = {device.name, Path(fc.path).name if isinstance(fc, SerialFc) else device.name}
-    # The firmware knows the UART on the header by this name.
+    # The firmware's name for the UART on the header.
     names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
     found, remedies = [], []
     if _getty(host, device.name):
@@ -106,15 +106,15 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
 
 
 def check_holder(host: Host, fc: FcAddress) -> Checked | None:
-    """Look whether another program has it open."""
+    """Check that no other program has the port open."""
     device = _device(host, fc)
     if device is None:
         return None
     holder = holder_of_port(host, fc)
     if holder is None:
-        return ok("other programs", f"nobody has {device} open")
+        return ok("other programs", f"no program has {device} open")
     if holder.name in _LOGIN_PROGRAMS:
-        return None  # the console's check says it
+        return None  # reported by the console's check
     who = f"{holder.name} (pid {holder.pid})"
     if holder.is_naze_bridge:
         return ok("other programs", f"the daemon has {device} open, pid {holder.pid}")
@@ -122,13 +122,13 @@ def check_holder(host: Host, fc: FcAddress) -> Checked | None:
 
 
 def holder_of_port(host: Host, fc: FcAddress) -> Process | None:
-    """Return who has the port open, as far as we may see it."""
+    """The program that has the port open, as far as permissions show it."""
     device = _device(host, fc)
     return None if device is None else host.holder(str(device))
 
 
 def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
-    """Look whether ModemManager would look for modems on it."""
+    """Check that ModemManager does not probe the port for modems."""
     if not any(process.name == "ModemManager" for process in host.processes()):
         return ok("ModemManager", "does not run")
     device = _device(host, fc)
@@ -143,7 +143,7 @@ def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
 
 
 def _device(host: Host, fc: FcAddress) -> Path | None:
-    """Return the port behind its links; None if there is none, which the first check says."""
+    """The device behind symbolic links; None if it is missing, which the first check reports."""
     if not isinstance(fc, SerialFc):
         return None
     device = host.resolve(fc.path)

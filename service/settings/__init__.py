@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where settings come from: flags over environment over the configuration files over defaults."""
+"""Settings: flags override the environment, which overrides the configuration files, which override the defaults."""
 
 from service.settings.load import default_state_dir, load_settings, takeoff_limit_m
 from service.settings.problem import SettingsError

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The configuration file, and those in `conf.d` beside it: TOML, in the order of their names, the later one wins."""
+"""The configuration file and its `conf.d`: TOML files, in the order of their names; later ones win."""
 
 import difflib
 import tomllib
@@ -16,14 +16,14 @@ from service.settings.table import KEYS, TABLES
 
 DROP_INS = "conf.d"
 _MAX_BYTES = 1 << 20
-#: Of one file; who names another program's file needs no longer list.
+#: Reported per file; another program's file, named by mistake, needs no longer list.
 _MOST_UNKNOWN = 20
 _NAMES = frozenset(key.name for key in KEYS)
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """A value as it was given: where that was, and the folder by which relative file names there go."""
+    """A value with its source, and the folder for relative file names in it."""
 
     value: object
     where: str
@@ -31,7 +31,7 @@ class Given:
 
 
 def read_files(config: Path, problems: list[Problem]) -> dict[str, Given]:
-    """Read a configuration file and its drop-ins: values by the name of their key, tables that are there as True."""
+    """Read a configuration file and its drop-ins: values by key name, and True for each table present."""
     found: dict[str, Given] = {}
     for path in (config, *_drop_ins(config.parent / DROP_INS, problems)):
         found |= _read_file(path, problems)
@@ -44,20 +44,20 @@ def _drop_ins(folder: Path, problems: list[Problem]) -> list[Path]:
     except FileNotFoundError:
         return []
     except OSError as error:
-        # To leave out what cannot be read would be to run with other settings than were written.
+        # Without the unreadable file the settings would differ from the written ones.
         problems.append(Problem(str(folder), f"this cannot be read: {error.strerror}"))
         return []
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Say what somebody may have meant."""
+    """A hint for an unknown name: the nearest known one, or all."""
     near = difflib.get_close_matches(name, list(known), n=1)
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"
 
 
 def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
     if path.is_fifo():
-        # Nobody may ever write into it, and a reload would find it empty.
+        # It may never have a writer, and at a reload it would be empty.
         problems.append(Problem(str(path), "this is a pipe: name a file, which can be read again at a reload"))
         return {}
     try:
@@ -73,7 +73,7 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
     found: dict[str, Given] = {}
     unknown: list[tuple[str, str]] = []
     for keys, value in _flat(tables):
-        # A dot within quotes belongs to the name, and no setting has one.
+        # A quoted dot belongs to the name, and no setting has one.
         name = ".".join(f'"{key}"' if "." in key else key for key in keys)
         where = f"{path}:{lines[keys]}" if keys in lines else str(path)
         if name in _NAMES or (name in TABLES and isinstance(value, dict)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One setting: its name, what it means, and how a value is read."""
+"""One setting: its name, its meaning, and how its value is read."""
 
 import tomllib
 from collections.abc import Callable, Sequence
@@ -14,24 +14,24 @@ _repr.maxstring = _repr.maxother = _repr.maxlong = 80
 
 
 class Unfit(ValueError):
-    """A value that cannot be used; the text goes on after the key's name: "is 7, but must be ..."."""
+    """A value that cannot be used; the text continues a sentence after the key's name: "is 7, but must be ..."."""
 
 
 class Reader(Protocol):
-    """Turns what was given into what is used; Unfit, or another ValueError whose text is a whole sentence."""
+    """Converts a given value to the one used; raises Unfit, or another ValueError with a whole sentence."""
 
     def read(self, value: object, folder: Path) -> object:
         """Read a value of the file in `folder`."""
 
     def from_text(self, text: str) -> object:
-        """Return what the file would hold for a text of the environment or of a flag."""
+        """Convert text from the environment or a flag to the form of the file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """`name`: with its table's, as "zenoh.prefix". `meaning`: one sentence, with the unit. `default`: as in the file.
+    """`name`: with its table, as "zenoh.prefix". `meaning`: one sentence, with the unit. `default`: as in the file.
 
-    `example`: for the sample file, where there is no default. `is_live`: taken over on a reload.
+    `example`: for the sample file, if there is no default. `is_live`: a reload applies it.
     """
 
     name: str
@@ -43,16 +43,16 @@ class Key:
 
     @property
     def variable(self) -> str:
-        """Return its name in the environment."""
+        """The name of its environment variable."""
         return _ENVIRONMENT + self.name.upper().replace(".", "_")
 
 
 def short(value: object) -> str:
-    """Return what was given as it is shown in a sentence: in quotes if it is text, and not more than a line of it."""
+    """A value for a sentence: quoted if it is text, and shortened to a line."""
     try:
         return _repr.repr(value)
     except ValueError:
-        # Python does not write a number of thousands of digits.
+        # Python refuses to print a number of thousands of digits.
         return "far too large"
 
 
@@ -62,7 +62,7 @@ def _wrong(value: object, wanted: str) -> Unfit:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Any text; `wanted` says which, `parse` may refuse it."""
+    """Any text; `wanted` describes it, `parse` may reject it."""
 
     wanted: str = "text in quotes"
     parse: Callable[[str], object] = str
@@ -74,24 +74,24 @@ class Text:
         return self.parse(value)
 
     def from_text(self, text: str) -> object:
-        """Take it as it is."""
+        """The text itself."""
         return text
 
 
 @dataclass(frozen=True, slots=True)
 class FileName:
-    """The name of a file or folder; if `beside`, a relative one is looked for beside the configuration file."""
+    """A file or folder; if `in_config_folder`, a relative path starts at the configuration file's folder."""
 
-    beside: bool = False
+    in_config_folder: bool = False
 
     def read(self, value: object, folder: Path) -> object:
         """Read a path."""
         if not isinstance(value, str) or not value or "\0" in value:
             raise _wrong(value, "text in quotes: the name of a file or folder")
-        return folder / value if self.beside else Path(value)
+        return folder / value if self.in_config_folder else Path(value)
 
     def from_text(self, text: str) -> object:
-        """Take it as it is."""
+        """The text itself."""
         return text
 
 
@@ -132,7 +132,7 @@ class YesNo:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of some words; `parse` makes of it what is used."""
+    """One of several words, converted by `parse`."""
 
     words: Sequence[str]
     parse: Callable[[str], object] = str
@@ -144,7 +144,7 @@ class Choice:
         return self.parse(value)
 
     def from_text(self, text: str) -> object:
-        """Take it as it is."""
+        """The text itself."""
         return text
 
 

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In which line of a TOML file each key begins: the parser of the standard library keeps that to itself."""
+"""Line numbers of the keys in a TOML file: the parser of the standard library does not provide them."""
 
 import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-#: What a line must hold to end a value that began in an earlier one: other lines are not worth a look.
+#: One of these ends a value that began in an earlier line; other lines are skipped.
 _ENDS = ("]", '"""', "'''")
-#: After so many looks at a value that does not end, the rest of the file has no line numbers.
+#: The number of attempts at one value; if it does not end, the rest of the file has no line numbers.
 _MOST_LOOKS = 200
 
 Keys = tuple[str, ...]
 
 
 def key_lines(text: str) -> Mapping[Keys, int]:
-    """Return the lines, counted from 1, in which tables and the keys in them are first named in a valid file."""
+    """The lines, from 1, in which tables and the keys in them are first named in a valid file."""
     found: dict[Keys, int] = {}
     table: Keys = ()
     for number, statement, held in _statements(text):
@@ -22,7 +22,7 @@ def key_lines(text: str) -> Mapping[Keys, int]:
         if statement.lstrip().startswith("["):
             table = names.pop()
             found.setdefault(table, number)
-            # As [zenoh.transport] names zenoh.
+            # [zenoh.transport] also names zenoh.
             found.setdefault(table[:1], number)
         for name in names:
             found.setdefault(table + name, number)
@@ -30,7 +30,7 @@ def key_lines(text: str) -> Mapping[Keys, int]:
 
 
 def _statements(text: str) -> Iterator[tuple[int, str, Mapping[str, Any]]]:
-    """Yield the lines that are TOML for themselves, as few as can be: a table's header, or a key with its value."""
+    """Yield the shortest runs of lines that are valid TOML: a table's header, or a key with its value."""
     statement, began, looks = "", 1, 0
     for number, line in enumerate(text.split("\n"), 1):
         if not statement:
@@ -51,7 +51,7 @@ def _statements(text: str) -> Iterator[tuple[int, str, Mapping[str, Any]]]:
 
 
 def _names(held: Mapping[str, Any]) -> Iterator[Keys]:
-    """Yield the keys of a statement, and those one table below."""
+    """Yield the keys of a statement, one table level deep."""
     for key, value in held.items():
         yield (key,)
         inner = value[-1] if isinstance(value, list) and value else value

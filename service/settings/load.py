@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts the settings of a daemon together, and tells of all that is wrong at once."""
+"""Loads a daemon's settings from all sources, and reports all problems at once."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,15 +18,15 @@ from service.settings.table import KEYS
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
 
-#: Names the configuration file itself.
+#: The environment variable for the configuration file itself.
 CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"
-#: The service's, as its unit names it.
+#: The service's configuration file, as in its unit.
 SERVICE_CONFIG = Path("/etc/naze-bridge/config.toml")
 _PREFIX = "NAZE_BRIDGE_"
 
 
 def default_state_dir() -> Path:
-    """Return systemd's StateDirectory, else the user's own folder for state; SettingsError if there is no such user."""
+    """Systemd's StateDirectory, else the user's own state folder; SettingsError if there is no such user."""
     given = os.environ.get("STATE_DIRECTORY")
     if given:
         return Path(given.split(":")[0])
@@ -46,7 +46,7 @@ def load_settings(
     *,
     verbose: bool = False,
 ) -> Settings:
-    """Put the settings of `run` together; SettingsError tells everything that is wrong with them."""
+    """Load the settings for `run`; SettingsError lists all problems."""
     problems: list[Problem] = []
     given = {} if config is None else read_files(config, problems)
     given |= _read_environment(os.environ, problems)
@@ -75,7 +75,7 @@ def load_settings(
         raise SettingsError(problems)
     return Settings(
         gcs=addresses,
-        # A link that is named by a flag, too, stays as safe as the file says.
+        # A link that is also given by a flag keeps the file's access rules.
         access={str(address): access for address, access in links if not access.is_open},
         state_dir=values.pop("state_dir", None) or default_state_dir(),
         tlog=tlog,
@@ -86,7 +86,7 @@ def load_settings(
 
 
 def takeoff_limit_m() -> int:
-    """takeoff_max_m as a daemon on this machine has it, for commands that do without one; SettingsError if unusable."""
+    """The takeoff_max_m of a daemon on this machine, for commands without one; SettingsError if unusable."""
     config = Path(os.environ.get(CONFIG_VARIABLE) or SERVICE_CONFIG)
     problems: list[Problem] = []
     is_there = CONFIG_VARIABLE in os.environ or config.exists()
@@ -158,7 +158,7 @@ def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:
-    """Tell what zenoh itself has against it."""
+    """Problems that zenoh itself finds."""
     from service.zenoh_link.configuration import make_config  # loads zenoh, 10 MB
 
     try:

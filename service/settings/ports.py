@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two users of one port, or of one link: found before either of them has opened it."""
+"""Conflicts between settings: two users of one port, or of one link, found before either is opened."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ class _Use:
 def port_conflicts(
     fc: FcAddress | None, gcs: Sequence[GcsAddress], zenoh: ZenohSettings | None, web: WebSettings | None
 ) -> Iterator[str]:
-    """Yield one sentence for each two of them that listen on one port, or whose other end is the bridge itself."""
+    """Yield a sentence for each pair that listens on one port, or that connects the bridge to itself."""
     uses = [
         _Use(f"gcs {address}", "TCP" if address.kind == "tcpin" else "UDP", address.host, address.port)
         for address in gcs
@@ -54,7 +54,7 @@ def port_conflicts(
 
 
 def _reaches(host: str, listening: str) -> bool:
-    """Tell whether this machine's own address `host` is listened at; other addresses of its own are not known here."""
+    """True if `host`, an address of this machine, is listened on; addresses other than the loopback's are not known."""
     if host == listening:
         return True
     try:
@@ -70,6 +70,6 @@ def _overlap(first: str, second: str) -> bool:
     try:
         one, other = ip_address(first), ip_address(second)
     except ValueError:
-        # Names are looked up when they are used.
+        # Host names are only resolved when they are used.
         return False
     return one.version == other.version and (one.is_unspecified or other.is_unspecified)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong with settings, all of it at once."""
+"""Problems of settings, reported all at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """`where`: file and line, environment variable or flag; empty if there is none. `text`: what, and what to do."""
+    """`where`: file and line, environment variable or flag; may be empty. `text`: the problem, and the remedy."""
 
     where: str
     text: str
@@ -17,7 +17,7 @@ class Problem:
 
 
 class SettingsError(ValueError):
-    """Settings that cannot be used; one sentence a problem, a line each."""
+    """Settings that cannot be used; one line per problem."""
 
     def __init__(self, problems: Sequence[Problem] | str) -> None:
         self.problems = (Problem("", problems),) if isinstance(problems, str) else tuple(problems)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sample configuration file, and the table of the reference page: `python -m service.settings.sample [--page]`.
 
-Both are made from the table of keys, and a test compares them with what is checked in (`make config-sample`).
+Both are made from the table of keys; a test compares them with the files in the repository (`make config-sample`).
 """
 
 import sys
@@ -11,17 +11,17 @@ from service.settings.key import Key
 from service.settings.table import KEYS, TABLES
 
 _HEAD = (
-    "naze-bridge's settings. What is commented out shows the default, or an example.",
-    "Files in conf.d/ beside this one go over it, in the order of their names.",
-    "Environment variables (NAZE_BRIDGE_SYSID, NAZE_BRIDGE_ZENOH_PREFIX) and flags go over all of them.",
-    "`naze-bridge run --check-config --config FILE` tells what is wrong.",
-    '`systemctl reload naze-bridge` takes over what is marked "live"; the rest needs a restart.',
+    "naze-bridge's settings. Commented-out lines show the default, or an example.",
+    "Files in conf.d/, in this folder, override it in the order of their names.",
+    "Environment variables (NAZE_BRIDGE_SYSID, NAZE_BRIDGE_ZENOH_PREFIX) and flags override all files.",
+    "`naze-bridge run --check-config --config FILE` checks the settings.",
+    '`systemctl reload naze-bridge` applies settings marked "live"; the others need a restart.',
 )
 _WIDTH = 100
 
 
 def sample() -> str:
-    """Return the file; nothing in it is set."""
+    """The file, with every setting commented out."""
     lines = [_comment(line) for line in _HEAD]
     table = ""
     for key in KEYS:
@@ -36,7 +36,7 @@ def sample() -> str:
 
 
 def page() -> str:
-    """Return the rows of the reference page."""
+    """The rows of the reference page."""
     rows = ["| key | default | meaning |", "|---|---|---|"]
     rows += [f"| `{key.name}` | {_default(key)} | {_cell(key)} |" for key in KEYS]
     return "\n".join(rows) + "\n"

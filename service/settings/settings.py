@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a daemon is started with."""
+"""The settings of a daemon."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ DEFAULT_LOG_LEVEL = "info"
 
 @dataclass(frozen=True, slots=True)
 class TlogLimits:
-    """Bytes of one telemetry log (a second's records come on top) and of all together; days for which one is kept."""
+    """Bytes per telemetry log (plus up to a second's records) and for all together; days that one is kept."""
 
     file_size: int = 16 << 20
     total_size: int = 256 << 20
@@ -29,7 +29,7 @@ class TlogLimits:
 
 
 class PassThroughRule(Enum):
-    """What an autopilot that speaks MAVLink for itself gets over links without a key or a list of writers."""
+    """The messages that an autopilot in pass-through gets over links without a key or a list of writers."""
 
     MISSIONS = "missions"
     EVERYTHING = "everything"
@@ -37,10 +37,10 @@ class PassThroughRule(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a daemon is started with. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
+    """The settings of a daemon. Without `state_dir` nothing is stored; `tlog` None: telemetry is not recorded.
 
-    `access`: who may write over a link, by its address as text; over others everyone may. `zenoh` None: it is not
-    joined. `web` None: no status page is served. `log_level`: debug, info, warning or error.
+    `access`: write permission per link, by its address as text; links not in it are open. `zenoh` None: not used.
+    `web` None: no status page. `log_level`: debug, info, warning or error.
     """
 
     fc: FcAddress = AutoFc()  # noqa: RUF009  # frozen

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All settings there are: the one table that reading, the sample file, the reference and the environment go by."""
+"""The table of all settings, used by the reader, the sample file, the reference page and the environment."""
 
 from pathlib import Path
 
@@ -41,7 +41,7 @@ KEYS = (
     Key(
         "fc",
         Text(parse=parse_fc),
-        "The flight controller: auto looks for it on the header's UART and on USB; /dev/ttyAMA0 (its speed is sensed), "
+        "The flight controller: auto looks for it on the header's UART and on USB; /dev/ttyAMA0 (detects the speed), "
         "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim: for a simulated one.",
         default='"auto"',
     ),
@@ -73,41 +73,41 @@ KEYS = (
     Key(
         "takeoff_max_m",
         Whole(2, 255),
-        "Greatest take-off height of a mission, metres, 2..255; a higher one becomes this.",
+        "Maximum take-off altitude of a mission, metres, 2..255; a higher one is lowered to it.",
         str(TAKEOFF_MAX_M),
     ),
     Key(
         "autopilot",
         Choice([each.value for each in Autopilot], Autopilot),
-        'Whose MAVLink is heard on the port: "auto" finds out, "harakiri" is served, "other" is passed through.',
+        'The sender of MAVLink on the port: "auto" detects it, "harakiri" is translated, "other" is passed through.',
         f'"{Autopilot.AUTO.value}"',
     ),
     Key(
         "pass_through",
         Choice([each.value for each in PassThroughRule], PassThroughRule),
-        "What an autopilot that is passed through gets over links with neither key_file nor writers: "
-        '"missions" (and parameters and requests), or "everything": arming, modes and steering, too.',
+        "Messages for an autopilot in pass-through from links with neither key_file nor writers: "
+        '"missions" (and parameters and requests), or "everything": arming, modes and control, too.',
         f'"{PassThroughRule.MISSIONS.value}"',
     ),
-    Key("record_tlog", YesNo(), "Whether telemetry is recorded, for Mission Planner to replay.", "true"),
+    Key("record_tlog", YesNo(), "Record telemetry, for replay in Mission Planner.", "true"),
     Key("tlog_file_mb", Whole(1, 1024), "Size of one telemetry log, megabytes, 1..1024.", str(_LIMITS.file_size >> 20)),
     Key(
         "tlog_total_mb",
         Whole(2, 1 << 20),
-        "Size of all telemetry logs together, megabytes, at least twice tlog_file_mb; the oldest give way.",
+        "Size of all telemetry logs together, megabytes, at least twice tlog_file_mb; the oldest are deleted.",
         str(_LIMITS.total_size >> 20),
     ),
     Key("tlog_days", Whole(1, 3650), "How long a telemetry log is kept, days, 1..3650.", str(_LIMITS.days)),
     Key(
         "record_uart",
         FileName(),
-        "File into which the traffic with the flight controller is recorded, for a bug report; nowhere by default.",
+        "File for a recording of the traffic with the flight controller, for a bug report. Off by default.",
         example='"/var/lib/naze-bridge/naze.uart"',
     ),
     Key(
         "log_level",
         Choice(LOG_LEVELS),
-        "The least of what is logged: debug, info, warning or error.",
+        "Minimum level of logged events: debug, info, warning or error.",
         f'"{DEFAULT_LOG_LEVEL}"',
         is_live=True,
     ),
@@ -115,25 +115,25 @@ KEYS = (
     Key(
         "zenoh.vehicle",
         _name("vehicle"),
-        "This vehicle's name, the second chunk; another one for each of a fleet. By default the host's name.",
+        "This vehicle's name, the second chunk; unique within a fleet. By default the host's name.",
         example='"naze-1"',
     ),
     Key(
         "zenoh.encoding",
         Choice([each.value for each in PayloadEncoding], PayloadEncoding),
-        "How payloads are written.",
+        "Encoding of payloads: json or cbor.",
         f'"{PayloadEncoding.JSON.value}"',
     ),
     Key(
         "zenoh.profile",
         Choice([each.value for each in Profile], Profile),
-        "What the link may cost: full sends each sample, metered a group every 5 s, and arming and the like at once.",
+        "Data volume: full sends each sample; metered sends a group every 5 s, but changes such as arming at once.",
         f'"{Profile.FULL.value}"',
     ),
     Key(
         "zenoh.rates",
         Table("as in {attitude = 2, position = 1}", check_rates),
-        "Greatest rate of a telemetry group, or of state, Hz; 0: never. Goes over the profile.",
+        "Maximum rate of a telemetry group, or of state, Hz; 0: never. Overrides the profile.",
         example="{attitude = 2, position = 1}",
     ),
     Key(
@@ -145,50 +145,48 @@ KEYS = (
     Key(
         "zenoh.listen",
         Several('as in ["tcp/0.0.0.0:7447"]', _endpoint),
-        "Endpoints at which others may join.",
+        "Endpoints on which to accept other sessions.",
         "[]",
     ),
     Key(
         "zenoh.config_file",
-        FileName(beside=True),
-        "A zenoh configuration file that is passed through: TLS, passwords, access control, namespace.",
+        FileName(in_config_folder=True),
+        "A zenoh configuration file, for TLS, passwords, access control, namespace.",
         example='"zenoh.json5"',
     ),
     Key(
         "zenoh.commands",
         YesNo(),
-        "Whether missions may be written and cleared over zenoh; the transport must be authenticated.",
+        "Allow writing and clearing missions over zenoh; the transport must be authenticated.",
         "false",
     ),
     Key(
         "zenoh.commands_without_authentication",
-        Text(f'"{I_KNOW}", or left away'),
-        f'"{I_KNOW}": take commands from whoever reaches the session.',
+        Text(f'"{I_KNOW}", or omitted'),
+        f'"{I_KNOW}": accept commands without authentication, from anyone who reaches the session.',
         example=f'"{I_KNOW}"',
     ),
     Key(
         "zenoh.mavlink_in",
         YesNo(),
-        "Whether raw MAVLink frames are taken from zenoh, under the same condition as commands.",
+        "Accept raw MAVLink frames over zenoh, under the same condition as commands.",
         "false",
     ),
     Key(
         "web.listen",
         Text('"HOST:PORT"', parse_listen),
-        "Where browsers reach the status page: 0.0.0.0:8080 for everybody on the network, 127.0.0.1:8080 for this "
-        "machine alone.",
+        "Address of the status page: 0.0.0.0:8080 for the whole network, 127.0.0.1:8080 for this machine only.",
         f'"{DEFAULT_LISTEN}"',
     ),
     Key(
         "web.token_file",
-        FileName(beside=True),
-        "File with the token that a restore from the page needs, made if it is not there. By default web-token in "
-        "state_dir.",
+        FileName(in_config_folder=True),
+        "File with the token for writing from the page, created if it is missing. By default web-token in state_dir.",
         example='"/etc/naze-bridge/web-token"',
     ),
 )
 
-#: Tables that switch a part on by being there.
+#: Tables whose presence enables a part.
 TABLES = {
     "zenoh": "Eclipse zenoh: telemetry and missions for subscribers anywhere, off without this table.",
     "web": "The status page, off without this table.",

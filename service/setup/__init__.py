@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge setup`: from a bare Raspberry Pi to a service that ground stations can connect to.
+"""`naze-bridge setup`: turns a bare Raspberry Pi into a service that ground stations can connect to.
 
-`steps.py` compares the machine with what is wanted and yields the changes; `change.py` carries them out; a second run
-finds nothing left to do.
+`steps.py` compares the machine with the desired state and yields the changes; `change.py` makes them; a second run
+finds nothing to do.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes that setup makes to a machine: files and commands. Each says what it does before it is done."""
+"""Changes to a machine: files and commands. Each is described before it is made."""
 
 import os
 import subprocess
@@ -16,14 +16,14 @@ class SetupError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class WriteFile:
-    """Replace a file, or make it. `secret`: only its owner may read it, and its text is not shown."""
+    """Create or replace a file. `secret`: only its owner may read it, and its text is not shown."""
 
     path: str
     text: str
     secret: bool = False
 
     def describe(self) -> str:
-        """What it does."""
+        """A description of the change."""
         return f"write {self.path}"
 
 
@@ -34,7 +34,7 @@ class Run:
     command: tuple[str, ...]
 
     def describe(self) -> str:
-        """What it does."""
+        """A description of the change."""
         return f"run {' '.join(self.command)}"
 
 
@@ -43,7 +43,7 @@ Change = WriteFile | Run
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Changes with one purpose. `needs_reboot`: they count only after the next start."""
+    """Changes with one purpose. `needs_reboot`: they take effect after a reboot."""
 
     purpose: str
     changes: Sequence[Change]
@@ -51,7 +51,7 @@ class Step:
 
 
 class Machine:
-    """Carries changes out; SetupError says which one failed, and why."""
+    """Makes changes; SetupError names the one that failed, and the reason."""
 
     def __init__(self, host: Host) -> None:
         self._host = host
@@ -83,5 +83,5 @@ class Machine:
 
 
 def is_root() -> bool:
-    """Whether this user may change the machine."""
+    """True if this user may change the machine."""
     return os.geteuid() == 0

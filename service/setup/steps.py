@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a Raspberry Pi needs before it can carry the bridge: each function yields what is missing of one thing."""
+"""The setup of a Raspberry Pi for the bridge: each function yields the missing steps of one part."""
 
 import json
 import re
@@ -23,17 +23,17 @@ _HOTSPOT_FILE = "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmco
 _AVAHI_FILE = "/etc/avahi/services/naze-bridge.service"
 _OTHERS_FILE = "/etc/udev/rules.d/59-naze-bridge-others.rules"
 _WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
-#: On every model but the Pi 5 the console's names mean the UART on the header.
+#: On all models except the Pi 5 the console's names mean the UART on the header.
 _HEADER_CONSOLES = ("serial0", "ttyAMA0", "ttyS0")
 _PI_5_CONSOLES = ("ttyAMA0",)
 
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What the pilot wants.
+    """The pilot's choices.
 
-    `hotspot`: its name and password; None keeps the network. `name`: the host's, for NAME.local.
-    `key`: the passphrase of MAVLink signing; None: anyone on the network may write, or the present key stays.
+    `hotspot`: its name and password; None keeps the network. `name`: the host name, for NAME.local.
+    `key`: the passphrase of MAVLink signing; None keeps the present key, or leaves writing open to the whole network.
     """
 
     fc: str = "auto"
@@ -45,7 +45,7 @@ class Answers:
 
 
 def missing_steps(host: Host, answers: Answers) -> list[Step]:
-    """The steps that are left to do on this machine, in order."""
+    """The remaining steps on this machine, in order."""
     makers = (_console, _uart, _country, _name, _key, _settings, _others, _announcement, _service, _hotspot)
     return [step for make in makers for step in make(host, answers)]
 
@@ -75,7 +75,7 @@ def _uart(host: Host, answers: Answers) -> Iterator[Step]:
     if file is None:
         return
     model = pi_model(host)
-    # An image that is set up elsewhere may start on any model.
+    # An image may be set up elsewhere, and then start on any model.
     wanted = ["enable_uart=1", "dtparam=uart0=on"] if model is None else [model.config_line]
     text = host.read(file)
     lines = [line for line in wanted if not _is_on(text, line)]
@@ -85,7 +85,7 @@ def _uart(host: Host, answers: Answers) -> Iterator[Step]:
 
 
 def _is_on(text: str, line: str) -> bool:
-    """Whether config.txt has `line` as its last word on that key."""
+    """True if the last setting of that key in config.txt is `line`."""
     key, _, _ = line.rpartition("=")
     given = re.findall(rf"^[ \t]*{re.escape(key)}(=\S*)?[ \t]*$", text, re.MULTILINE)
     return bool(given) and f"{key}{given[-1] or '=on'}" == line
@@ -120,7 +120,7 @@ def _key(host: Host, answers: Answers) -> Iterator[Step]:
 
 
 def settings_text(host: Host, answers: Answers) -> str:
-    """The drop-in file with the answers."""
+    """The drop-in file with the choices."""
     lines = ["# Written by `naze-bridge setup`, which may be run again.", f'fc = "{answers.fc}"']
     if answers.key is not None or host.path(KEY_FILE).exists():
         lines.append(f'gcs = [{{address = "udpin:0.0.0.0:{GCS_PORT}", key_file = "{KEY_FILE}"}}]')
@@ -140,7 +140,7 @@ def _settings(host: Host, answers: Answers) -> Iterator[Step]:
 
 
 def _others(host: Host, answers: Answers) -> Iterator[Step]:
-    """Keep the name /dev/naze from USB devices that the bridge has heard to be none."""
+    """Keep the name /dev/naze from USB devices that proved not to be a flight controller."""
     try:
         others = json.loads(host.read(f"{STATE_FOLDER}/{PORTS_FILE}") or "{}").get("others", {})
         keys = [re.fullmatch(r"usb (\S+) (\w{4}):(\w{4}).*", key) for key in others]
@@ -161,7 +161,7 @@ def _others(host: Host, answers: Answers) -> Iterator[Step]:
 
 def _announcement(host: Host, answers: Answers) -> Iterator[Step]:
     if not host.path(Path(_AVAHI_FILE).parent).exists():
-        return  # without Avahi there is no NAME.local either, which the last words say
+        return  # without Avahi there is no NAME.local either, as the closing message says
     services = [("_mavlink._udp", GCS_PORT)] + ([("_http._tcp", PAGE_PORT)] if answers.page else [])
     entries = "".join(
         f"  <service><type>{escape(kind)}</type><port>{port}</port></service>\n" for kind, port in services
@@ -180,7 +180,7 @@ def _service(host: Host, answers: Answers) -> Iterator[Step]:
 
 
 def _hotspot(host: Host, answers: Answers) -> Iterator[Step]:
-    """The last step: it may end the connection over which setup is run."""
+    """The last step, because it may cut the connection over which setup is run."""
     if answers.hotspot is None:
         return
     ssid, password = answers.hotspot
@@ -203,11 +203,11 @@ def _hotspot(host: Host, answers: Answers) -> Iterator[Step]:
 
 
 def _keyfile(text: str) -> str:
-    """A value as NetworkManager's key files have it (GKeyFile)."""
+    """A value in the syntax of NetworkManager's key files (GKeyFile)."""
     escaped = text.replace("\\", "\\\\")
     return escaped.replace(" ", "\\s", 1) if escaped.startswith(" ") else escaped
 
 
 def _now(host: Host) -> tuple[str, ...]:
-    """`--now` where systemd runs; an image that is only being made has nothing to start."""
+    """`--now` if systemd runs; not while an image is being built."""
     return ("--now",) if host.path("/run/systemd/system").exists() else ()

@@ -85,7 +85,7 @@ def test_a_port_that_is_missing(pi: FaultyMachine) -> None:
     pi.path("/dev/serial0").unlink()
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup")
     pi.write("/dev/ttyUSB0")
-    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "set fc to a port that is there: /dev/ttyUSB0")
+    assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "set fc to a port that exists: /dev/ttyUSB0")
     assert_problem(check_port(pi, SerialFc("/dev/naze", None)), "/dev/naze is missing", "plug the flight controller in")
     # There is nothing to say of what is not there.
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
@@ -189,7 +189,7 @@ def test_a_flight_controller_that_says_nothing() -> None:
     assert_problem(check_flight_controller(PORT, nobody, nobody), "no flight controller answers", "TX goes to RX")
     silent = STATUS | {"flight_controller": None, "state": "searching"}
     (_, found) = check_flight_controller(PORT, lambda: silent, None)
-    assert_problem(found, "nobody answers on /dev/serial0: searching", "TX goes to RX")
+    assert_problem(found, "no reply on /dev/serial0: searching", "TX goes to RX")
     (_, found) = check_flight_controller(PORT, lambda: silent | {"state": "no port"}, None)
     assert_note(found, "/dev/serial0 cannot be opened yet")
 
@@ -237,7 +237,7 @@ def test_a_connection_from_a_port_does_not_take_it(pi: FaultyMachine) -> None:
 
 def test_zenoh(tmp_path: Path) -> None:
     assert_ok(check_zenoh(None), "off")
-    assert_ok(check_zenoh(ZenohSettings(vehicle="naze-1")), "fleet/naze-1, connects to nobody")
+    assert_ok(check_zenoh(ZenohSettings(vehicle="naze-1")), "fleet/naze-1, opens no connections")
     nowhere = ZenohSettings(vehicle="naze-1", connect=("tcp/127.0.0.1:9",))
     assert_note(check_zenoh(nowhere), "tcp/127.0.0.1:9: connection refused")
     (tmp_path / "zenoh.json5").write_text("{mode: ")
