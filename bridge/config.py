@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import Profile
-from bridge.fc.states.port import Autopilot
 from bridge.gcs.guard import LinkAccess
+from bridge.model.autopilot import Autopilot
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,7 @@ any number of {"progress": ...} lines and one last line with "result" or "error"
 import asyncio
 import json
 import os
-import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
@@ -24,15 +23,13 @@ from bridge.model.vehicle_groups import Group
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
-from service.control_socket import find_socket
+from service.control_client import ControlError
 from service.daemon import Daemon
-from service.mission_data import Json, mission_items, to_json, verdict_data, whole_number
+from service.mission_data import MOST, Json, mission_items, to_json, verdict_data, whole_number
 from service.store_worker import as_dicts
 from service.version import version
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission, StoreError
 
-#: The greatest number that a request may hold.
-MOST = 2**31 - 1
 _MAX_LINE = 1 << 20
 #: More clients at a time are hung up on.
 _MAX_CLIENTS = 16
@@ -46,14 +43,6 @@ _MOST_LISTED = 1000
 _LAST_ANSWERS_S = 0.05
 _log = structlog.get_logger()
 T = TypeVar("T")
-
-
-class ControlError(Exception):
-    """The daemon refused, or is not there; one sentence."""
-
-
-class NoDaemonError(ControlError):
-    """No daemon answers."""
 
 
 class MissionJobs:
@@ -330,36 +319,3 @@ def _held(held: HeldMission) -> Json:
 
 def _hex(checksum: int) -> str:
     return f"{checksum:08x}"
-
-
-def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
-    """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
-    path = find_socket(state_dir)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-        try:
-            connection.connect(str(path))
-        except PermissionError as error:
-            remedy = "use sudo, or join the group that the daemon runs as (dialout, as a service)"
-            raise ControlError(f"no permission to ask the daemon on {path}: {remedy}") from error
-        except OSError as error:
-            remedy = "start one (sudo systemctl start naze-bridge, or naze-bridge run), or use --fc directly"
-            raise NoDaemonError(f"no daemon answers on {path}: {remedy}") from error
-        with suppress(ConnectionError):
-            # Who is refused in the middle of a long request has its answer to read all the same.
-            connection.sendall(to_json(request).encode() + b"\n")
-        with suppress(ConnectionError):
-            for answer in _lines(connection):
-                if "progress" in answer:
-                    progress(answer["progress"])
-                elif "error" in answer:
-                    raise ControlError(answer["error"])
-                else:
-                    result: Json = answer["result"]
-                    return result
-    raise ControlError("the daemon ended before it answered")
-
-
-def _lines(connection: socket.socket) -> Iterator[Json]:
-    with connection.makefile() as stream:
-        for line in stream:
-            yield json.loads(line)

@@ -12,6 +12,9 @@ from protocols.mission_record import identify
 
 Json = dict[str, Any]
 
+#: The greatest number that a request may hold.
+MOST = 2**31 - 1
+
 _WHOLE = {"seq": 65535, "command": 65535, "frame": 255}
 _NUMBERS = ("p1", "p2", "p3", "p4", "alt_m")
 

@@ -12,11 +12,12 @@ from bridge.fc.states.events import Event, FrskyFound, Identified, Lost, Mavlink
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.msp import Identifying, Msp, MspLine
-from bridge.fc.states.port import Autopilot, Port
+from bridge.fc.states.port import Port
 from bridge.fc.states.searching import Searching
 from bridge.line.msp_link import MspLink
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
+from bridge.model.autopilot import Autopilot
 from bridge.model.events import EventLog, Incidents
 from bridge.model.vehicle import Vehicle
 from protocols.mavlink.frame import MavlinkFrame

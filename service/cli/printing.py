@@ -2,18 +2,22 @@
 """What commands print: tables that end where their text ends, strict JSON, and the sentence of a failure."""
 
 import re
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
-from rich.console import Console, RenderableType
 
 from service.mission_data import to_json
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 _BLANK_END = re.compile(r"(?: |\x1b\[[\d;]*m)+$", re.MULTILINE)
 
 
-def print_table(table: RenderableType) -> None:
+def print_table(table: "RenderableType") -> None:
     """Print a table as wide as the terminal lets it, 80 columns into a file; no blanks at the ends of lines."""
+    from rich.console import Console
+
     console = Console(highlight=False)
     with console.capture() as capture:
         console.print(table)

@@ -1,34 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge run`: the daemon in the foreground."""
 
-import asyncio
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from service.api import ControlError, ControlServer
-from service.cli.printing import fail
-from service.control_socket import socket_of_daemon
-from service.daemon import Daemon
-from service.lifecycle import run_until_signal
-from service.links.gcs_links import LinkError
-from service.log_setup import set_up_logging
-from service.notify import Notifier
-from service.recording.uart_recorder import UartFileError
-from service.settings import DEFAULT_GCS, Settings, SettingsError, load_settings
+from service.settings import DEFAULT_GCS, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE
-from service.web.settings import WebSettings
-from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
-from storage.state_lock import StateLock, StateUnusableError
-from storage.store_error import StoreError
-
-if TYPE_CHECKING:
-    from service.web.server import WebServer
-    from service.zenoh_link.node import Node
 
 
 @click.command()
@@ -62,49 +41,6 @@ def run(
     if check_config:
         click.echo("The settings can be used.")
         return
-    set_up_logging(settings.log_level)
-    try:
-        _serve(settings, load)
-    except (ControlError, LinkError, StoreError, UartFileError, ZenohSettingsError) as error:
-        fail(str(error))
+    from service.cli.serve import serve  # the whole daemon: --help does without
 
-
-def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
-    assert settings.state_dir is not None
-    with ExitStack() as stack:
-        # A disk that cannot be written keeps nobody on the ground: the store says so, and keeps missions in memory.
-        with suppress(StateUnusableError):
-            stack.enter_context(StateLock(settings.state_dir))
-        asyncio.run(_main(settings, load, socket_of_daemon(settings.state_dir)))
-
-
-async def _main(settings: Settings, load: Callable[[], Settings], socket_path: Path) -> None:
-    daemon = Daemon(settings)
-    control = ControlServer(daemon, socket_path)
-    zenoh_node = None if settings.zenoh is None else _zenoh_node(settings.zenoh, daemon)
-    page = None if settings.web is None else _web_server(settings.web, daemon)
-    await control.start()
-    if zenoh_node is not None:
-        zenoh_node.start()
-    if page is not None:
-        page.start()
-    try:
-        await run_until_signal(daemon, Notifier(), load)
-    finally:
-        await control.close()
-        if page is not None:
-            await page.close()
-        if zenoh_node is not None:
-            await zenoh_node.close()
-
-
-def _zenoh_node(settings: ZenohSettings, daemon: Daemon) -> "Node":
-    from service.zenoh_link.node import Node  # 10 MB that only its users pay for
-
-    return Node(settings, daemon)
-
-
-def _web_server(settings: WebSettings, daemon: Daemon) -> "WebServer":
-    from service.web.server import WebServer  # 20 MB that only its users pay for
-
-    return WebServer(daemon, settings)
+    serve(settings, load)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from service.cli.daemon_client import STATUS, ask, bridge_options
+from service.cli.daemon_client import ask, bridge_options
 from service.cli.printing import print_json
+from service.control_client import STATUS
 from service.host import Host
 from service.mission_data import Json
 

@@ -9,13 +9,12 @@ from rich.table import Table
 from rich.text import Text
 
 from bridge.model.finding import Finding
-from service.api import MOST
 from service.cli.command_group import CommandGroup
 from service.cli.daemon_client import ask_store, ask_with_progress, bridge_options, daemon_options
 from service.cli.mission_commands import show_delivery
 from service.cli.mission_table import difference_table, mission_table
 from service.cli.printing import print_json, print_table
-from service.mission_data import Json, mission_items
+from service.mission_data import MOST, Json, mission_items
 from service.web.comparison import difference
 
 _NUMBER = click.IntRange(1, MOST)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import click
 
-from service.api import ControlError, ask_daemon
-from service.cli.daemon_client import SERVICE_STATE, STATUS, ask_directly
+from service.cli.daemon_client import SERVICE_STATE
 from service.cli.printing import print_json
+from service.control_client import STATUS, ControlError, ask_daemon
 from service.doctor.checked import Checked, Grade
 from service.doctor.examination import examine
 from service.host import Host
@@ -75,6 +75,8 @@ def _examine(
 
 
 def _listen(settings: Settings) -> Json:
+    from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
+
     try:
         return asyncio.run(ask_directly(settings.fc, STATUS))
     except StoreError as error:

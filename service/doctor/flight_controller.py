@@ -4,7 +4,7 @@
 from collections.abc import Callable
 
 from bridge.fc.states.base import Closed
-from service.api import ControlError
+from service.control_client import ControlError
 from service.doctor.checked import Checked, note, ok, problem
 from service.links.connection import FcAddress
 from service.mission_data import Json

@@ -3,16 +3,13 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from service.links.connection import AddressError, GcsAddress, family_of, parse_gcs
+from service.links.connection import family_of
 from service.links.gcs_links import LinkError
+from service.links.share_settings import ShareSettings
 
-_KEYS = ("address", "write")
-_KINDS = ("tcpin", "udpin")
 #: A client that does not read its replies is disconnected.
 _MAX_UNSENT = 65536
 _MAX_CLIENTS = 8
@@ -30,29 +27,6 @@ class Share(Protocol):
 
     def close(self) -> None:
         """Close the port and its clients."""
-
-
-@dataclass(frozen=True, slots=True)
-class ShareSettings:
-    """The address, tcpin or udpin; `write`: True if requests that change something are forwarded."""
-
-    address: GcsAddress
-    write: bool = False
-
-
-def parse_share(entry: object, _folder: Path) -> ShareSettings:
-    """Read one entry of `share`, or one [[share]] table; AddressError says what is wrong."""
-    if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
-        raise AddressError(f'share: {entry!r} is no table with address = "tcpin:127.0.0.1:5761"')
-    address, write = parse_gcs(entry["address"]), entry.get("write", False)
-    if address.kind not in _KINDS:
-        raise AddressError(f"share {address}: programs connect to it, so write tcpin:ADDR:PORT or udpin:ADDR:PORT")
-    for key in entry:
-        if key not in _KEYS:
-            raise AddressError(f"share {address}: {key!r} is no setting of a share; known are {', '.join(_KEYS)}")
-    if type(write) is not bool:
-        raise AddressError(f"share {address}: write is {write!r}, but must be true or false")
-    return ShareSettings(address, write)
 
 
 async def open_share(settings: ShareSettings, requested: Requested) -> Share:

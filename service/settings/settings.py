@@ -7,9 +7,9 @@ from enum import Enum
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
-from bridge.fc.states.port import Autopilot
+from bridge.model.autopilot import Autopilot
 from service.links.connection import AutoFc, FcAddress, GcsAddress
-from service.links.msp_share import ShareSettings
+from service.links.share_settings import ShareSettings
 from service.links.write_access import WriteAccess
 from service.web.settings import WebSettings
 from service.zenoh_link.settings import ZenohSettings

@@ -4,9 +4,9 @@
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
-from bridge.fc.states.port import Autopilot
+from bridge.model.autopilot import Autopilot
 from service.links.connection import parse_fc
-from service.links.msp_share import parse_share
+from service.links.share_settings import parse_share
 from service.links.write_access import parse_link
 from service.settings.key import Choice, FileName, Key, Several, Table, Text, Unfit, Whole, YesNo
 from service.settings.settings import (

@@ -30,11 +30,12 @@ from starlette.routing import Route
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionItem
-from service.api import MOST, ControlError, MissionJobs
+from service.api import MissionJobs
+from service.control_client import ControlError
 from service.daemon import Daemon
 from service.host import Host
 from service.metrics import CONTENT_TYPE, Metrics
-from service.mission_data import Json, mission_items, to_json
+from service.mission_data import MOST, Json, mission_items, to_json
 from service.recording.recorder import TLOG_FOLDER
 from service.version import version
 from service.web.access import MAX_FILE, Refused, check_token, guarded

@@ -13,7 +13,8 @@ from starlette.requests import ClientDisconnect, Request
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.api import ControlError, MissionJobs
+from service.api import MissionJobs
+from service.control_client import ControlError
 from service.mission_data import Json
 from service.web.access import Refused
 from service.web.comparison import MAX_ROWS, checked_mission

@@ -6,7 +6,7 @@ import secrets
 from collections.abc import Awaitable, Callable
 from http import HTTPStatus
 
-from service.api import ControlError
+from service.control_client import ControlError
 from service.mission_data import Json
 from service.web.access import Refused
 from storage.store_error import StoreError

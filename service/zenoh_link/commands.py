@@ -7,8 +7,8 @@ from collections.abc import Callable
 from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.api import MOST, MissionJobs
-from service.mission_data import Json, to_json
+from service.api import MissionJobs
+from service.mission_data import MOST, Json, to_json
 from service.zenoh_link import keys
 from service.zenoh_link.queries import JSON_REPLY, Answerer, QueryRefused, Question
 from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates

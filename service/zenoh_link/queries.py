@@ -9,7 +9,7 @@ from functools import partial
 import structlog
 import zenoh
 
-from service.api import ControlError
+from service.control_client import ControlError
 from service.mission_data import Json, to_json
 from service.zenoh_link.keys import UPLOAD
 from service.zenoh_link.payload import encoding_of

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from faulty_machine import PORT, FaultyMachine
 
-from service.api import ControlError
+from service.control_client import ControlError
 from service.doctor.checked import Checked, Grade
 from service.doctor.examination import examine
 from service.doctor.flight_controller import check_flight_controller

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from plan import PlanRow
 
-from service.api import ControlError, ask_daemon
+from service.control_client import ControlError, ask_daemon
 
 #: Seconds after which something that must come at all counts as not coming.
 PATIENCE = 20.0

@@ -11,7 +11,7 @@ from benches import Starter
 from plan import plain_plan
 from programs import Daemon, run_naze_bridge, until
 
-from service.api import ControlError
+from service.control_client import ControlError
 
 ITEM = {"seq": 0, "command": 16, "frame": 3, "p1": 0, "p2": 0, "p3": 0, "p4": 0, "lat_e7": 1, "lon_e7": 1, "alt_m": 1}
 

@@ -15,7 +15,7 @@ from programs import NAZE_BRIDGE, REPOSITORY, free_port, until
 from structlog.testing import capture_logs
 
 from service import daemon as daemon_module
-from service.api import ControlError, ask_daemon
+from service.control_client import ControlError, ask_daemon
 from service.daemon import Daemon
 from service.links.connection import SerialFc, SimulatedFc
 from service.settings import Settings

@@ -10,7 +10,7 @@ from benches import Starter
 from plain_station import tcp_station, udp_station
 from programs import Program, free_port, until
 
-from service.api import ask_daemon
+from service.control_client import ask_daemon
 
 
 class ConfiguredDaemon:

@@ -13,7 +13,7 @@ from service.api import MissionJobs
 from service.cli.mission_source import load_mission
 from service.daemon import Daemon
 from service.links.connection import SimulatedFc, parse_gcs
-from service.links.msp_share import ShareSettings, parse_share
+from service.links.share_settings import ShareSettings, parse_share
 from service.settings import Settings
 
 PATIENCE_S = 20.0

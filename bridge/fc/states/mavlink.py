@@ -6,8 +6,9 @@ from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController, Profile
 from bridge.fc.states.base import State
 from bridge.fc.states.events import Event, Lost, MavlinkFound
-from bridge.fc.states.port import Autopilot, Port
+from bridge.fc.states.port import Port
 from bridge.line.mavlink_line import MavlinkLine
+from bridge.model.autopilot import Autopilot
 from protocols.mavlink.frame import MavlinkFrame
 
 

@@ -3,21 +3,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 
 from bridge.fc.profile import FlightController, Profile
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
+from bridge.model.autopilot import Autopilot
 from bridge.model.vehicle import Vehicle
 from protocols.mavlink.frame import MavlinkFrame
-
-
-class Autopilot(Enum):
-    """Whose MAVLink is heard on the port."""
-
-    AUTO = "auto"
-    HARAKIRI = "harakiri"
-    OTHER = "other"
 
 
 @dataclass(slots=True)

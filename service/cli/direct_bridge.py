@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bridge of a command's own (`--fc`), for one request."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+
+from service.api import MissionJobs
+from service.control_client import STATUS, ControlError
+from service.daemon import Daemon
+from service.links.connection import AutoFc, FcAddress
+from service.log_setup import set_up_logging
+from service.mission_data import Json
+from service.settings import Settings, takeoff_limit_m
+
+#: An unknown speed is found within 8 s.
+_SEARCH_PATIENCE_S = 12.0
+#: With `auto`: the header and two on USB.
+_PORTS_SEARCHED = 3
+#: A round of telemetry takes a second; at 9600 baud two.
+_TELEMETRY_PATIENCE_S = 3.0
+_INTERVAL_S = 0.05
+_TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
+
+
+async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
+    """Ask a bridge of our own on this port; ControlError or StoreError say why there is no answer."""
+    set_up_logging("error")
+    daemon = Daemon(Settings(fc, takeoff_max_m=takeoff_limit_m()))
+    jobs = MissionJobs(daemon)
+    running = asyncio.create_task(daemon.run())
+    try:
+        patience_s = _SEARCH_PATIENCE_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
+        await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.controller), patience_s)
+        if daemon.fc_trouble:
+            raise ControlError(daemon.fc_trouble)
+        if daemon.bridge.session.controller is None:
+            where = daemon.fc_where
+            raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
+        # Who it is comes before what it tells of itself, and some controllers never tell all of it.
+        if request == STATUS:
+            await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
+        return await jobs.do(request, lambda answer: progress(answer["progress"]))
+    except asyncio.CancelledError:
+        # A mission is either finished or given up cleanly, never left in the middle.
+        await daemon.finish()
+        raise
+    finally:
+        running.cancel()
+        with suppress(asyncio.CancelledError):
+            await running
+
+
+async def _wait(condition: Callable[[], bool], seconds: float) -> None:
+    """Wait until something is so, but not longer than that."""
+    for _ in range(int(seconds / _INTERVAL_S)):
+        if condition():
+            return
+        await asyncio.sleep(_INTERVAL_S)
