@@ -13,7 +13,6 @@ from service.cli.daemon_client import SERVICE_STATE
 from service.cli.printing import print_json
 from service.control_client import STATUS, ControlError, ask_daemon
 from service.doctor.checked import Checked, Grade
-from service.doctor.examination import examine
 from service.host import Host
 from service.mission_data import Json
 from service.settings import Settings, SettingsError, load_settings
@@ -63,6 +62,8 @@ def diagnose(
 def _examine(
     config: Path | None, fc: str | None, state_dir: Path | None, ask_running: Callable[[], Json]
 ) -> Iterator[Checked]:
+    from service.doctor.examination import examine  # half the daemon: --help does without
+
     try:
         settings = load_settings(config, fc, (), state_dir)
     except SettingsError as error:
