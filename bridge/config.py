@@ -17,7 +17,7 @@ class BridgeConfig:
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
     `links`: access rules by link name; every station may write over other links. `passes_everything`: an autopilot
-        that speaks MAVLink itself gets commands over those other links, too.
+    that speaks MAVLink itself gets commands over those other links, too.
     """
 
     speeds: Sequence[int | None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flight controllers that are shown but store no missions here, and autopilots that speak MAVLink themselves."""
+"""Flight controllers with telemetry only, and autopilots that speak MAVLink themselves."""
 
 from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
@@ -14,7 +14,7 @@ _BETAFLIGHT_BOXES = {0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "ALT HOLD", 11: "POS
 
 
 def _recognise(board: Interview) -> Conversation[FlightController | None]:
-    """Any board that answers is one of these."""
+    """Accept any board that answers."""
     ident = yield from board.ident()
     if ident is not None:
         boxes = yield from board.box_names()
@@ -31,7 +31,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
 
 
 OTHER_MSP = Profile("another MSP flight controller", "other", recognise=_recognise)
-#: Ground stations write missions to such an autopilot directly; only the command line can ask the bridge for it.
+#: Ground stations write missions to such an autopilot directly; only the command line can ask the bridge to.
 OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",
     "MAVLink",

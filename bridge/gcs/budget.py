@@ -30,7 +30,7 @@ class Budgets:
     """Counts the work that each peer causes.
 
     `has_standing`: True for a peer that has authenticated, or that connected before a link filled up. Only its own
-        limit applies to it, so strangers cannot use up the pilot's share.
+    limit applies to it, so strangers cannot use up the pilot's share.
     """
 
     def __init__(self, has_standing: Callable[[Peer], bool]) -> None:

@@ -25,8 +25,8 @@ class Cost(Enum):
     BOARD: a request to the flight controller, which has a few hundred bytes a second to spare.
     PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.
     FLASH: a write to the board's flash, which endures 10,000 per page.
-        STORED: a list in the store that did not reach the flight controller.
-        RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
+    STORED: a list in the store that did not reach the flight controller.
+    RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
 
     ANSWER = auto()

@@ -245,7 +245,7 @@ class Ground:
         """Send the heartbeat in the other MAVLink version too, to peers whose version is unknown.
 
         A ground station that knows only MAVLink 1 would not see the vehicle otherwise. Mission Planner sends MAVLink 1
-                until it has seen MAVLink 2, which it can always read; so signed links need no MAVLink 1.
+        until it has seen MAVLink 2, which it can always read; so signed links need no MAVLink 1.
         """
         for peer in self.everyone():
             self._introduce(peer, heartbeat)

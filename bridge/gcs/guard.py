@@ -112,7 +112,7 @@ class LinkAccess:
     """The conditions for writing over a link. `signing`: a signature with its key; `may_write`: the right address.
 
     None: not required. Everything the bridge sends over a link with `signing` is signed, too; `link_id` is the link's
-        number in the signature.
+    number in the signature.
     """
 
     signing: Signing | None = None
@@ -127,7 +127,7 @@ class GuardRefusal(NamedTuple):
     """The reason for refusing a frame.
 
     `is_first`: the first one of this peer for this reason. `is_forged`: the peer has the key, but this frame is not
-        signed with it, or is a copy. It gets no answer and has no effect, not even on the time the peer was last heard.
+    signed with it, or is a copy. It gets no answer and has no effect, not even on the time the peer was last heard.
     """
 
     why: str

@@ -36,8 +36,8 @@ def displaced(peers: Mapping[Peer, float]) -> Peer:
     """The peer of a full link that makes room for another. `peers`: when each was last heard, in order of arrival.
 
     The first half keeps its slots: a pilot is not displaced by a later crowd, not even after a radio fade. Of the
-        others, the longest-silent peer of the host with most peers goes: a crowd is often one host, which changes its
-        addresses faster than a pilot's ground station falls silent.
+    others, the longest-silent peer of the host with most peers goes: a crowd is often one host, which changes its
+    addresses faster than a pilot's ground station falls silent.
     """
     hosts = Counter(peer.host for peer in peers)
     later = list(peers)[len(peers) // 2 :]

@@ -36,7 +36,7 @@ class Delivery:
     """The result of a mission. `number` is its number in the store, None if it could not be stored.
 
     `is_lossy`: accepted, but an item was lost, the list erased, or an altitude changed its meaning. `change`: the
-        change on the aircraft as text; empty if there is none.
+    change on the aircraft as text; empty if there is none.
     """
 
     ack: MissionResult

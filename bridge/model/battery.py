@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Estimates for a LiPo battery of which only the voltage is known. Under load the voltage sags, and both read low."""
+"""Estimates for a LiPo battery with known voltage only. Under load the voltage sags, and both estimates are low."""
 
 from itertools import pairwise
 from math import ceil
 
-#: No charged cell has more.
+#: The highest voltage of a charged cell.
 _FULL_CELL_V = 4.25
-#: Volts a cell at rest -> percent left.
+#: Volts per cell at rest -> percent remaining.
 _CURVE = ((3.3, 0), (3.5, 5), (3.7, 20), (3.8, 45), (3.9, 65), (4.0, 80), (4.2, 100))
 
 
@@ -16,7 +16,7 @@ def least_cells(voltage_v: float) -> int:
 
 
 def remaining_percent(voltage_v: float, cells: int) -> int:
-    """What is left, 0..100."""
+    """The remaining charge, 0..100."""
     cell_v = voltage_v / cells
     for (low_v, low), (high_v, high) in pairwise(_CURVE):
         if cell_v < high_v:

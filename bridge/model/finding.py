@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finding: one thing that the rules changed, dropped or rejected in a mission, and how a pilot reads it."""
+"""A finding: one change, drop or rejection by the mission rules, and its text for the pilot."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -30,9 +30,9 @@ Note = Callable[[MissionItem, str, float | None, float | str | None, str], None]
 
 
 class News(StrEnum):
-    """How much a finding matters to the pilot."""
+    """The importance of a finding to the pilot."""
 
-    WARNING = "warning"  # something is lost, or flown otherwise than it was drawn
+    WARNING = "warning"  # something is lost, or flown differently than drawn
     NOTICE = "notice"
     NONE = "none"  # a default was filled in
 
@@ -41,10 +41,10 @@ class News(StrEnum):
 class Finding:
     """A changed value, a dropped item or a rejected list (docs/mission-rules.md).
 
-    `seq` is the item's number as it was sent; None speaks of the whole list. `field` is an attribute of MissionItem,
+    `seq` is the item's number as sent; None for the whole list. `field` is an attribute of MissionItem,
     or "count". `was` is the value as sent, None if not given; `becomes` the value as stored, or DROPPED (the item),
-    REJECTED or CLEARED (the list). `command` is the item's MAV_CMD; None for the list, and in missions that an older
-    release stored.
+    REJECTED or CLEARED (the list). `command` is the item's MAV_CMD; None for the list, and in missions stored by older
+    releases.
     """
 
     seq: int | None
@@ -70,7 +70,7 @@ class Finding:
         if self.field == "frame" or (self.news is News.WARNING and self.field in ("lat_e7", "lon_e7")):
             return f"{who}: {self.why}"
         if self.was == self.becomes:
-            # Nothing is changed: the pilot is warned of what is sent.
+            # Nothing is changed: the warning is about the value as sent.
             return f"{who}: {self.why}"
         label = self._label()
         unit = " m" if self.field in _METRES or label in _METRES else ""
@@ -103,7 +103,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """Why a list is rejected: the answer to the ground station, and the words for its user."""
+    """The rejection of a list: the MISSION_ACK code, and the finding for the pilot."""
 
     ack: MissionResult
     finding: Finding
@@ -112,7 +112,7 @@ class Rejection:
 def reject(ack: MissionResult, item: MissionItem, name: str, why: str) -> Rejection:
     """Reject the list because of one item's field `name`."""
     was = getattr(item, name)
-    # NaN is "not given": JSON, in which findings are stored, has no such number.
+    # NaN means "not given"; findings are stored as JSON, which has no NaN.
     return Rejection(ack, Finding(item.seq, name, was if was == was else None, REJECTED, why, item.command))
 
 

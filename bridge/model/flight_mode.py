@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which flight mode the active boxes make, in ArduCopter's terms: what ground stations can name and colour."""
+"""The flight mode that follows from the active boxes, as an ArduCopter mode, which ground stations can name."""
 
 from collections.abc import Sequence
 from enum import Enum, auto
 
 
 class FlightMode(Enum):
-    """What the pilot's switches have chosen."""
+    """The flight mode selected by the pilot's switches."""
 
     ACRO = auto()
     STABILIZE = auto()
@@ -16,10 +16,10 @@ class FlightMode(Enum):
     AUTO = auto()
 
 
-#: An aux channel's positions (MultiWii, and all its relatives).
+#: The thresholds of an aux channel's positions (MultiWii and its descendants).
 _LOW_BELOW_US, _HIGH_ABOVE_US = 1300, 1700
 
-#: The first whose box is active wins. Harakiri's, baseflight's and Cleanflight's names, then those of MultiWii NAV,
+#: The first mode with an active box wins. Harakiri's, baseflight's and Cleanflight's names, then those of MultiWii NAV,
 #: INAV and Betaflight.
 _BOXES: tuple[tuple[FlightMode, frozenset[str]], ...] = (
     (FlightMode.AUTO, frozenset({"GPS AUTO", "NAV WP", "MISSION"})),
@@ -31,15 +31,15 @@ _BOXES: tuple[tuple[FlightMode, frozenset[str]], ...] = (
 
 
 def flight_mode(box_flags: int, boxes: Sequence[str]) -> FlightMode:
-    """Return the mode; `box_flags` has one bit for each of `boxes`, in their order."""
+    """The mode; `box_flags` has one bit for each of `boxes`, in their order."""
     active = {name for bit, name in enumerate(boxes) if box_flags >> bit & 1}
     return next((mode for mode, names in _BOXES if active & names), FlightMode.ACRO)
 
 
 def active_boxes(activation: Sequence[int], aux_us: Sequence[int]) -> int:
-    """The boxes that the pilot's switches turn on, one bit each: what MSP_BOX and the aux channels say together.
+    """The boxes that the pilot's switches turn on, one bit each, from MSP_BOX and the aux channels.
 
-    `activation` has one word a box, three bits an aux channel: low, middle, high.
+    `activation` has one word per box, with three bits per aux channel: low, middle, high.
     """
     positions = 0
     for number, width_us in enumerate(aux_us):

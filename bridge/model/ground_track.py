@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distances between places, and the course over ground of receivers that report a speed but no course."""
+"""Distances between places, and the course over ground for receivers that report a speed but no course."""
 
 import math
 from typing import Protocol
 
 _METRES_PER_DEGREE = 111_320.0
-#: Positions closer together than this show the receiver's noise rather than a movement.
+#: Smaller moves are the receiver's noise.
 _LEG_M = 1.0
 
 
@@ -29,7 +29,7 @@ class GroundTrack:
         self._course_deg: float | None = None
 
     def course_deg(self, place: Place) -> float | None:
-        """Take a position. The course, 0 up to 360, or None before the first metre."""
+        """Add a position. The course, 0 up to 360, or None before the first metre."""
         if self._leg_began is None:
             self._leg_began = place
         elif distance_m(self._leg_began, place) >= _LEG_M:
@@ -39,7 +39,7 @@ class GroundTrack:
 
 
 def distance_m(start: Place, end: Place) -> float:
-    """Metres between two places; exact enough for a flight in sight."""
+    """Metres between two places, by a flat-earth approximation."""
     return math.hypot(*north_east_m(start, end))
 
 
@@ -52,7 +52,7 @@ def bearing_deg(start: Place, end: Place) -> float:
 def north_east_m(start: Place, end: Place) -> tuple[float, float]:
     """Metres to the north and to the east."""
     metres_per_unit = _METRES_PER_DEGREE / 1e7
-    # Across the date line the short way is meant.
+    # Take the short way across the date line.
     east_units = (end.lon_e7 - start.lon_e7 + 1_800_000_000) % 3_600_000_000 - 1_800_000_000
     north = (end.lat_e7 - start.lat_e7) * metres_per_unit
     return north, east_units * metres_per_unit * math.cos(math.radians(end.lat_e7 / 1e7))

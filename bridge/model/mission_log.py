@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is remembered of every mission that comes in."""
+"""The stored record of a received mission."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -11,18 +11,18 @@ from protocols.mission_record import ListIdentity
 
 
 class Outcome(Enum):
-    """What became of a mission, as stored."""
+    """The outcome of a mission, as stored."""
 
     PENDING = "PENDING"
     VERIFIED = "VERIFIED"  # the flight controller holds it, checksum read back
     REJECTED = "REJECTED"  # by the rules; the flight controller was not touched
-    CANCELLED = "CANCELLED"  # by the ground station, or it fell silent
+    CANCELLED = "CANCELLED"  # by the ground station, or by its timeout
     FAILED = "FAILED"  # the flight controller refused it or was not reachable
 
 
 @dataclass(frozen=True, slots=True)
 class ArrivedMission:
-    """A mission as it came in: from whom, the items as sent, and what the rules said."""
+    """A mission as received: its sender, the items as sent, and the verdict."""
 
     source: str
     items: tuple[MissionItem, ...]
@@ -31,10 +31,10 @@ class ArrivedMission:
 
 @dataclass(frozen=True, slots=True)
 class PendingMission:
-    """A mission of which it is not known whether the flight controller has it.
+    """A mission that the flight controller may or may not have.
 
-    `number`: in the store, None if it is not stored. `identity`: of the list to look for, None if it was rejected.
-    `before`: of the list that was there before, None if that is not known.
+    `number`: in the store, None if not stored. `identity`: of the list to look for, None if it was rejected.
+    `before`: of the previous list, None if unknown.
     """
 
     number: int | None
@@ -44,7 +44,7 @@ class PendingMission:
 
 @dataclass(frozen=True, slots=True)
 class Conclusion:
-    """How it ended, with one sentence of detail."""
+    """The outcome, with one sentence of detail."""
 
     outcome: Outcome
     detail: str

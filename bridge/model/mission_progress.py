@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a craft is in its mission, as NAV_STATUS tells it: which record it flies to, and which it has reached."""
+"""Mission progress from NAV_STATUS: the record that the craft flies to, and the last one reached."""
 
 from enum import Enum
 
 from protocols.msp.nav import FINISHED, LEGS, NavAction, NavMode, NavState, NavStatus
 
-#: In these states the craft is where its record leads.
+#: In these states the craft is at its record's place.
 _THERE = frozenset((NavState.HOLD_TIMED, NavState.LAND_IN_PROGRESS, NavState.LANDED, NavState.HOVER_ABOVE_HOME))
 _REACHED = LEGS | {NavAction.RTH}
 
 
 class Progress(Enum):
-    """MAVLink's MISSION_STATE, as far as it is told."""
+    """The known values of MAVLink's MISSION_STATE."""
 
     NOT_STARTED = 2
     ACTIVE = 3
@@ -28,9 +28,9 @@ class MissionProgress:
         self._reached = 0
 
     def take(self, status: NavStatus) -> int | None:
-        """Learn from one answer; return the record that was reached meanwhile. Of several only the last is known."""
+        """Take one reply; returns the record reached since the last one. Of several only the last is known."""
         before, action = self.number, self._action
-        # The way home with which a mission ends is flown in the mode RTH.
+        # The return home at the end of a mission is flown in the mode RTH.
         goes_home = status.mode == NavMode.RTH and status.action == NavAction.RTH and before > 0
         if status.mode != NavMode.MISSION and not goes_home:
             self.number = self._action = self._reached = 0

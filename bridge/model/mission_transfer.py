@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mission transfer under way, as it is shown to people."""
+"""The progress of a running mission transfer, for display."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +14,7 @@ class TransferStep(Enum):
 
 @dataclass(frozen=True, slots=True)
 class MissionTransfer:
-    """`done` of `total` items or records; once all records are written they are read back and verified."""
+    """`done` of `total` items or records. All records written does not mean verified: read-back follows."""
 
     source: str
     step: TransferStep

@@ -17,9 +17,9 @@ from bridge.model.ground_track import GroundTrack, distance_m
 from protocols.msp.nav import NavStatus
 from protocols.msp.telemetry import Sensor
 
-#: A reading older than this is stale: it is shown as such, or not at all. With the time on the line that makes 1.5 s.
+#: A reading older than this is stale: shown as such, or not at all. With the transmission time this makes 1.5 s.
 STALE_S = 1.4
-#: Before the first arming, home is where the craft stands. Smaller moves than this are the receiver's noise.
+#: Before the first arming, home follows the craft's position. Smaller moves than this are the receiver's noise.
 _STANDING_M = 10.0
 
 
@@ -114,7 +114,7 @@ class Sticks(Reading):
 
 @dataclass(frozen=True, slots=True)
 class Switches(Reading):
-    """Which positions of the aux channels turn on which box, by MSP_BOX; `boxes` names them."""
+    """The aux channel positions that turn on each box, from MSP_BOX; `boxes`: their names."""
 
     boxes: tuple[str, ...]
     activation: tuple[int, ...]
@@ -150,7 +150,7 @@ class Health(Reading):
 
 @dataclass(frozen=True, slots=True)
 class Readiness(Reading):
-    """What keeps the craft from arming, in words; () if nothing does. Unknown on firmware that does not say."""
+    """The reasons that prevent arming, as text; () if there are none. Unknown on firmware that does not report them."""
 
     blockers: tuple[str, ...]
 
@@ -203,10 +203,10 @@ class Vehicle:
 
     def __init__(self, mixer: int | None = None) -> None:
         self.mixer = mixer
-        #: The firmware's: major, minor, patch level.
+        #: The firmware version: major, minor, patch level.
         self.version: tuple[int, int, int] | None = None
         self.home: Home | None = None
-        #: When any reading was heard last.
+        #: When any reading was last heard.
         self.heard_at: float | None = None
         self.track = GroundTrack()
         self._readings: dict[type[Reading], Reading] = {}
@@ -279,7 +279,7 @@ class Vehicle:
         return Home(position.lat_e7, position.lon_e7, position.altitude_m)
 
     def _place_home(self, *, has_armed: bool) -> None:
-        """Home is where the craft was armed. It never moves in flight, nor by losing the link there.
+        """Home is where the craft was armed. It never moves in flight, even if the link is lost.
 
         Before the first arming it is where the craft stands. The flight controller's own home overrides both.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of a vehicle, in groups with a name for each value: for zenoh, the web page and the command line.
+"""The published state of a vehicle, in groups of named values: for zenoh, the web page and the command line.
 
 None means "not known". The notes beside the fields are part of the published schemas (service/zenoh_link/schemas).
 """
@@ -10,7 +10,7 @@ from typing import Annotated
 
 
 class Group(Enum):
-    """What is told of together."""
+    """The groups; each is published as a whole."""
 
     ATTITUDE = "attitude"
     POSITION = "position"
@@ -24,13 +24,13 @@ class Group(Enum):
     __hash__ = object.__hash__
 
 
-#: Of every group.
+#: A field of every group.
 Age = Annotated[float | None, "seconds since it was heard; above 1.5 it is stale"]
 
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """How the vehicle is turned."""
+    """The vehicle's attitude."""
 
     roll_deg: Annotated[float | None, "right side down is positive"] = None
     pitch_deg: Annotated[float | None, "nose up is positive"] = None
@@ -40,7 +40,7 @@ class Attitude:
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where the vehicle is; all of it only while the receiver has a fix, but for height and climb."""
+    """The vehicle's position. All values except height and climb need a GPS fix."""
 
     lat_deg: Annotated[float | None, "WGS 84"] = None
     lon_deg: Annotated[float | None, "WGS 84"] = None
@@ -58,7 +58,7 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Gps:
-    """What the satellite receiver says of itself."""
+    """The satellite receiver's status."""
 
     fix: Annotated[str | None, "none, 2D or 3D"] = None
     satellites: Annotated[int | None, "how many are used"] = None
@@ -70,7 +70,7 @@ class Gps:
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """What is measured of the battery."""
+    """Battery measurements."""
 
     voltage_v: float | None = None
     current_a: float | None = None
@@ -82,7 +82,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Rc:
-    """What comes from the pilot's transmitter."""
+    """Input from the pilot's transmitter."""
 
     channels_us: Annotated[tuple[int, ...] | None, "pulse widths: roll, pitch, throttle, yaw, then aux 1.."] = None
     rssi_percent: Annotated[float | None, "strength of the received signal"] = None
@@ -91,7 +91,7 @@ class Rc:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How the flight controller is."""
+    """The flight controller's status."""
 
     armed: bool | None = None
     mode: Annotated[str | None, "ACRO, STABILIZE, ALT_HOLD, LOITER, RTL or AUTO; an autopilot's own: its number"] = None
@@ -103,7 +103,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """How the bridge and its flight controller get on."""
+    """The link between the bridge and its flight controller."""
 
     state: Annotated[str, "no port, searching, identifying, MSP, MAVLink or FrSky"]
     flight_controller: Annotated[str | None, "who it is"] = None
@@ -116,7 +116,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class MissionIdentity:
-    """Which mission the flight controller holds."""
+    """The identity of the flight controller's mission."""
 
     count: Annotated[int, "records, home included; 0: none"]
     checksum: Annotated[str, "CRC-32 over the records, 8 hexadecimal digits"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a checked mission list comes to."""
+"""The result of checking a mission list."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ RecordT = TypeVar("RecordT", bound=MissionRecord)
 
 
 class Result(Enum):
-    """What becomes of a list."""
+    """The possible results of a check."""
 
     ACCEPTED = auto()
     CLEARED = auto()
@@ -25,9 +25,9 @@ class Result(Enum):
 class Verdict(Generic[RecordT]):
     """A checked list.
 
-    `records` is what the flight controller is to hold, `items` the same as it reads back, both empty unless ACCEPTED.
-    `sent_as` maps a record's place to the MAV_CMD with which it was sent, where the record does not tell (a region of
-    interest). `findings` come in the order of the list; that of a rejection is the last.
+    `records` is the list for the flight controller, `items` the same as read back; both empty unless ACCEPTED.
+    `sent_as` maps a record's place to the MAV_CMD that it was sent as, where the record is ambiguous (a region of
+    interest). `findings` are in the order of the list; that of a rejection is the last.
     """
 
     result: Result
@@ -38,10 +38,10 @@ class Verdict(Generic[RecordT]):
     sent_as: Mapping[int, int] = field(default_factory=dict)
 
 
-#: What a list without items comes to.
+#: The verdict on a list without items.
 CLEARED_LIST: Verdict[Any] = Verdict(Result.CLEARED, MissionResult.ACCEPTED)
 
 
 def rejected(findings: tuple[Finding, ...], rejection: Rejection) -> Verdict[Any]:
-    """Return the verdict on a list that is refused."""
+    """The verdict on a rejected list."""
     return Verdict(Result.REJECTED, rejection.ack, findings=(*findings, rejection.finding))

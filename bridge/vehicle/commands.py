@@ -169,7 +169,7 @@ def _action(command: int, params: Sequence[float]) -> FcAction | None:
     """The flight controller action for a command; None if there is none.
 
     MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time; param2 for the compass, param5 for the accelerometers (1, or 4
-        for "simple"). MAV_CMD_PREFLIGHT_STORAGE: param1 = 1 writes.
+    for "simple"). MAV_CMD_PREFLIGHT_STORAGE: param1 = 1 writes.
     """
     asked = {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
     if command == messages.MAV_CMD_PREFLIGHT_CALIBRATION:

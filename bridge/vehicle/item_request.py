@@ -41,7 +41,7 @@ class ItemRequest:
         """Update the timeout when the requested item arrives.
 
         The answer to a repeated request gives no round trip time. But if it took a usual round trip after the repeat,
-                a frame was lost, and the timeout shrinks again: MAVSDK gives up if we wait longer after each loss.
+        a frame was lost, and the timeout shrinks again: MAVSDK gives up if we wait longer after each loss.
         """
         elapsed_s = now - self._asked_at
         known_s = self._round_trip_s

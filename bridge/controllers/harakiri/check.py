@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules for a Harakiri's mission list (docs/mission-rules.md): what a list becomes there, and why."""
+"""The rules for a Harakiri's mission list (docs/mission-rules.md)."""
 
 import math
 from dataclasses import dataclass, replace
@@ -34,9 +34,9 @@ from protocols.wp_record import WpCommand, WpRecord
 
 @dataclass(frozen=True, slots=True)
 class HarakiriRules:
-    """What the rules need to know of the flight controller and the settings.
+    """The inputs of the rules from the flight controller and the settings.
 
-    capacity: records it can hold, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: highest take-off.
+    capacity: records, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: the highest take-off.
     """
 
     capacity: int = USUAL_CAPACITY
@@ -45,20 +45,20 @@ class HarakiriRules:
 
     @property
     def max_items(self) -> int:
-        """The longest list: every item may become a record."""
+        """The longest list, home included: every item may become a record."""
         return self.capacity
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "HarakiriCheck":
-        """Begin a list."""
+        """Begin the check of a list."""
         return HarakiriCheck(self, count, fallback_home)
 
 
 class HarakiriCheck(ListCheck):
-    """The check of one list. `fallback_home` (lat_e7, lon_e7) stands in for a home without coordinates.
+    """The check of one list. `fallback_home` (lat_e7, lon_e7) replaces a home without coordinates.
 
-    Decided here: home without a finite height is a list INVALID_PARAM7, because home cannot be dropped; coordinates out
-    of range reject the list even if the item lacks something else and would be dropped, and INT32_MAX, MAVLink's "not
-    given" for an integer coordinate, is out of range like any other; a fallback home with a 0 in it is none.
+    Our own decisions: home without a finite altitude rejects the list with INVALID_PARAM7, because home cannot be
+    dropped; coordinates out of range reject the list even if the item would be dropped for another reason, and so does
+    INT32_MAX, MAVLink's "not given" for an integer coordinate; a fallback home with a 0 in it does not count.
     """
 
     def __init__(self, rules: HarakiriRules, count: int, fallback_home: tuple[int, int] | None = None) -> None:
@@ -75,7 +75,7 @@ class HarakiriCheck(ListCheck):
         rejection = self._refuse(item, rule)
         if rejection is not None or rule is None or self._drops(item, rule):
             return rejection
-        # The frame is judged only for an item that is kept.
+        # The frame is checked only for an item that is kept.
         rejection = refuse_frame(item, needs_position=rule.position)
         if rejection is None:
             self._keep(self._placed_home(item) if item.seq == 0 else item, rule)
@@ -96,7 +96,7 @@ class HarakiriCheck(ListCheck):
         )
 
     def _refuse(self, item: MissionItem, rule: CommandRule | None) -> Rejection | None:
-        """Find what rejects the list as soon as this item is seen."""
+        """The rejection of the list because of this item, if any."""
         if item.seq == 0 and item.command != Command.NAV_WAYPOINT:
             return reject(MissionResult.INVALID, item, "command", "must be a WAYPOINT")
         if rule is None:
@@ -155,14 +155,14 @@ class HarakiriCheck(ListCheck):
         return replace(home, lat_e7=lat_e7, lon_e7=lon_e7)
 
     def _keep(self, item: MissionItem, rule: CommandRule) -> None:
-        """Store one item; every value that does not survive becomes a finding."""
+        """Keep one item; every value that cannot be stored becomes a finding."""
         if item.seq and item.frame in (*SEA_LEVEL_FRAMES, *TERRAIN_FRAMES) and rule.height is not UNUSED:
             self._now_relative(item)
         if item.seq == 0:
             self._note_home(item)
         no_nose = rule.p4 is NOSE_ON_ROI and not self._roi_known
         p1 = self._fit(item, "p1", rule.p1)
-        # A default that is filled in is no news, and nor is the radius of home, which is not flown to.
+        # Filled-in defaults are not reported, nor is the radius of home, which is not flown to.
         p2 = self._fit(item, "p2", rule.p2, News.NOTICE if item.seq and given(item.p2) else News.NONE)
         self._fit(item, "p3", UNUSED)
         p4 = self._fit(item, "p4", NO_ROI_KNOWN if no_nose else rule.p4)
@@ -193,7 +193,7 @@ class HarakiriCheck(ListCheck):
         return News.WARNING if item.seq and is_raised else News.NOTICE
 
     def _refuse_kept_list(self) -> Rejection | None:
-        """Apply the rules for last and alone to what is kept; what is first and last as received stays so."""
+        """Apply the rules for `last` and `alone` to the kept list; dropping items does not change first and last."""
         last, last_rule = self._kept[-1]
         if last_rule.place is Place.NOT_LAST:
             return reject(MissionResult.INVALID, last, "command", f"{last_rule.name} is last of the items kept")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions for a Harakiri that answers nothing but MAVLink: its own mission messages (baseflight_mavlink.c).
+"""Missions for a Harakiri that answers only MAVLink, by its own mission messages (baseflight_mavlink.c).
 
-It takes MISSION_ITEM only, with coordinates in single precision, one item at a time, and forgets a transfer after
-500 ms. What is then in its memory, a part of the list, it writes a second later. But any error that it finds meanwhile
-makes it load the old list again: so after a failure it is sent an item that is out of sequence. The traps
-of its serial port are minded by `bridge.line.mavlink_sender`; an item that cannot be sent safely refuses the list.
+It takes only MISSION_ITEM, with coordinates in single precision, one item at a time, and drops a transfer after
+500 ms. A second later it writes the partial list in its RAM to flash. But any error in between makes it reload the old
+list: so after a failure the bridge sends an item that is out of sequence. `bridge.line.mavlink_sender` avoids the traps
+of its serial port; an item that cannot be sent safely rejects the list.
 
 A written list is read back, item by item. Single precision holds a coordinate to 0.4 m.
 """
@@ -26,20 +26,20 @@ from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.wp_record import WpRecord
 
-#: Harakiri's ids; it does not look whether it is meant.
+#: Harakiri's ids; it does not check the target itself.
 _TARGET = (1, 200)
-#: Well within its 500 ms: there is time for a second try.
-_PATIENCE_S = 0.2
+#: Short enough for a second try within its 500 ms.
+_TIMEOUT_S = 0.2
 _TRIES = 2
 _MAX_BEGINS = 3
-#: The list is written 1 s after the last item, and the CPU stands still for that.
+#: The list is written 1 s after the last item, which stalls the CPU.
 _WRITTEN_AFTER_S = 1.6
 _REQUEST, _ACK = m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK
 _COUNT, _ITEM = m.MAVLINK_MSG_ID_MISSION_COUNT, m.MAVLINK_MSG_ID_MISSION_ITEM
 _NO_SEQ = 0xFFFF
 _E7 = single(1e7)
 _COMMANDS = {int(command): number for number, command in MAV_COMMANDS.items()}
-#: What is told if this ends the last attempt; others say nothing but "the line is bad".
+#: The failure reported if this ends the last attempt; any other becomes "the line is bad".
 _FAILURES = {
     m.MAV_MISSION_NO_SPACE: PushFailure.NO_SPACE,
     m.MAV_MISSION_INVALID: PushFailure.REFUSED,
@@ -48,7 +48,7 @@ _FAILURES = {
 
 
 class _Failed(Exception):
-    """An attempt is over."""
+    """An attempt has failed."""
 
     def __init__(self, failure: PushFailure, *, is_final: bool = False) -> None:
         super().__init__(failure.value)
@@ -57,7 +57,7 @@ class _Failed(Exception):
 
 
 class HarakiriMavlinkMissions(OneMission):
-    """The mission store of one Harakiri in MAVLink mode. `is_armed`: None while no heartbeat told."""
+    """The mission store of one Harakiri in MAVLink mode. `is_armed`: None before the first heartbeat."""
 
     def __init__(self, is_armed: Callable[[], bool | None], rules: HarakiriRules) -> None:
         self._is_armed = is_armed
@@ -70,7 +70,7 @@ class HarakiriMavlinkMissions(OneMission):
         """gps_wp_radius cannot be read over Harakiri's MAVLink."""
 
     def report(self) -> Conversation[StoreReport | None]:
-        """Tell whether it would take a list; what it holds is not known without reading it."""
+        """Its state from telemetry; the stored list is unknown until it is read."""
         yield from pause(0.0)
         armed = self._is_armed()
         if armed is None:
@@ -80,7 +80,7 @@ class HarakiriMavlinkMissions(OneMission):
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult[WpRecord]]:
         """Write the list and read it back."""
         if self._is_armed() is not False:
-            # The firmware itself does not look: it would take a list, or lose its own, in flight.
+            # The firmware does not check this: it would accept a list, or lose its own, in flight.
             return PushResult(PushFailure.ARMED)
         wanted = tuple(as_stored(record) for record in records)
         items = [_message(seq, item) for seq, item in enumerate(items_from_records(wanted))] or _NOTHING
@@ -112,28 +112,28 @@ class HarakiriMavlinkMissions(OneMission):
         return PushResult(failure, held=wanted)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read the list that is there."""
+        """Read its list."""
         return (yield from self._read(self._known or ()))
 
     def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """Return what a ground station reads of a list."""
+        """A list as a ground station reads it."""
         return tuple(items_from_records(records, sent_as))
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Return the same: home is stored with the list."""
+        """Unchanged: home is stored with the list."""
         return items
 
     def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
-        """Return the same number: each record is an item, home too."""
+        """The same number: each record is an item, home too."""
         return number if number < len(records) else 0
 
     def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
-        """Harakiri knows the parameter by another name and scale; it is not set from here."""
+        """Not supported: Harakiri has the parameter under another name and scale."""
         yield from pause(0.0)
         return None
 
     def _write(self, items: Sequence[Message], progress: PushProgress) -> Conversation[None]:
-        """Send the list up to its MISSION_ACK."""
+        """Send the list, up to its MISSION_ACK."""
         answer = yield from self._ask(m.MAVLink_mission_count_message(*_TARGET, len(items)), 0)
         for seq, item in enumerate(items):
             if answer.msgid == _ACK or self._seq_of(answer) != seq:
@@ -147,14 +147,14 @@ class HarakiriMavlinkMissions(OneMission):
         raise _Failed(PushFailure.NO_ANSWER)
 
     def _ask(self, message: Message, expected: int) -> Conversation[MavlinkFrame]:
-        """Send, and wait for the request for item `expected` or a MISSION_ACK. A refusal raises."""
+        """Send, and wait for the request for item `expected` or a MISSION_ACK; _Failed if it refuses."""
         for _ in range(_TRIES):
             is_safe: bool = yield Transmit(pack(message))
             if not is_safe:
-                # The pilot may move the waypoint by a metre.
+                # Only the pilot can help, by moving the waypoint by a metre.
                 raise _Failed(PushFailure.UNSAFE, is_final=True)
             while True:
-                answer: MavlinkFrame | None = yield Await(frozenset((_REQUEST, _ACK)), _PATIENCE_S)
+                answer: MavlinkFrame | None = yield Await(frozenset((_REQUEST, _ACK)), _TIMEOUT_S)
                 if answer is None:
                     break
                 if answer.msgid == _ACK:
@@ -168,17 +168,17 @@ class HarakiriMavlinkMissions(OneMission):
         raise _Failed(PushFailure.NO_ANSWER)
 
     def _restore(self) -> Conversation[bool]:
-        """Have the old list loaded again; tell whether it said so."""
+        """Make it reload the old list; True if it confirms that."""
         nowhere = replace(items_from_records([_HOME])[0], seq=_NO_SEQ)
         for _ in range(3):
             yield Transmit(pack(_message(_NO_SEQ, nowhere)))
-            answer: MavlinkFrame | None = yield Await(frozenset((_ACK,)), _PATIENCE_S)
+            answer: MavlinkFrame | None = yield Await(frozenset((_ACK,)), _TIMEOUT_S)
             if answer is not None and self._result_of(answer) != m.MAV_MISSION_ACCEPTED:
                 return True
         return False
 
     def _read(self, likely: tuple[WpRecord, ...]) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read the list; as `likely` if it reads as that one would. An empty one is not answered at all."""
+        """Read the list; returns `likely` if it reads as that one would. An empty list gets no answer at all."""
         for _ in range(_MAX_BEGINS):
             count = yield from self._question(m.MAVLink_mission_request_list_message(*_TARGET), _COUNT)
             if count is None:
@@ -189,7 +189,7 @@ class HarakiriMavlinkMissions(OneMission):
             if items == [_as_read(seq, item) for seq, item in enumerate(items_from_records(likely))]:
                 return likely
             return tuple(_record(item) for item in items)
-        # As many questions stay unanswered by an empty store; a line that is gone ends the conversation.
+        # No answer means an empty store; a lost line would have ended the conversation.
         return () if count is None else None
 
     def _read_items(self, count: int) -> Conversation[list[MissionItem] | None]:
@@ -210,7 +210,7 @@ class HarakiriMavlinkMissions(OneMission):
             is_safe: bool = yield Transmit(pack(message))
             if not is_safe:
                 return None
-            answer: MavlinkFrame | None = yield Await(frozenset((answer_id,)), _PATIENCE_S)
+            answer: MavlinkFrame | None = yield Await(frozenset((answer_id,)), _TIMEOUT_S)
             if answer is not None and (seq is None or self._seq_of(answer) == seq):
                 return answer
         return None
@@ -227,17 +227,17 @@ class HarakiriMavlinkMissions(OneMission):
 
 
 def as_stored(record: WpRecord) -> WpRecord:
-    """Return what Harakiri makes of a record that is sent to it in single precision."""
+    """The record that Harakiri stores after receiving it in single precision."""
     return replace(record, lat_e7=_as_int(_single_e7(record.lat_e7)), lon_e7=_as_int(_single_e7(record.lon_e7)))
 
 
 def _as_int(degrees: float) -> int:
-    """Do as the firmware: (int32_t)(x * 1.0e7f)."""
+    """As the firmware does: (int32_t)(x * 1.0e7f)."""
     return math.trunc(single(degrees * _E7))
 
 
 def _single_e7(value_e7: int) -> float:
-    """Return the degrees that the firmware stores as near to `value_e7` as it can."""
+    """The degrees in single precision that the firmware stores closest to `value_e7`."""
     if value_e7 == 0:
         return 0.0
     return min(neighbours(single(value_e7 / 1e7)), key=lambda degrees: abs(_as_int(degrees) - value_e7))
@@ -252,13 +252,13 @@ def _message(seq: int, item: MissionItem) -> Message:
 
 
 def _as_read(seq: int, item: MissionItem) -> MissionItem:
-    """Return what is read of an item that was stored."""
+    """A stored item as it is read back."""
     lat_e7, lon_e7 = (_as_int(single(single(value or 0) / _E7)) for value in (item.lat_e7, item.lon_e7))
     return replace(item, seq=seq, frame=int(Frame.GLOBAL_RELATIVE_ALT), lat_e7=lat_e7, lon_e7=lon_e7)
 
 
 def _record(item: MissionItem) -> WpRecord:
-    """Return the record that is read as `item`."""
+    """The record that reads back as `item`."""
     is_turns = item.command == Command.NAV_LOITER_TURNS
     return WpRecord(
         lat_e7=item.lat_e7 or 0,
@@ -273,5 +273,5 @@ def _record(item: MissionItem) -> WpRecord:
 
 
 _HOME = WpRecord(0, 0, 0, 0, 0, 0, 0, 0)
-#: Two items of which the first is good for nothing are accepted, and clear the store.
+#: Two items, the first of them invalid, are accepted and clear the store.
 _NOTHING = [_message(seq, replace(items_from_records([_HOME])[0], seq=seq)) for seq in (0, 1)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri with the mission extension: docs/msp-mission.md, the companion's side."""
+"""The companion's side of Harakiri's mission extension (docs/msp-mission.md)."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -16,19 +16,19 @@ from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Stat
 from protocols.wp_record import RECORD_SIZE, WpRecord
 
 _SHORT_REPLY_SIZE = 7
-#: A read asks for no more than this, so that two replies fit the flight controller's send ring.
+#: Records per read request: two replies fit the flight controller's send ring.
 _READ_RECORDS = 6
 _READS_IN_FLIGHT = 2
-_BUSY_PATIENCE_S = 1.0
+_BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
-#: How often one push may begin anew (reset, damaged line, flash error) before it is given up.
+#: Restarts of one push (after a reset, damaged line, flash error) before it is given up.
 _MAX_BEGINS = 3
 #: Unanswered requests in a row after which the flight controller counts as gone.
 _MAX_SILENCE = 5
-#: Losses in a row without a record more, silent or told, after which it is no use.
+#: Losses in a row without progress, silent or reported, before giving up.
 _MAX_VAIN = 20
 
-#: What is told if this status ends the last attempt; those that are missing say nothing but "the line is bad".
+#: The failure reported if this status ends the last attempt; any other becomes "the line is bad".
 _FAILURES = {
     Status.ARMED: PushFailure.ARMED,
     Status.BUSY: PushFailure.BUSY,
@@ -41,7 +41,7 @@ _FAILURES = {
 
 
 class _Retry(Exception):
-    """Begin the transfer again."""
+    """Restart the transfer."""
 
     def __init__(self, failure: PushFailure) -> None:
         super().__init__(failure.value)
@@ -57,12 +57,12 @@ class _GiveUp(Exception):
 
 
 class HarakiriMissions(OneMission):
-    """The mission store of one Harakiri. `takeoff_max_m` is the upper limit of the rules' take-off height."""
+    """The mission store of one Harakiri. `takeoff_max_m`: the highest take-off that the rules allow."""
 
     def __init__(self, info: Info, takeoff_max_m: int) -> None:
         self.info = info
         self._takeoff_max_m = takeoff_max_m
-        self._may_be_stored = False  # COMMIT was sent, and nothing heard since that tells whether it was done
+        self._may_be_stored = False  # COMMIT was sent, and its result is still unknown
 
     @property
     def wp_radius_cm(self) -> int:
@@ -85,7 +85,7 @@ class HarakiriMissions(OneMission):
         return StoreReport(state, rules, info.stored)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult[WpRecord]]:
-        """Put the list there: BEGIN, CHUNKs in a window, COMMIT; proven by the checksum over the flash."""
+        """Write the list: BEGIN, CHUNKs in a window, COMMIT; verified by the checksum over the flash."""
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER
         self._may_be_stored = False
@@ -129,19 +129,19 @@ class HarakiriMissions(OneMission):
         return None
 
     def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """Return what a ground station reads of a list."""
+        """A list as a ground station reads it."""
         return tuple(items_from_records(records, sent_as))
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Return the same: home is stored with the list."""
+        """Unchanged: home is stored with the list."""
         return items
 
     def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
-        """Return the same number: each record is an item, home too."""
+        """The same number: each record is an item, home too."""
         return number if number < len(records) else 0
 
     def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
-        """Set gps_wp_radius, 0..2000 cm; INFO tells what came of it, and not a late answer to another value."""
+        """Set gps_wp_radius, 0..2000 cm; INFO gives the result, as a reply may belong to an earlier value."""
         frame = ext.encode_radius(wp_radius_cm)
         waited_s = 0.0
         while True:
@@ -149,7 +149,7 @@ class HarakiriMissions(OneMission):
             answer = None if reply is None else ext.decode_radius(reply.payload)
             if answer is None:
                 return None
-            if answer.status is not Status.BUSY or waited_s >= _BUSY_PATIENCE_S:
+            if answer.status is not Status.BUSY or waited_s >= _BUSY_TIMEOUT_S:
                 break
             yield from pause(_BUSY_INTERVAL_S)
             waited_s += _BUSY_INTERVAL_S
@@ -160,7 +160,7 @@ class HarakiriMissions(OneMission):
         return info.wp_radius_cm
 
     def _read_info(self) -> Conversation[Info | None]:
-        # Of the radius in it every waypoint gets its own, and its checksum tells what is stored.
+        # Every waypoint's radius depends on the one in INFO, and its checksum identifies the stored list.
         reply = yield from ask_surely(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
         return None if reply is None else ext.decode_info(reply.payload)
 
@@ -172,7 +172,7 @@ class HarakiriMissions(OneMission):
             if answer is None:
                 raise _GiveUp(PushFailure.NO_ANSWER)
             if answer.status is Status.BUSY:
-                if waited_s >= _BUSY_PATIENCE_S:
+                if waited_s >= _BUSY_TIMEOUT_S:
                     info = yield from self._read_info()
                     is_spent = info is not None and InfoFlag.WRITES_SPENT in info.flags
                     raise _GiveUp(PushFailure.WRITES_SPENT if is_spent else PushFailure.BUSY)
@@ -184,16 +184,16 @@ class HarakiriMissions(OneMission):
             return answer
 
     def _transfer(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Conversation[None]:
-        """Keep the window full and send COMMIT right behind the last chunk: the line never waits for an answer.
+        """Keep the window full and send COMMIT right behind the last chunk: the line never waits for a reply.
 
-        After a loss go back to the first record that the flight controller lacks. To a COMMIT that comes before the
-        lost chunk does it answers INCOMPLETE.
+        After a loss, continue at the first record that the flight controller lacks. It answers INCOMPLETE to a COMMIT
+        that arrives before the lost chunk.
         """
         wanted = identify(records)
         total = len(records)
         acked = sent = self._confirmed(records, begun)
         in_flight: list[int] = []  # first record of each unanswered chunk
-        stale = 0  # chunks before which one was lost, and which will be answered all the same
+        stale = 0  # chunks sent after a lost one, which will be answered all the same
         committing = False
         most = self.info.chunk_records
         silence = vain = 0
@@ -204,7 +204,7 @@ class HarakiriMissions(OneMission):
                 in_flight.append(sent)
                 sent += chunk.count
             if sent == total and not committing:
-                # As long as a chunk may have to be repeated, COMMIT must not keep the line to itself.
+                # While a chunk may have to be repeated, COMMIT must not block the line.
                 frame = ext.encode_commit(wanted)
                 yield from send(frame, MissionCommand.COMMIT, _SHORT_REPLY_SIZE, exclusive=acked == total)
                 committing = self._may_be_stored = True
@@ -235,7 +235,7 @@ class HarakiriMissions(OneMission):
                 if answer.stored != wanted:
                     raise _Retry(PushFailure.FLASH)
                 return
-            # Something was lost. A line that loses frames loses long ones most.
+            # A frame was lost. A bad line loses long frames most.
             vain += 1
             if vain > _MAX_VAIN:
                 raise _GiveUp(PushFailure.NO_ANSWER)
@@ -245,7 +245,7 @@ class HarakiriMissions(OneMission):
             most = max(most // 2, 1)
 
     def _look_what_is_stored(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
-        """Ask whether COMMIT was done after all; only silence leaves it uncertain."""
+        """Ask if COMMIT succeeded after all; only silence leaves it uncertain."""
         try:
             info = yield from self._read_info()
         except LinkLost:
@@ -255,12 +255,12 @@ class HarakiriMissions(OneMission):
         return None if info.stored == wanted else failure
 
     def _is_stored(self, records: Sequence[WpRecord]) -> Conversation[bool]:
-        """Compare record by record: "the same list" is a claim by checksum only."""
+        """Compare record by record: an equal checksum is no proof of the same list."""
         held = yield from self.pull()
         return held == tuple(records)
 
     def _read(self, info: Info) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read all records, two requests in flight, each asked again until it is there."""
+        """Read all records with two requests in flight, each repeated until it is answered."""
         step = min(info.read_records, _READ_RECORDS)
         total = info.stored.count
         missing = range(0, total, step)
@@ -286,14 +286,14 @@ class HarakiriMissions(OneMission):
             in_flight = max(in_flight - 1, 0)
             if answer.status is not Status.OK:
                 return None
-            # Damage that the XOR let pass may show as another place.
+            # Damage that the XOR missed may look like another place.
             if answer.first in missing and len(answer.records) == min(step, total - answer.first):
                 vain = 0 if answer.first not in parts else vain
                 parts[answer.first] = answer.records
         return tuple(record for first in missing for record in parts[first])
 
     def _confirmed(self, records: Sequence[WpRecord], answer: Progress) -> int:
-        """Return how many records the flight controller has right; begin again if it has other ones."""
+        """The number of correct records on the flight controller; restarts if it has other ones."""
         if answer.next > len(records) or identify(records[: answer.next]).checksum != answer.checksum:
             raise _Retry(PushFailure.NO_ANSWER)
         return answer.next
@@ -306,5 +306,5 @@ def _decode_answer(reply: MspFrame) -> Progress | Stored | None:
 
 
 def _again(status: Status) -> _Retry:
-    """Ask again, whatever the refusal: on a bad line one in a hundred is a damaged reply that the XOR let pass."""
+    """Retry after any refusal: on a bad line one in a hundred is a damaged reply that the XOR missed."""
     return _Retry(_FAILURES.get(status, PushFailure.NO_ANSWER))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri: how it is recognised, and what it can do on each protocol that it speaks.
+"""Harakiri: its recognition, and its profile for each protocol.
 
 Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky telemetry (1) or MAVLink (2, 3).
 """
@@ -23,12 +23,12 @@ from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
 _FAMILY = "Harakiri"
 _VERSION = 211
 _CAPABILITY = 0x80000000
-#: A box that no other firmware has.
+#: A box that only Harakiri has.
 _OWN_BOX = "GTUNE"
 
 
 def rules(settings: RuleSettings) -> HarakiriRules:
-    """The mission rules; what the settings leave open is as on a board with its default settings."""
+    """The mission rules; missing settings are those of a board with its defaults."""
     radius_cm = USUAL_WP_RADIUS_CM if settings.wp_radius_cm is None else settings.wp_radius_cm
     return HarakiriRules(settings.capacity or USUAL_CAPACITY, radius_cm, settings.takeoff_max_m)
 
@@ -37,7 +37,7 @@ def _recognise_patched(board: Interview) -> Conversation[FlightController | None
     harakiri = yield from _recognise_unpatched(board)
     if harakiri is None:
         return None
-    # Asked last, and only of a Harakiri: to other boards this command number means something else.
+    # Sent last, and only to a Harakiri: on other boards this command number means something else.
     info = decode_info((yield from board.ask(MissionCommand.INFO, INFO_SIZE)).payload)
     if info is None:
         return None

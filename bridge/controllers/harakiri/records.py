@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records to items: what a Harakiri holds, as a ground station reads it."""
+"""Converts a Harakiri's records to items for ground stations."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -13,11 +13,11 @@ _UNKNOWN_COMMAND = 0
 
 
 def items_from_records(records: Iterable[WpRecord], sent_as: Mapping[int, int] = _NONE_KNOWN) -> list[MissionItem]:
-    """Return the read-back form of a stored list (docs/mission-rules.md, "Read-back").
+    """The items of a stored list (docs/mission-rules.md, "Read-back").
 
-    Frame 3, home frame 0. A region of interest carries the command number that `sent_as` (stored seq to MAV_CMD)
-    remembers, else 80. A record whose number is no WpCommand (ours) is shown as MAV_CMD 0, which no ground station
-    takes for something that flies and which the rules would drop, with the raw number as its param1.
+    Frame 3, home frame 0. A region of interest gets its command number from `sent_as` (stored seq to MAV_CMD), else
+    80. A record with an unknown WpCommand becomes MAV_CMD 0, with the raw number as its param1: no ground station
+    takes that for a flight command, and the rules would drop it (our own choice).
     """
     return [_item(seq, record, sent_as) for seq, record in enumerate(records)]
 

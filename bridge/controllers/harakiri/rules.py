@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Harakiri can hold, command by command: the table of docs/mission-rules.md."""
+"""Harakiri's mission rules by command: the table of docs/mission-rules.md."""
 
 import math
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ MAV_COMMANDS: Mapping[int, Command] = {
 }
 ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
 
-#: Of a board with its default settings; a patched one reports its own.
+#: The capacity with default settings; patched boards report theirs.
 USUAL_CAPACITY = 146
 USUAL_WP_RADIUS_CM = 200
 #: The user manual's limit; the firmware itself would take 255.
@@ -31,7 +31,7 @@ _MAX_RADIUS_M = 255
 
 
 class Place(Enum):
-    """Where a command may stand, in the list as received and in what is kept of it."""
+    """The allowed places of a command, in the list as received and as kept."""
 
     ANY = auto()
     ITEM_1 = auto()
@@ -49,9 +49,9 @@ CRUISE = Range(-32767, 32767, "-32767..32767", instead_of_zero=2)
 
 @dataclass(frozen=True, slots=True)
 class CommandRule:
-    """One row: what becomes of the fields of one command. param3 is 0 for every command.
+    """One row: the storable fields of one command. param3 is 0 for every command.
 
-    position: needed, else the item is dropped; if False, latitude and longitude are stored as 0.
+    position: required, else the item is dropped; if False, latitude and longitude are stored as 0.
     alone: False if the mission needs another command besides this one (and ROIs).
     """
 
@@ -66,17 +66,17 @@ class CommandRule:
 
     @property
     def name(self) -> str:
-        """Return the command's name as Mission Planner's list has it."""
+        """The command's name in Mission Planner's list."""
         return "ROI" if self.record is WpCommand.SETROI else self.record.name
 
     @property
     def needs_height(self) -> bool:
-        """Whether the item is faulty without a finite height; RETURN_TO_LAUNCH gets the least one."""
+        """True if the item needs a finite altitude; RETURN_TO_LAUNCH gets the lowest one instead."""
         return self.height is not UNUSED and self.record is not WpCommand.RETURN_TO_LAUNCH
 
 
 def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, CommandRule]:
-    """Return the table: MAV_CMD number to rule; a command without a rule cannot be stored.
+    """The table: MAV_CMD number to rule; a command without a rule cannot be stored.
 
     gps_wp_radius is rounded up to whole metres, so that no stored radius is smaller than it.
     """

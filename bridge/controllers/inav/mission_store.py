@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV: the list is in its memory until SAVE; what is not whole cannot be flown (docs/inav.md).
+"""INAV: the list is only in RAM until SAVE; an incomplete list cannot be flown (docs/inav.md).
 
-Its store holds up to nine missions, one behind the other, each ended by the flag LAST. Disarmed, all of them are
-counted and read; armed, only the loaded one. Record 1 wipes them all, so they are written again behind a new list.
+Its store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all of them are counted and read;
+armed, only the loaded one. Writing record 1 wipes them all, so they are written again behind a new list.
 """
 
 from collections.abc import Sequence
@@ -28,24 +28,24 @@ from protocols.msp.nav import (
 )
 
 _MAX_SAVES = 2
-#: Questions after SAVE: together they wait longer than its flash takes.
+#: Requests after SAVE: their timeouts together exceed its flash time.
 _ASKS_AFTER_SAVE = 4
 _MAX_READS = 2
 _SETTING_SIZE = 1
 
 
 class InavMissions(NavMissions):
-    """The mission store of one INAV. Record 1 wipes what is there, and no list is valid before its last record."""
+    """The mission store of one INAV. Record 1 wipes all missions, and no list is valid before its last record."""
 
     reads_armed = True
     _others: tuple[Mission, ...] = ()
-    #: Those of them that are written again behind a new list.
+    #: The other missions that are written again behind a new list.
     _kept: tuple[Mission, ...] = ()
     #: Records in the store before the loaded mission's first.
     _before_loaded = 0
     #: The number of the record that was compared last.
     _compared = 0
-    #: GETINFO's answer and the selected mission, as of the last reading or writing.
+    #: GETINFO's reply and the selected mission, as of the last read or write.
     _seen: tuple[NavInfo, int] | None = None
 
     @property
@@ -58,14 +58,14 @@ class InavMissions(NavMissions):
         return erased(self._others, self._profile.capacity - len(records or NOTHING))
 
     def push(self, records: Mission, progress: PushProgress) -> Conversation[PushResult[NavRecord]]:
-        """Put the list there, with the other missions behind it, and prove it."""
+        """Write the list, with the other missions behind it, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:
             self._others, self._before_loaded = self._kept, 0
         return result
 
     def pull(self) -> Conversation[Mission | None]:
-        """Read the loaded mission. One that is not whole is none; so is the single RTH of a cleared one."""
+        """Read the loaded mission. An incomplete one reads as empty, as does the single RTH of a cleared one."""
         for _ in range(_MAX_READS):
             seen = yield from self._look()
             if seen is None:
@@ -77,21 +77,21 @@ class InavMissions(NavMissions):
                 if record is None:
                     return None
                 records.append(record)
-            # It may have armed meanwhile, and numbers then count from the loaded mission's first record.
+            # If it armed meanwhile, numbers count from the loaded mission's first record.
             if (yield from self._look()) == seen:
                 self._take_over(split_missions(records), seen)
                 return self._known
         return None
 
     def is_current(self) -> Conversation[bool]:
-        """Ask GETINFO, and which mission is selected: the sticks or another client may have changed either."""
+        """Read GETINFO and the selected mission: the sticks or another client may have changed either."""
         seen = yield from self._look()
         if seen is None or seen != self._seen:
             return seen is None
         return (yield from self._has_same_records())
 
     def _has_same_records(self) -> Conversation[bool]:
-        """Compare the first record and one more, the next one each time: another list may have as many."""
+        """Compare the first record and one more, the next one each time: another list may have the same size."""
         if not self._known:
             return True
         self._compared = self._compared % len(self._known) + 1
@@ -103,7 +103,7 @@ class InavMissions(NavMissions):
         return True
 
     def reload(self) -> Conversation[bool | None]:
-        """INAV forgets its list at every restart, and keeps what it saved."""
+        """Load the saved mission: INAV's list in RAM is empty after a restart."""
         info = yield from self._info()
         if info is None or info.is_valid:
             return False
@@ -141,7 +141,7 @@ class InavMissions(NavMissions):
             raise Failed(PushFailure.REFUSED, is_final=False)
 
     def _keep(self) -> Conversation[None]:
-        """SAVE, and look again: the flight controller stands still meanwhile, and may have restarted."""
+        """SAVE, then verify again: the flight controller stalls meanwhile, and may have restarted."""
         before = yield from self._info()
         if before is None:
             raise Failed(PushFailure.UNCERTAIN)
@@ -158,7 +158,7 @@ class InavMissions(NavMissions):
         yield from self._load_first(before)
 
     def _load_first(self, saved: NavInfo) -> Conversation[None]:
-        """Until LOAD, INAV takes what was written for one long mission, whose last record decides about landing."""
+        """Until LOAD, INAV takes the written records for one long mission, whose last record decides about landing."""
         if self._kept:
             reply = yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             if reply is None or reply.direction is Direction.ERROR or (yield from self._info()) != saved:
@@ -168,12 +168,12 @@ class InavMissions(NavMissions):
     def _confirm(self, before: Mission | None) -> Conversation[Mission | None]:
         if (yield from self.is_current()):
             return before
-        # Another client wrote or loaded a list since: its other missions are to be kept, too.
+        # Another client has written or loaded a list since: its other missions must be kept, too.
         yield from self.pull()
         return None
 
     def _restore(self, before: Mission | None) -> Conversation[bool]:
-        """Have it LOAD what it saved; if that is not the old list, write that one again."""
+        """Make it LOAD the saved missions; if that is not the old list, write that one again."""
         if self._craft.is_armed():
             return False
         with suppress(LinkLost):
@@ -184,7 +184,7 @@ class InavMissions(NavMissions):
         return (yield from super()._restore(before))
 
     def _restore_at_once(self, before: Mission | None) -> Conversation[bool]:
-        """Have it LOAD what was saved last: the old list, unless another client wrote one and did not save it."""
+        """Make it LOAD the saved missions: the old list, unless another client wrote one without saving it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
             return bool(before) and (yield from self.is_current())
@@ -198,7 +198,7 @@ class InavMissions(NavMissions):
         return None
 
     def _look(self) -> Conversation[tuple[NavInfo, int] | None]:
-        """GETINFO, and which mission is selected, from 1: of a list that is not whole, none is."""
+        """GETINFO, and the number of the selected mission, from 1; of an incomplete list, none is selected."""
         info = yield from self._info()
         if info is None:
             return None

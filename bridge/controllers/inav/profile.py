@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV: how it is recognised, and what it can do."""
+"""INAV: its recognition and its profile."""
 
 from bridge.controllers.inav.mission_store import InavMissions
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS
@@ -15,7 +15,7 @@ from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
 from protocols.msp.nav import INFO_SIZE, Nav, decode_info
 
 _VARIANT = "INAV"
-#: Bytes of GETINFO that stay the same.
+#: The constant bytes of GETINFO.
 _LASTING_INFO = 2
 #: MultiWii's MULTITYPE for INAV's platform types: aeroplane, helicopter, tricopter. Others are shown as a quadrocopter.
 _MIXERS = {1: 14, 2: 15, 3: 1}
@@ -28,10 +28,10 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
         return None
     boxes = yield from board.boxes_by_id(_BOXES)
     controller = FlightController(PROFILE, PROFILE.name, boxes=boxes)
-    # The pilot may load another mission meanwhile: only the capacity cannot change.
+    # The pilot may load another mission meanwhile: only the capacity is constant.
     info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE, lasting=_LASTING_INFO)).payload)
     if info is None or not info.capacity or controller.arm_bit is None:
-        # Without an arm flag nothing would keep missions from being written in flight.
+        # Without an arm flag nothing would prevent a mission write in flight.
         return None
     platform = decode_platform((yield from board.ask(MIXER, MIXER_SIZE)).payload)
     mixer = _MIXERS.get(platform or 0)

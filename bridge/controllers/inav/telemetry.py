@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Readings that only INAV has: load, what keeps it from arming, battery percentage and cells (MSP v2)."""
+"""INAV's own readings: load, arming blockers, battery percentage and cells (MSP v2)."""
 
 from collections.abc import Mapping
 
@@ -27,7 +27,7 @@ def _inav_status(vehicle: Vehicle, payload: bytes, _controller: FlightController
 
 
 def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
-    """Without a battery it has no cells, and its percentage means nothing."""
+    """INAV_ANALOG. Without a battery the cell count is 0 and the percentage meaningless."""
     told = decode_inav_analog(payload)
     if told is None:
         return
@@ -40,7 +40,7 @@ def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController
 
 
 def _analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
-    """MSP_ANALOG: INAV_ANALOG has the battery in a finer scale."""
+    """MSP_ANALOG, for the signal strength; INAV_ANALOG has the battery in a finer scale."""
     told = decode_analog(payload)
     if told is not None:
         _hear_signal(vehicle, told.rssi, now)

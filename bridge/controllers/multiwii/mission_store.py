@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii 2.4 NAV: each record goes to EEPROM at once, the list ends with the first that says so (docs/inav.md)."""
+"""MultiWii 2.4 NAV: each record goes to EEPROM at once; the flag LAST ends the list (docs/inav.md)."""
 
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.line.conversation import Conversation
 from protocols.msp.nav import LAST, NavRecord
 
-#: Flags of what is no record: a wrong checksum in EEPROM, and erased EEPROM.
+#: Flags of invalid records: a wrong checksum in EEPROM, and erased EEPROM.
 _NO_RECORD = (0xFE, 0xFF)
-#: Action and flag of the answer while it flies a mission, whatever is asked.
+#: Action and flag of every reply while it flies a mission.
 _NAVIGATING = (0, 0xFF)
 
 
@@ -17,7 +17,7 @@ class MultiwiiMissions(NavMissions):
     _stores_slowly = True
 
     def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
-        """Read up to the last record. A list without one is none; so is the single RTH of a cleared one."""
+        """Read up to the last record. A list without one reads as empty, as does the single RTH of a cleared one."""
         records: list[NavRecord] = []
         known: tuple[NavRecord, ...] = ()
         for number in range(1, self._profile.capacity + 1):
@@ -36,7 +36,7 @@ class MultiwiiMissions(NavMissions):
         return known
 
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
-        """Write a single RTH first and the true record 1 last: what is cut off in between just flies home."""
+        """Write a single RTH first and the real record 1 last: a list interrupted in between only flies home."""
         first, *rest = enumerate(wanted, 1)
         return [(1, NOTHING[0]), *rest, first] if rest else [first]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii 2.4 with navigation: how it is recognised, and what it can do."""
+"""MultiWii 2.4 with navigation: its recognition and its profile."""
 
 from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.check import NavRules
@@ -12,7 +12,7 @@ from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
 
-#: IDENT's capability bit of a board that flies missions.
+#: IDENT's capability bit of boards that fly missions.
 _NAV_CAPABILITY = 1 << 4
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules for a mission list on INAV and MultiWii NAV (docs/inav.md): what a list becomes there, and why."""
+"""The rules for a mission list on INAV and MultiWii NAV (docs/inav.md)."""
 
 import math
 from collections.abc import Callable
@@ -38,17 +38,17 @@ from protocols.float32 import is_single
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord
 
-#: So high a single-precision number still holds a centimetre.
+#: The greatest height at which single precision still resolves a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
 _FULL_CIRCLE = 360
 _TURNS = (NavAction.SET_POI, NavAction.SET_HEAD)
-#: DO_CHANGE_SPEED, param3: none, no change, as set.
+#: DO_CHANGE_SPEED's param3 without a throttle: none, no change, as set.
 _NO_THROTTLE = (0, -1, -2)
 
 
 @dataclass(frozen=True, slots=True)
 class NavRules:
-    """The rules of one flight controller. others: the further missions in its store."""
+    """The rules of one flight controller. others: the other missions in its store."""
 
     profile: NavProfile
     others: tuple[Mission, ...] = ()
@@ -59,14 +59,14 @@ class NavRules:
         return self.profile.max_items
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "NavCheck":
-        """Begin a list."""
+        """Begin the check of a list."""
         return NavCheck(self.profile, count, fallback_home, self.others)
 
 
 class NavCheck(ListCheck):
     """The check of one list.
 
-    Home (item 0) is no record: these flight controllers take their own where they arm. It must be a WAYPOINT, as with
+    Home (item 0) is not stored: these flight controllers set their own where they arm. It must be a WAYPOINT, as in
     every list; without coordinates it is shown at `fallback_home`.
     """
 
@@ -123,7 +123,7 @@ class NavCheck(ListCheck):
         return None
 
     def _take(self, item: MissionItem, rule: NavRule) -> Rejection | None:
-        """Keep one item as a record; every value that does not survive becomes a finding."""
+        """Keep one item as a record; every value that cannot be stored becomes a finding."""
         if rule.position and (rejection := refuse_position(item)):
             return rejection
         if not math.isfinite(item.alt_m):
@@ -140,7 +140,7 @@ class NavCheck(ListCheck):
         if rejection := refuse_frame(item, needs_position=rule.position):
             return rejection
         p1 = self._hold(item) if rule.p1 is HOLD else self._fit(item, "p1", rule.p1)
-        # MAVLink gives these no meaning for an RTL or a ROI: nothing is lost.
+        # MAVLink gives these no meaning for an RTL or a ROI, so nothing is lost.
         news = News.NOTICE if rule.height in (Height.FLOWN, Height.APPROACH) else News.NONE
         for name in ("p2", "p3", "p4"):
             self._fit(item, name, UNUSED, news)
@@ -202,7 +202,7 @@ class NavCheck(ListCheck):
         return None
 
     def _take_jump(self, item: MissionItem) -> Rejection | None:
-        """Keep a place for the record: where it goes is known when all items are there."""
+        """Reserve a record; its target is known once all items have arrived."""
         if not (math.isfinite(item.p1) and item.p1 == math.trunc(item.p1) and 1 <= item.p1 < self._count):
             return reject(MissionResult.INVALID_PARAM1, item, "p1", "there is no such item to jump to")
         repeats = self._fit(item, "p2", REPEATS)
@@ -245,7 +245,7 @@ class NavCheck(ListCheck):
         return reject_list(MissionResult.INVALID, self._count, "no waypoint is left to fly to")
 
     def _cut(self, size: int, why: str) -> None:
-        """Leave out the last records, from place `size` on."""
+        """Drop the last records, from place `size` on."""
         for item in self._sent[size:]:
             self._drop(item, "command", item.command, why, News.WARNING)
         for place in range(size, len(self._records)):
@@ -253,7 +253,7 @@ class NavCheck(ListCheck):
         del self._records[size:], self._sent[size:]
 
     def _refuse_as_flown(self) -> Rejection | None:
-        """Reject a list that is flown otherwise than it reads, and warn of legs that are."""
+        """Reject a list that is flown differently than it reads, and warn about such legs."""
         if self._profile.jumps_back_only and (place := jump_within_jump(self._records)) is not None:
             why = "a jump within another's loop never ends"
             return reject(MissionResult.INVALID_PARAM1, self._sent[place], "p1", why)
@@ -270,7 +270,7 @@ class NavCheck(ListCheck):
         return None
 
     def _speed_differs(self, place: int, jump: MissionItem) -> bool:
-        """Whether a pilot expects another speed after a JUMP than its target's own."""
+        """True if a pilot expects another speed after a JUMP than its target's own."""
         record = self._records[place]
         target = record.p1 - 1
         if not (self._profile.leg_speed and record.p2):
@@ -296,13 +296,13 @@ class NavCheck(ListCheck):
     def _drop(
         self, item: MissionItem, name: str, was: float | None, why: str, news: News = News.NOTICE
     ) -> Rejection | None:
-        """Leave one item out, which rejects nothing."""
+        """Drop one item without rejecting the list."""
         self._jumps.dropped.add(item.seq)
         self._note(item, name, was, DROPPED, why, news)
         return None
 
     def _height(self, item: MissionItem, rule: NavRule) -> tuple[int, int]:
-        """Return centimetres, and the bit that says what they count from."""
+        """Centimetres, and the bit for their reference level."""
         if rule.height is Height.RTH and not self._profile.rth_height:
             self._fit(item, "alt_m", UNUSED)
             return 0, 0
@@ -324,7 +324,7 @@ class NavCheck(ListCheck):
         return alt_cm, 0
 
     def _flown_height(self, item: MissionItem, alt_cm: int, *, above_sea: bool) -> int:
-        """A leg is flown at whatever height it has, the ground included."""
+        """Replace 0 m, and warn about a leg at or below its reference level: it is flown as stored."""
         if alt_cm == 0 and not above_sea:
             self._note(item, "alt_m", item.alt_m, LEAST_HEIGHT_M, "0 m is not allowed", News.WARNING)
             return 100 * LEAST_HEIGHT_M
@@ -334,7 +334,7 @@ class NavCheck(ListCheck):
         return alt_cm
 
     def _unused(self, item: MissionItem, *names: str) -> None:
-        """Take note of values that mean nothing, in `names` and where a place would be: nothing is lost."""
+        """Note values without a meaning, in `names` and the coordinates; nothing is lost."""
         for name in (*names, "alt_m"):
             self._fit(item, name, UNUSED, News.NONE)
         self._no_position(item, News.NONE)

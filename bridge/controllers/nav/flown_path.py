@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What INAV and MultiWii make of a whole list in flight, where no single record shows it (docs/inav.md).
+"""Effects of a whole list in flight on INAV and MultiWii that no single record shows (docs/inav.md).
 
 Records are given by their place, from 0; a JUMP's p1 is a number, from 1.
 """
@@ -12,13 +12,13 @@ _ENDLESS = -1
 
 
 def flown_size(records: Sequence[NavRecord]) -> int:
-    """How many records are left without those behind an RTH that no jump leads to: the way home ends a mission."""
+    """The number of records without those behind an RTH that no jump reaches: an RTH ends a mission."""
     starts, end = {0}, -1
     while True:
         before, end = end, max(_reached(records, starts))
         if end == before:
             break
-        # A jump that is never flown must have a target, too, or INAV does not arm.
+        # A jump that is never flown needs a target, too, or INAV does not arm.
         starts |= {record.p1 - 1 for record in records[: end + 1] if record.action == NavAction.JUMP}
     return end + 1 if records[end].action == NavAction.RTH else len(records)
 
@@ -40,7 +40,7 @@ def _reached(records: Sequence[NavRecord], starts: set[int]) -> set[int]:
 
 
 def lands_after_rth(records: Sequence[NavRecord]) -> bool:
-    """Whether an INAV lands after any RTH of the list: its last record's p1 decides, whatever that record does.
+    """True if an INAV lands after any RTH of the list: the last record's p1 decides, whatever its action is.
 
     INAV keeps a JUMP's target as an index, so one to the first record counts as 0.
     """
@@ -49,7 +49,7 @@ def lands_after_rth(records: Sequence[NavRecord]) -> bool:
 
 
 def jump_within_jump(records: Sequence[NavRecord]) -> int | None:
-    """The place of a JUMP whose way back leads over another: MultiWii counts both with one counter, and never ends."""
+    """The place of a JUMP whose loop contains another: MultiWii counts both with one counter, and never ends."""
     jumps = [place for place, record in enumerate(records) if record.action == NavAction.JUMP]
     for outer in jumps:
         if any(records[outer].p1 - 1 <= inner < outer for inner in jumps):

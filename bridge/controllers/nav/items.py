@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records to items: what an INAV or a MultiWii NAV holds, as a ground station reads it.
+"""Converts the records of INAV and MultiWii NAV to items for ground stations.
 
-A leg's speed is shown as a DO_CHANGE_SPEED before it, so a list may have more items than records, and home (item 0) is
-none of them.
+A leg's speed is shown as a DO_CHANGE_SPEED before it, so a list may have more items than records. Home (item 0) has no
+record.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,7 +21,7 @@ _HIGHEST_HEADING = 359
 
 
 def home_item(place: tuple[int, int] | None, alt_m: float = 0.0) -> MissionItem:
-    """Return item 0: where home is, if that is known, degrees * 1e7."""
+    """Item 0: home, if known; `place` in degrees * 1e7."""
     lat_e7, lon_e7 = place or (0, 0)
     return MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, lat_e7, lon_e7, alt_m)
 
@@ -29,7 +29,7 @@ def home_item(place: tuple[int, int] | None, alt_m: float = 0.0) -> MissionItem:
 def items_from_records(
     records: Sequence[NavRecord], home: MissionItem, sent_as: Mapping[int, int] = _NONE_KNOWN
 ) -> tuple[MissionItem, ...]:
-    """Return the read-back form of a list; `sent_as`: a record's place (from 0) -> the MAV_CMD that it was sent as."""
+    """The items of a list; `sent_as`: a record's place (from 0) -> the MAV_CMD that it was sent as."""
     seqs = item_seqs(records)
     speeds = _shown_speeds(records)
     after = _speeds_after(records)
@@ -44,20 +44,20 @@ def items_from_records(
         elif target is None:
             items.append(_item(len(items), Command.DO_JUMP, p2=record.p2))
         else:
-            # To the change of speed before the leg, unless the leg is flown at the speed that holds at the jump.
+            # Jump to the speed change before the leg, unless the leg has the speed that is in force at the jump.
             is_same = leg_speed(records[target], after[place]) == after[place]
             items.append(_item(len(items), Command.DO_JUMP, p1=seqs[target] - (not is_same), p2=record.p2))
     return tuple(items)
 
 
 def item_seqs(records: Sequence[NavRecord]) -> list[int]:
-    """The item's number for each record, in their order."""
+    """The seq of each record's item."""
     speeds = _shown_speeds(records)
     return list(accumulate(2 if place in speeds else 1 for place in range(len(records))))
 
 
 def _shown_speeds(records: Sequence[NavRecord]) -> dict[int, int]:
-    """The speed in a DO_CHANGE_SPEED before a record, by its place: where it changes on any way that leads there."""
+    """The DO_CHANGE_SPEED before a record, by its place: wherever the speed changes on any path to it."""
     after = _speeds_after(records)
     shown = {place: speed for place, speed in enumerate(after) if speed != (after[place - 1] if place else 0)}
     for place, record in enumerate(records):
@@ -73,12 +73,12 @@ def _speeds_after(records: Iterable[NavRecord]) -> list[int]:
 
 
 def _jump_target(record: NavRecord, count: int) -> int | None:
-    """The place that a JUMP goes to; None if it is no JUMP, or goes nowhere."""
+    """The target place of a JUMP; None for other records and for invalid targets."""
     return record.p1 - 1 if record.action == NavAction.JUMP and 1 <= record.p1 <= count else None
 
 
 def leg_speed(record: NavRecord, before: int) -> int:
-    """Return the speed, cm/s, that holds after this record; 0: as set on the flight controller."""
+    """The speed in force after this record, cm/s; 0: as set on the flight controller."""
     match record.action:
         case NavAction.WAYPOINT | NavAction.LAND:
             speed = record.p1
@@ -111,7 +111,7 @@ def _shown(seq: int, record: NavRecord, sent_as: int | None) -> MissionItem:
         case NavAction.LAND:
             return _leg(seq, Command.NAV_LAND, record)
         case unknown:
-            # No ground station takes MAV_CMD 0 for something that flies, and the rules would drop it.
+            # No ground station takes MAV_CMD 0 for a flight command, and the rules would drop it.
             return _item(seq, _UNKNOWN_COMMAND, p1=unknown)
 
 

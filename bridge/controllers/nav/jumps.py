@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the JUMPs of a list go, as the flight controller counts: records from 1, without what was dropped or folded."""
+"""Resolves JUMP targets to the flight controller's numbers: records from 1, without dropped or merged items."""
 
 from dataclasses import dataclass, field, replace
 
@@ -7,16 +7,16 @@ from bridge.model.finding import Note, Rejection, reject
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import LEGS, NavRecord
 
-#: INAV does not arm with a JUMP to a nearer record (navigation.c, navigationIsBlockingArming).
+#: INAV does not arm with a JUMP to a closer record (navigation.c, navigationIsBlockingArming).
 _NEAREST = 2
 
 
 @dataclass(slots=True)
 class Jumps:
-    """What must be known of a list to aim its JUMPs.
+    """The state needed to resolve a list's JUMPs.
 
-    back_only: whether they may only go back. places: of each item, how many records there were when it came. dropped:
-    numbers of items that are left out. wanted: of each JUMP its record's place and the item.
+    back_only: True if they may only go back. places: for each item, the number of records before it. dropped: the
+    numbers of dropped items. wanted: for each JUMP, its record's place and the item.
     """
 
     back_only: bool
@@ -25,7 +25,7 @@ class Jumps:
     wanted: list[tuple[int, MissionItem]] = field(default_factory=list)
 
     def aim(self, records: list[NavRecord], note: Note) -> Rejection | None:
-        """Give each JUMP among `records` its target; refuse one with which the flight controller would not fly."""
+        """Set the target of each JUMP in `records`; rejects one that the flight controller would not fly."""
         for place, item in self.wanted:
             wanted = int(item.p1)
             target = self.places[wanted]

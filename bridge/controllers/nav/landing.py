@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a LAND lands that does not say so: ground stations send it without a place, or with height 0."""
+"""The place of a LAND that has none: ground stations send it without a position, or with altitude 0."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,9 +11,9 @@ from protocols.msp.nav import LEGS, NavRecord
 
 
 def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) -> MissionItem:
-    """Give a LAND the place and the height of the leg before, as far as it has none of its own.
+    """Fill in a LAND's missing position and altitude from the leg before.
 
-    INAV flies to the place at the height that LAND has: at height 0 it would do so through whatever stands there.
+    INAV flies there at the LAND's own altitude: at 0 m it would hit any obstacle.
     """
     before = next((record for record in reversed(records) if record.action in LEGS), None)
     if before is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""DO_CHANGE_SPEED on a flight controller whose legs each have a speed of their own."""
+"""DO_CHANGE_SPEED on flight controllers that store a speed with each leg."""
 
 import math
 from dataclasses import dataclass, field
@@ -18,28 +18,28 @@ _MAX_SPEED_CMS = 32767
 class LegSpeed:
     """cms: the speed of the legs that follow, cm/s; 0: as set on the flight controller.
 
-    waiting: the change of speed with which no leg is flown yet.
+    waiting: a change of speed that no leg follows yet.
     """
 
     cms: int = 0
     waiting: MissionItem | None = None
-    #: Numbers of the items that changed it, and the speed at each JUMP by its record's place.
+    #: The numbers of the items that changed the speed, and the speed at each JUMP by its record's place.
     changed_at: list[int] = field(default_factory=list)
     at_jump: dict[int, int] = field(default_factory=dict)
 
     def fault(self, item: MissionItem) -> tuple[str, float | None, str] | None:
-        """Tell why a change of speed is none: field, value, reason."""
+        """The fault of an invalid change of speed: field, value, reason."""
         if math.isfinite(item.p1) and item.p1 not in (0, GROUND_SPEED):
             return "p1", item.p1, "speed over ground only"
         return None
 
     @staticmethod
     def leaves_it(item: MissionItem) -> bool:
-        """Whether a change of speed means "leave it as it is"."""
+        """True if a change of speed means "no change"."""
         return not math.isfinite(item.p2) or (item.p2 <= 0 and item.p2 != AS_SET)
 
     def change(self, item: MissionItem, note: Note) -> None:
-        """Take one that has no fault."""
+        """Apply a valid change of speed."""
         self.waiting = item
         self.changed_at.append(item.seq)
         if item.p1 != GROUND_SPEED:

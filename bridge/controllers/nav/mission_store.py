@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a list is put on INAV and MultiWii NAV (docs/inav.md): record by record, each read back before the next is sent.
+"""Writes a list to INAV and MultiWii NAV (docs/inav.md): record by record, each read back before the next is sent.
 
-An answer to SET_WP does not mean that anything was stored, so nothing is believed but what is read. Nothing is sent to
-an armed flight controller: STATUS is asked before the first record and before the last one, with which the list becomes
-one that can be flown, and watched in between.
+A reply to SET_WP does not mean that the record was stored, so only read-back counts. Nothing is sent to an armed
+flight controller: STATUS is requested before the first record and before the last one, which makes the list flyable,
+and watched in between.
 """
 
 from abc import ABC, abstractmethod
@@ -31,20 +31,20 @@ from protocols.msp.nav import (
 )
 from protocols.msp.telemetry import decode_status
 
-#: There is no empty list to write: this is what is there instead.
+#: The replacement for an empty list, which cannot be written.
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
 _STATUS_PAYLOAD = 11
 _TRIES = 5
-#: How often one push may begin anew, because something else is read than was written.
+#: Restarts of one push after a read-back mismatch.
 _MAX_BEGINS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class NavCraft:
-    """What a dialect must know of the craft.
+    """The state of the craft that a dialect needs.
 
-    arm_mask: the bit of the box ARM in STATUS. is_armed: as last heard, None while it is not known. home: where it says
-    that home is, and position: the same, or where it stands; degrees * 1e7, None while it is not known.
+    arm_mask: the bit of the box ARM in STATUS. is_armed: as last heard, None if unknown. home: as reported by it;
+    position: home, or else its present position; degrees * 1e7, None if unknown.
     """
 
     arm_mask: int
@@ -54,7 +54,7 @@ class NavCraft:
 
 
 class Failed(Exception):
-    """An attempt is over; `is_final`: no other would do better."""
+    """An attempt has failed; `is_final`: a retry would not help."""
 
     def __init__(self, failure: PushFailure, *, is_final: bool = True) -> None:
         super().__init__(failure.value)
@@ -65,27 +65,27 @@ class Failed(Exception):
 class NavMissions(OneMission, ABC):
     """The mission store of one flight controller."""
 
-    #: Whether it stands still while it stores a record.
+    #: True if storing a record stalls it.
     _stores_slowly = False
 
     def __init__(self, profile: NavProfile, craft: NavCraft) -> None:
         self._profile = profile
         self._craft = craft
-        #: What is on the flight controller, as last read from it; None: something that cannot be flown, or not known.
+        #: The flight controller's list, as last read; None: unknown, or one that cannot be flown.
         self._known: tuple[NavRecord, ...] | None = None
 
     @property
     def wp_radius_cm(self) -> int | None:
-        """It is a setting of its own that is neither asked for nor set from here."""
+        """Not supported."""
         return None
 
     def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
-        """Set nothing."""
+        """Not supported."""
         yield from pause(0.0)
         return None
 
     def report(self) -> Conversation[StoreReport | None]:
-        """Tell whether it would take a list; what it holds is not known without reading it."""
+        """Its state from telemetry; the stored list is unknown until it is read."""
         armed = yield from self._ask_armed()
         if armed is None:
             return None
@@ -95,11 +95,11 @@ class NavMissions(OneMission, ABC):
         return NavRules(self._profile)
 
     def items(self, records: Sequence[NavRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """Return what a ground station reads of a list; of none, nothing."""
+        """A list as a ground station reads it; an empty one has no items, not even home."""
         return items_from_records(records, home_item(self._craft.position()), sent_as) if records else ()
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Show home where the flight controller has it; before it has one, where it was sent, if that is known."""
+        """Home as on the flight controller; before it has one, as sent, if known."""
         if not items:
             return items
         is_known = bool(items[0].lat_e7 and items[0].lon_e7)
@@ -107,13 +107,13 @@ class NavMissions(OneMission, ABC):
         return items if home is None else (replace(items[0], lat_e7=home[0], lon_e7=home[1]), *items[1:])
 
     def seq_of(self, records: Sequence[NavRecord], number: int) -> int:
-        """Return the number of the item that record `number` is shown as; 0: there is none."""
+        """The seq of the item for record `number`; 0: none."""
         return item_seqs(records)[number - 1] if 1 <= number <= len(records) else 0
 
     def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult[NavRecord]]:
-        """Put the list there and prove it; after a failure put back what was there, if that is known."""
+        """Write the list and verify it; after a failure restore the old list, if known."""
         before, self._known = self._known, None
-        # What to say if the link is lost now.
+        # The result if the link is lost now.
         failure = PushFailure.NO_ANSWER
         writing = False
 
@@ -125,7 +125,7 @@ class NavMissions(OneMission, ABC):
         try:
             yield from self._make_sure_disarmed()
             before = yield from self._confirm(before)
-            # Until the first record is read back it may have come, and wiped the old list, or not.
+            # Until the first record is read back, it may or may not have wiped the old list.
             failure, writing = PushFailure.UNCERTAIN, True
             yield from self._write_surely(self._store_content(records or NOTHING), proven)
             failure, writing = PushFailure.UNCERTAIN, False
@@ -148,27 +148,27 @@ class NavMissions(OneMission, ABC):
 
     @abstractmethod
     def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
-        """Read the list that is there; None if that fails."""
+        """Read the list; None if that fails."""
 
     @abstractmethod
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
-        """Return what is written, in order, with its number: at no moment can half a list be flown."""
+        """The records to write, in order, with their numbers: half a list must never be flyable."""
 
     @abstractmethod
     def _keep(self) -> Conversation[None]:
-        """Do what has to be done after the last record; raises Failed."""
+        """Make the list permanent after the last record; raises Failed."""
 
     def _store_content(self, records: tuple[NavRecord, ...]) -> tuple[NavRecord, ...]:
-        """All that must be written so that `records` are flown, and nothing else is lost."""
+        """All records to write so that `records` are flown, and nothing else is lost."""
         return records
 
     def _confirm(self, before: tuple[NavRecord, ...] | None) -> Conversation[tuple[NavRecord, ...] | None]:
-        """The old list; None if another client has changed it since it was read, as far as that can be asked."""
+        """The old list; None if another client has detectably changed it since it was read."""
         yield from ()
         return before
 
     def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
-        """Put the old list back if that takes no time; tell whether it is there."""
+        """Restore the old list if that takes no time; True if it is there."""
         yield from ()
         return False
 
@@ -190,7 +190,7 @@ class NavMissions(OneMission, ABC):
                 raise Failed(PushFailure.ARMED)
             frame = _frame(number, record)
             if self._stores_slowly and (yield from self.read(number)) == record:
-                # A ground station that gave up waiting is sent the same list again: then this is quick.
+                # A ground station that timed out may send the same list again: then this is quick.
                 progress(done)
                 continue
             reply = yield from ask(frame, Nav.SET_WP, 0, tries=_TRIES, exclusive=self._stores_slowly)
@@ -203,11 +203,11 @@ class NavMissions(OneMission, ABC):
         yield from self._prove(len(wanted))
 
     def _prove(self, count: int) -> Conversation[None]:
-        """Make sure of what no single record tells; raises Failed."""
+        """Verify what single records do not show; raises Failed."""
         yield from ()
 
     def _compare(self, number: int, record: NavRecord) -> Conversation[None]:
-        """Read what was written; once more if it differs: the checksum of 8 bits lets some damage through."""
+        """Read a record back; once more if it differs: the 8-bit checksum misses some damage."""
         for _ in range(2):
             held = yield from self.read(number)
             if held is None:
@@ -217,7 +217,7 @@ class NavMissions(OneMission, ABC):
         raise Failed(PushFailure.REFUSED, is_final=False)
 
     def read(self, number: int) -> Conversation[NavRecord | None]:
-        """Read one record; answers that are about another one (home is asked for by telemetry) are left alone."""
+        """Read one record; ignores replies about other ones (telemetry polls home)."""
         for _ in range(_TRIES):
             yield from send(encode_read_wp(number), Nav.WP, WP_SIZE)
             while True:
@@ -230,7 +230,7 @@ class NavMissions(OneMission, ABC):
         return None
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
-        """Write the old list again, if it is known and there was one; tell whether it is there."""
+        """Write the old list again, if known; True if it is there."""
         if not before or self._craft.is_armed():
             return False
         try:
@@ -255,12 +255,12 @@ class NavMissions(OneMission, ABC):
 
 
 def _frame(number: int, record: NavRecord) -> bytes:
-    """Encode; what crashes the flight controller may have been put there by others, and is not written back."""
+    """Encode SET_WP. A record that crashes the flight controller (another client may have written it) is not sent."""
     try:
         return encode_set_wp(number, record)
     except UnsafeRecord as unsafe:
         raise Failed(PushFailure.UNSAFE) from unsafe
 
 
-#: What is told instead, if the old list is not there any more.
+#: The failures to report instead if the old list is lost.
 _UNRESTORED = {PushFailure.ARMED: PushFailure.ARMED_MEANWHILE}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What INAV and MultiWii NAV can hold, command by command: the table of docs/inav.md."""
+"""The mission rules of INAV and MultiWii NAV by command: the table of docs/inav.md."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from bridge.missions.value_range import UNUSED, Range
 from protocols.mission_item import Command
 from protocols.msp.nav import NavAction
 
-#: POSHOLD_TIME with this time stands for a hold without end, which INAV does not know: nine hours.
+#: The time of a POSHOLD_TIME that replaces an endless hold, which INAV lacks: nine hours.
 ENDLESS_S = 32767
-#: Records that fit: on every INAV, and on the navigation build of MultiWii, whose board reports it.
+#: The capacity in records: of every INAV, and of MultiWii's navigation build, whose boards report theirs.
 INAV_CAPACITY = 120
 MULTIWII_CAPACITY = 178
-#: Speeds below this are none to INAV, cm/s.
+#: INAV ignores lower speeds, cm/s.
 LEAST_SPEED_CMS = 50
-#: Metres above home that a height of 0 becomes.
+#: The height above home that replaces 0, metres.
 LEAST_HEIGHT_M = 2
 HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
 ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
@@ -24,14 +24,13 @@ ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI
 
 @dataclass(frozen=True, slots=True)
 class NavProfile:
-    """What two relatives do not have in common.
+    """The differences between INAV and MultiWii NAV.
 
-    capacity: records that fit; home is none of them. endless_hold: action and p1 of a hold without end. sea_level:
-    whether a height may count from mean sea level. leg_speed: whether a leg may have a speed of its own. rth_height:
-    whether the way home may have a height. jumps_back_only: whether a JUMP must go back, and its loop hold no other;
-    else it may go to any leg that is not next to it. longest_hold: seconds. ends_on_any_record: whether it notices the
-    end of a list on a SET_POI or SET_HEAD. own_rth_landing: whether an RTH's own p1 decides if it lands; else the last
-    record's p1 does.
+    capacity: records, without home. endless_hold: action and p1 of an endless hold. sea_level: altitudes may refer to
+    mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
+    must go back, and its loop contain no other; else it may go to any leg not next to it. longest_hold: seconds.
+    ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
+    decides if it lands; else the last record's p1 does.
     """
 
     name: str
@@ -77,7 +76,7 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         leg_speed=False,
         rth_height=True,
         jumps_back_only=True,
-        # It counts 1000 * seconds in 16 bits.
+        # It counts milliseconds in 16 bits.
         longest_hold=Range(0, 65, "it holds at most 65 s"),
         ends_on_any_record=False,
         own_rth_landing=True,
@@ -85,14 +84,14 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
 
 
 class Height(Enum):
-    """What a command's height is."""
+    """The meaning of a command's altitude."""
 
     FLOWN = auto()
-    #: The way home's, where it may have one.
+    #: The altitude of an RTH, if the firmware has one.
     RTH = auto()
-    #: Where the landing begins; 0, as planners have it, is the height of the leg before.
+    #: The start of the landing; 0, as planners send it, means the altitude of the leg before.
     APPROACH = auto()
-    #: Stored, and flown by nothing.
+    #: Stored but not flown.
     POINT = auto()
 
 
@@ -102,7 +101,7 @@ REPEATS = Range(-1, 32767, "repeats -1..32767")
 
 @dataclass(frozen=True, slots=True)
 class NavRule:
-    """One row. p1: what the first parameter can hold. position: needed; if False, none is kept."""
+    """One row. p1: the range of the first parameter. position: required; if False, none is kept."""
 
     name: str
     p1: Range
@@ -111,7 +110,7 @@ class NavRule:
 
 
 _ROI = NavRule("ROI", UNUSED, True, Height.POINT)
-#: Commands that become a record of their own with nothing but these fields. `check` in this package has the others:
+#: Commands that become one record with only these fields. nav/check.py handles the others:
 #: CONDITION_YAW, DO_SET_ROI_NONE, DO_JUMP, DO_CHANGE_SPEED.
 NAV_RULES: Mapping[int, NavRule] = {
     Command.NAV_WAYPOINT: NavRule("WAYPOINT", HOLD, True, Height.FLOWN),

@@ -10,7 +10,7 @@ Mission = tuple[NavRecord, ...]
 
 
 def split_missions(records: Sequence[NavRecord]) -> list[Mission]:
-    """The missions of a store; records behind the last flag belong to none."""
+    """The missions in a store; records behind the last flag belong to none."""
     missions: list[Mission] = []
     start = 0
     for end, record in enumerate(records, 1):
@@ -21,12 +21,12 @@ def split_missions(records: Sequence[NavRecord]) -> list[Mission]:
 
 
 def flown(missions: Sequence[Mission], selected: int) -> Mission:
-    """The mission with that number, from 1. INAV takes the first one if there is none."""
+    """The mission with that number, from 1; the first one if there is none, as INAV does."""
     if not missions:
         return ()
     return missions[selected - 1 if 1 <= selected <= len(missions) else 0]
 
 
 def erased(others: Sequence[Mission], room: int) -> tuple[Mission, ...]:
-    """The last of `others`, as many as do not fit into `room` records: the order of those before them stays."""
+    """The last of `others`, as many as do not fit into `room` records; the order of the rest is kept."""
     return tuple(mission for mission, end in zip(others, accumulate(map(len, others)), strict=True) if end > room)
