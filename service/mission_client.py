@@ -4,8 +4,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from pymavlink import mavutil
-
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mission_messages import item_from_int_message, item_message
 from protocols.mission_item import MissionItem, MissionResult
@@ -67,6 +65,8 @@ class MissionClient:
 @contextmanager
 def connect(host: str, port: int, patience_s: float) -> Iterator[MissionClient]:
     """Connect to the vehicle behind a UDP port; ClientError if no heartbeat arrives in time."""
+    from pymavlink import mavutil  # with numpy and every dialect: --help does without
+
     link = mavutil.mavlink_connection(f"udpout:{host}:{port}", source_system=255, source_component=190)
     try:
         for _ in range(max(int(patience_s / 0.2), 1)):
