@@ -1,31 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# `make demo` shows the main job on a simulated flight controller, `make test` proves it. Both set up what they need in
-# .venv, from python3 >= 3.11 with venv and from make: every package is pinned by its hash, and none needs a compiler.
+# `make demo` shows the main job on a simulated flight controller, `make test` runs the tests. Both set up their
+# dependencies in .venv, given python3 >= 3.11 with venv, and make. All packages are pinned by hash; none needs a compiler.
 #
 #   make demo           run the demonstration, and stay up for Mission Planner to connect
-#   make demo ONCE=1    the same, but end there
+#   make demo ONCE=1    the same, but exit afterwards
 #   make test           run all tests (ARGS="tests/storage -x" runs some)
 #   make lint           check style, format and types
 #   make bench          measure speed and memory
-#   make pictures       take the docs' pictures of the status page
+#   make pictures       retake the docs' pictures of the status page
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts)
-#   make soak           run the daemon through everything for half an hour (MINUTES=10: for ten; SOAK_SEED=7: otherwise)
-#   make fuzz           feed the bridge anything, 20,000 examples of up to 20 inputs for each way in (EXAMPLES=500000)
+#   make soak           run the daemon through all kinds of events for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
+#   make fuzz           feed the bridge random input, 20,000 examples of up to 20 inputs per interface (EXAMPLES=500000)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
-#   make message-table  write protocols/mavlink/message_table.py anew, from pymavlink's definitions
-#   make cli-page    write docs/cli.md anew
-#   make rules-page   write the table of docs/mission-rules.md anew, from the rules
-#   make inav-page   write the table of docs/inav.md anew
-#   make config-sample  write systemd/config.toml and the keys of docs/configuration.md anew
-#   make zenoh-schemas  write service/zenoh_link/schemas/ anew, from the types that the payloads are made of
-#   make clean          remove everything that the above have made
+#   make message-table  regenerate protocols/mavlink/message_table.py from pymavlink's definitions
+#   make cli-page       regenerate docs/cli.md
+#   make rules-page     regenerate the table of docs/mission-rules.md from the rules
+#   make inav-page      regenerate the table of docs/inav.md
+#   make config-sample  regenerate systemd/config.toml and the keys of docs/configuration.md
+#   make zenoh-schemas  regenerate service/zenoh_link/schemas/ from the payload types
+#   make clean          remove all generated files that are not in git
 
 PYTHON ?= python3
 UV ?= uv
-# Most tests wait for programs: two cores have time for four at once.
+# Most tests wait for programs, so two cores can run four at once.
 JOBS ?= 4
 VENV := .venv
 BIN := $(VENV)/bin
@@ -33,10 +33,10 @@ BIN := $(VENV)/bin
 .NOTPARALLEL:
 .PHONY: rules-page demo test lint bench pictures real-board soak fuzz deb deb-trial image-check lock message-table config-sample cli-page inav-page zenoh-schemas clean
 
-# Installed if they are missing and this is root, as the compilers of firmware/ are; systemd judges its unit.
+# Installed if missing and if run as root, like the compilers of firmware/; systemd checks its own unit.
 BROWSER_PACKAGES := chromium chromium-driver
 BROWSER := { command -v chromium && command -v chromedriver; } >/dev/null
-# Where the Debian package is installed for its tests: needs leave to make namespaces, which some containers refuse.
+# For tests of the installed Debian package: needs permission to create namespaces, which some containers lack.
 BARE_ROOT := { $(BIN)/python tests/service/bare_root.py; } >/dev/null 2>&1
 IN_BARE_ROOT := tests/service/test_debian_package.py::test_in_a_bare_root
 INSTALL = if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
@@ -65,7 +65,7 @@ lint: $(VENV)/.test-ready
 bench: $(VENV)/.test-ready
 	$(BIN)/python -m benchmarks $(ARGS)
 
-# The pictures of the status page in the docs, taken by what tests it.
+# The docs' pictures of the status page, taken by its tests.
 pictures: $(VENV)/.test-ready
 	PYTHONPATH=.:tests/e2e:tests/web $(BIN)/python tests/web/take_pictures.py
 
@@ -89,8 +89,8 @@ deb-trial: deb
 image-check: deb
 	deb/trial dist/naze-bridge_*_$(ARCH).deb deb/first-hour-inside $(SUITE)
 
-# The project itself is installed editable: what is edited is what runs. Its build backend comes from the lock, too;
-# --no-deps because pip would miss what the lock leaves out on purpose (pyproject.toml, tool.uv).
+# The project itself is installed editable, so that edits take effect. Its build backend comes from the lock, too;
+# --no-deps because pip would complain about packages deliberately left out of the lock (pyproject.toml, tool.uv).
 PIP_INSTALL = $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-deps
 define set_up
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
@@ -116,7 +116,7 @@ lock:
 	$(PIN) --output-file requirements.lock
 	$(PIN) --constraint requirements.lock --group test --group lint --output-file requirements-dev.lock
 
-# First to another file: the module that writes it imports the present one.
+# Through a temporary file: the generator imports the present one.
 message-table: $(VENV)/.test-ready
 	$(BIN)/python -m protocols.mavlink.make_message_table > $(VENV)/message_table.py
 	mv $(VENV)/message_table.py protocols/mavlink/
@@ -124,13 +124,13 @@ message-table: $(VENV)/.test-ready
 cli-page: $(VENV)/.test-ready
 	$(BIN)/python -m service.cli.cli_page > docs/cli.md
 
-# The table of what becomes of each command on INAV and MultiWii.
+# The table of INAV's and MultiWii's treatment of each command.
 inav-page: $(VENV)/.test-ready
 	PYTHONPATH=. $(BIN)/python tests/simulator/nav_rows.py > docs/inav.table
 	sed -i -e '/begin: make inav-page/,/end: make inav-page/{/make inav-page -->/!d}' -e '/begin: make inav-page/r docs/inav.table' docs/inav.md
 	rm docs/inav.table
 
-# The table of what Harakiri stores of each command.
+# The table of Harakiri's records for each command.
 rules-page: $(VENV)/.test-ready
 	$(BIN)/python -m bridge.controllers.harakiri.rules_page > docs/rules.table
 	sed -i -e '/begin: make rules-page/,/end: make rules-page/{/make rules-page -->/!d}' \

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m benchmarks [NAME...]`: measure, print a table, keep it as JSON; exit 1 if a promise is broken."""
+"""`python -m benchmarks [NAME...]`: measures, prints a table, saves it as JSON; exits 1 if a limit is exceeded."""
 
 import logging
 import os
@@ -28,7 +28,7 @@ _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
 
 
 def main() -> int:
-    """Run the benchmarks that were named, or all; return the exit status."""
+    """Run the named benchmarks, or all; returns the exit status."""
     names = sys.argv[1:] or list(_BENCHMARKS)
     unknown = [name for name in names if name not in _BENCHMARKS]
     if unknown:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Streams of MAVLink frames with damage of one kind in them."""
+"""Streams of MAVLink frames with one kind of damage."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _SIGNATURE_SIZE = 13
 
 
 class Damage(Enum):
-    """What happens to a frame, or before it."""
+    """The kind of damage to a frame, or before it."""
 
     NOISE = "noise"
     FAKE_HEADER = "fake header"
@@ -24,14 +24,14 @@ class Damage(Enum):
 
 @dataclass(frozen=True, slots=True)
 class DamagedStream:
-    """`pieces` is what is on the line, one for each frame with its damage; `intact` are the frames that are whole."""
+    """`pieces`: the bytes on the line, one piece per frame with its damage; `intact`: the undamaged frames."""
 
     pieces: list[bytes]
     intact: list[bytes]
 
 
 def damaged_stream(frames: Sequence[bytes], damage: Damage, share: float, chance: Random) -> DamagedStream:
-    """Let `damage` happen to a share (0..1) of the frames."""
+    """Apply `damage` to a share (0..1) of the frames."""
     pieces, intact = [], []
     for frame in frames:
         if chance.random() >= share:
@@ -68,5 +68,5 @@ def _header_size(frame: bytes) -> int:
 
 
 def _checked_size(frame: bytes) -> int:
-    """Return the size without a signature: nobody without its key can see a flipped bit in that."""
+    """The frame's size without a signature: only the key's owner can notice a flipped bit in that."""
     return _header_size(frame) + frame[1] + _CRC_SIZE

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One measured figure, what the machine could do at best, and what was promised."""
+"""One measured figure, with the machine's own floor and the promised limit."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """The least that the figure could be here and now, in the figure's unit, and what that is the cost of."""
+    """The lowest value possible on this machine, in the figure's unit, and what it measures."""
 
     value: float
     of: str
@@ -14,10 +14,10 @@ class Floor:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A smaller value is a better one.
+    """A measured value; smaller is better.
 
-    `limit` is the greatest value that keeps the promise, in `unit`, or a multiple of the floor if `times_floor`;
-    None is a figure that explains another one and promises nothing.
+    `limit` is the greatest allowed value, in `unit`, or a multiple of the floor if `times_floor`; None for a figure
+    that only explains another one.
     """
 
     name: str
@@ -34,6 +34,6 @@ class Figure:
 
     @property
     def is_missed(self) -> bool:
-        """Whether a promise is broken."""
+        """True if the limit is exceeded."""
         judged = self.ratio if self.times_floor else self.value
         return self.limit is not None and judged is not None and judged > self.limit

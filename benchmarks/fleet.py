@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fleet of 5 and of 50 through one router: `fleet list`, `fleet push` to all, and what one more vehicle costs.
+"""A fleet of 5 and of 50 through one router: `fleet list`, `fleet push` to all, and the cost of each further vehicle.
 
-Each vehicle is the daemon itself (`naze-bridge run`) in a process of its own, with the simulated Naze within it, which
-keeps the pace of a UART. The router is a zenoh session in router mode, in a process of its own, too. What is timed are
-whole commands, from their start to their end, as a person waits for them; the floor is a Python that opens a zenoh
-session and leaves.
+Each vehicle is a daemon (`naze-bridge run`) in its own process, with the simulated Naze inside, which keeps the pace of
+a UART. The router is a zenoh session in router mode in another process. Whole commands are timed, from start to exit;
+the floor is a Python program that only opens and closes a zenoh session.
 """
 
 import json
@@ -37,7 +36,7 @@ _OPEN_AND_LEAVE = f"{_OPEN}; c.insert_json5('connect/endpoints', json.dumps([sys
 
 @dataclass(frozen=True, slots=True)
 class _Cost:
-    """What a fleet costs. Times in seconds; CPU in percent of one core: the router's, and all vehicles' together."""
+    """The cost of a fleet. Times in seconds; CPU in percent of one core: the router's, and all vehicles' together."""
 
     list_s: float
     push_s: float
@@ -47,7 +46,7 @@ class _Cost:
 
 
 def measure() -> list[Figure]:
-    """Measure both fleets; the first vehicles of the greater one are the smaller one."""
+    """Measure both fleets; the larger one contains the smaller one."""
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
         endpoint, router = stack.enter_context(router_program(folder))
@@ -74,7 +73,7 @@ def measure() -> list[Figure]:
 
 
 def _each(name: str, few: float, many: float) -> Figure:
-    """Make a figure of a cost for each of many vehicles, as a multiple of that for each of few."""
+    """Make a figure of the cost per vehicle of the larger fleet, as a multiple of that of the smaller one."""
     floor = Floor(few / _FEW, f"the same among {_FEW}")
     return Figure(f"{name} among {_MANY}", many / _MANY, "% of a core", floor, 1.5, times_floor=True)
 
@@ -121,7 +120,7 @@ def _wait_for_vehicles(endpoint: str, count: int) -> None:
 
 @contextmanager
 def _vehicle(folder: Path, number: int, endpoint: str) -> Iterator[int]:
-    """Run a daemon on a simulated Naze that takes commands; yield its process id."""
+    """Run a daemon on a simulated Naze, with commands enabled; yields its process id."""
     own = folder / f"naze-{number}"
     own.mkdir()
     config = configuration(own, f"naze-{number}", endpoint)

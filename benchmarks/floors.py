@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The floors that need a program of their own: `python -m benchmarks.floors echo`, or `... poll LINK`.
+"""The floors that need their own program: `python -m benchmarks.floors echo`, or `... poll LINK`.
 
 echo        sends every UDP datagram back; prints its port
 poll LINK   asks a flight controller what the idle daemon asks it, as often, and looks at nothing that comes back

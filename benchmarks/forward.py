@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MAVLink passed on from the flight controller to a ground station: CPU time a message, latency, losses.
+"""Forwarding MAVLink from the flight controller to a ground station: CPU time per message, latency, losses.
 
-Each forwarder has a pseudo-terminal and a UDP port of its own; flight controller and ground station are this process.
-They take turns, round by round, so that each sees the same moods of the machine. Two placements: all on one CPU, where
-the promises are judged, and the forwarder on a CPU of its own, as it would run: there each wake-up costs more.
+Each forwarder has its own pseudo-terminal and UDP port; flight controller and ground station are this process. The
+forwarders take turns, so that all see the same load of the machine. Two placements: all on one CPU, where the limits
+apply, and the forwarder on its own CPU, as in practice: there each wake-up costs more.
 """
 
 import os
@@ -24,14 +24,14 @@ _RATES: dict[str, float | None] = {"500/s": 500.0, "3000/s": 3000.0, "unpaced": 
 _JUDGED = "3000/s"
 _SETTLING_S = 0.5
 _WATCHED_S = 2.0
-#: What may be spent, as multiples of what others spend.
+#: The limits, as multiples of other forwarders' figures.
 _LIMITS = {FLOOR: 2.0, MAVP2P: 1 / 3, MAVPROXY: 1 / 20}
 _MAX_P99_MS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """One forwarder at one rate: CPU time in microseconds a message, latency in ms."""
+    """One forwarder at one rate: CPU time in microseconds per message, latency in ms."""
 
     cpu_us: float
     p99_ms: float
@@ -43,7 +43,7 @@ _Runs = dict[tuple[str, str], list[_Run]]
 
 
 def measure() -> list[Figure]:
-    """Measure all forwarders that this machine has, on one CPU and, if there are two, apart."""
+    """Measure all forwarders on this machine, on one CPU and, if there are two, on separate ones."""
     peers = forwarders()
     for name in _LIMITS.keys() - {peer.name for peer in peers}:
         print(f"  without {name}: it is not on this machine")
@@ -56,7 +56,7 @@ def measure() -> list[Figure]:
 
 
 def _judged(runs: _Runs) -> list[Figure]:
-    """Return our figures on one CPU, beside those of each other forwarder."""
+    """Our figures on one CPU, with those of each other forwarder."""
     return [figure for rate in _RATES for figure in _at(rate, runs)]
 
 
@@ -94,7 +94,7 @@ def _lost(runs: Sequence[_Run]) -> int:
 
 
 def _rounds(peers: Sequence[Forwarder], cpu: int, count: int) -> _Runs:
-    """Let all take turns, so many times, each on that CPU."""
+    """Run all in turns, several rounds, each on that CPU."""
     runs: _Runs = defaultdict(list)
     for _ in range(count):
         for peer in peers:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs that pass MAVLink on from a terminal to UDP: ours, the floor, and what others use."""
+"""Programs that forward MAVLink from a terminal to UDP: ours, the floor, and other projects'."""
 
 import os
 import shutil
@@ -15,20 +15,20 @@ from benchmarks.processes import ROOT, daemon, running
 
 OURS, FLOOR, MAVPROXY, MAVP2P = "naze-bridge", "C floor", "MAVProxy", "mavp2p"
 _SPEED = 57600
-#: Start in a folder, on a line; the process id.
+#: Starts a forwarder in a folder, on a line; yields its process id.
 _Start = Callable[[Path, Line], AbstractContextManager[int]]
 
 
 @dataclass(frozen=True, slots=True)
 class Forwarder:
-    """`start` runs it in a folder of its own, on a line; yields its process id."""
+    """`start` runs it in its own folder, on a line; yields its process id."""
 
     name: str
     start: _Start
 
 
 def forwarders() -> list[Forwarder]:
-    """Return those that this machine has: the floor needs cc, mavp2p is looked for as $MAVP2P and on the path."""
+    """The forwarders on this machine: the floor needs cc; mavp2p is looked for as $MAVP2P and on the path."""
     found = [Forwarder(OURS, _naze_bridge), Forwarder(MAVPROXY, _mavproxy)]
     if shutil.which("cc"):
         found.insert(0, Forwarder(FLOOR, _floor))
@@ -38,7 +38,7 @@ def forwarders() -> list[Forwarder]:
 
 
 def cpu_s(pid: int) -> float:
-    """Return the CPU time that a process and its threads have had, user and system."""
+    """The CPU time of a process and its threads, user and system, seconds."""
     tasks = [task for task in Path(f"/proc/{pid}/task").iterdir() if task.is_dir()]
     return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e9
 
@@ -60,7 +60,7 @@ def _naze_bridge(folder: Path, line: Line) -> Iterator[int]:
 
 @contextmanager
 def _mavproxy(folder: Path, line: Line) -> Iterator[int]:
-    """As it comes, with the modules that it loads by itself."""
+    """The daemon with its default modules."""
     program = [sys.executable, str(Path(sys.executable).parent / "mavproxy.py"), "--daemon"]
     link = [f"--master={line.tty}", f"--baudrate={_SPEED}", f"--out=127.0.0.1:{line.port}", "--mav20"]
     with running([*program, *link, f"--state-basedir={folder}"], folder / "mavproxy.log") as process:

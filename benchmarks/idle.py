@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the daemon costs while nobody does anything: CPU, memory, and the time from its start to its first heartbeat.
+"""The cost of an idle daemon: CPU, memory, and the time from its start to its first heartbeat.
 
-It polls a simulated Naze behind a pseudo-terminal at 115200 baud and sends telemetry to one ground station over UDP;
-the Naze has a process of its own and does not count.
+It polls a simulated Naze behind a pseudo-terminal at 115200 baud and sends telemetry to one ground station over UDP.
+The Naze runs in another process and is not counted.
 """
 
 import os
@@ -77,7 +77,7 @@ def _first_heartbeat_s(folder: Path, board: Board) -> float:
 
 
 def _start_s(program: str) -> float:
-    """Return how long Python takes from its start to the end of a program, median."""
+    """The median time of a Python program from start to exit, seconds."""
     times = []
     for _ in range(_STARTS):
         began_at = time.perf_counter()
@@ -87,7 +87,7 @@ def _start_s(program: str) -> float:
 
 
 def libraries_mb(libraries: str) -> float:
-    """Return the resident size of a Python that has imported something, and nothing of the daemon."""
+    """The resident size of a Python process after some imports, without the daemon, megabytes."""
     show = "print(open('/proc/self/status').read())"
     command = [sys.executable, "-c", f"{libraries}; {show}"]
     result = subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, text=True)
@@ -95,7 +95,7 @@ def libraries_mb(libraries: str) -> float:
 
 
 def listener() -> socket.socket:
-    """Return a socket at which a ground station listens."""
+    """A socket on which a ground station listens."""
     ground = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     ground.bind(("127.0.0.1", 0))
     ground.settimeout(10)
@@ -103,12 +103,12 @@ def listener() -> socket.socket:
 
 
 def udpout(ground: socket.socket) -> str:
-    """Return the daemon's connection to it."""
+    """The daemon's connection to it."""
     return f"udpout:127.0.0.1:{ground.getsockname()[1]}"
 
 
 def cpu_percent(pid: int) -> float:
-    """Watch a process for a while; return its user and system time in percent of one core."""
+    """Watch a process for a while; returns its user and system time in percent of one core."""
     time.sleep(_SETTLING_S)
     before, began_at = _cpu_s(pid), time.perf_counter()
     time.sleep(_WATCHED_S)
@@ -122,7 +122,7 @@ def _cpu_s(pid: int) -> float:
 
 
 def resident_mb(pid: int) -> float:
-    """Return how much memory a process has at this moment, megabytes."""
+    """The present memory of a process, megabytes."""
     return _rss_mb(Path(f"/proc/{pid}/status").read_text())
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Put 120 records on an INAV, each read back: over TCP beside a bare loop of the same frames, on a UART at its pace.
+"""A push of 120 records to INAV, each read back: over TCP against a bare loop of the same frames, and on a UART.
 
-The bare loop sends a frame and waits for its answer, nothing else: no parser, no telemetry, no event loop. It and the
-daemon take turns with the same simulated INAV in another process (one client at a time), so that both see the same load
-of the machine. On the UART it shows how late the simulated line itself is. The daemon runs on this process's event
-loop; its clock is read within the conversation: from the proof of the first record to that of the last one, and a
-record's share more for the first. SAVE, which stands still for the flash, is not in it.
+The bare loop sends a frame and waits for its reply: no parser, telemetry or event loop. It and the daemon take turns
+with the same simulated INAV in another process (one client at a time), so that both see the same load of the machine.
+On the UART it shows the delay of the simulated line itself. The daemon runs on this process's event loop; the clock is
+read within the conversation, from the proof of the first record to that of the last, plus one record's share for the
+first. SAVE, during which the board stalls for its flash, is not included.
 """
 
 import asyncio
@@ -133,7 +133,7 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
 
 
 async def _push(daemon: Daemon, records: tuple[NavRecord, ...]) -> float:
-    """Push one list; return the seconds from the first record's frame to the proof of the last."""
+    """Push one list; returns the seconds from the first record's frame to the proof of the last."""
     loop = asyncio.get_running_loop()
     dialect = daemon.bridge.missions.dialect
     assert dialect is not None
@@ -145,5 +145,5 @@ async def _push(daemon: Daemon, records: tuple[NavRecord, ...]) -> float:
     result = await done
     if len(proven_at) != _COUNT or getattr(result, "failure", True):
         raise BenchmarkError(f"the push ended with {result}")
-    # All but the first one's share, as measured between the others.
+    # Plus the share of the first one, estimated from the others.
     return (proven_at[-1] - proven_at[0]) * _COUNT / (_COUNT - 1)

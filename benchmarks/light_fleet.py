@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What hundreds of vehicles cost a router: `python -m benchmarks.light_fleet [COUNT...]`.
+"""The cost of hundreds of vehicles for a router: `python -m benchmarks.light_fleet [COUNT...]`.
 
-A light vehicle is a zenoh session of its own that declares what a bridge declares (a liveliness token, its queryables)
-and publishes a state and a position of the usual size once a second. The sessions share one process; the router is
-another one, on the loopback: ZENOHD, or the router of the Python package. A subscriber reads all of it.
+A light vehicle is a zenoh session that declares the same as a bridge (a liveliness token, its queryables) and publishes
+a state and a position of typical size once a second. The sessions share one process; the router runs in another, on the
+loopback: $ZENOHD, or the router of the Python package. One subscriber reads everything.
 """
 
 import json
@@ -56,7 +56,7 @@ while True:
 
 
 def main(counts: tuple[int, ...]) -> None:
-    """Print a line for each size of the fleet."""
+    """Print a line per fleet size."""
     print("vehicles  opened in s  router MB  router CPU %  samples/s  list s  vehicles' process MB")
     for count in counts:
         with tempfile.TemporaryDirectory() as name, ExitStack() as stack:

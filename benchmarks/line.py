@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A line between an autopilot and a ground station, both of them this process, for a forwarder to stand in.
+"""A line between an autopilot and a ground station, both in this process, with a forwarder between them.
 
-The autopilot writes frames of MAVLink 2 into a pseudo-terminal, each with its number and the time of its sending; the
-ground station takes datagrams of whole frames on the loopback.
+The autopilot writes numbered and timestamped MAVLink 2 frames into a pseudo-terminal; the ground station receives
+datagrams of whole frames on the loopback.
 """
 
 import os
@@ -24,24 +24,24 @@ from protocols.mavlink.dialect import CRC_EXTRA, messages
 _SYSID, _COMPID = 1, 1
 _MAGIC_V2, _SIGNED = 0xFD, 0x01
 _HEADER_SIZE, _CRC_SIZE, _SIGNATURE_SIZE = 10, 2, 13
-#: RAW_IMU with the time of sending in its time field, and its number where the first two axes are.
+#: RAW_IMU, with the time of sending in its time field and the number in its first two axes.
 _TIMED = messages.MAVLINK_MSG_ID_RAW_IMU
 _TIMED_PAYLOAD = struct.Struct("<QI7hBh")
 _NUMBER_AND_TIME = struct.Struct("<QI")
 _AXES = (-7, 11, 980, 3, -2, 1, 230)
 _HEARTBEAT = struct.pack("<IBBBBB", 0, messages.MAV_TYPE_QUADROTOR, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, 81, 3, 3)
 _HEARTBEAT_INTERVAL_NS = 1_000_000_000
-#: Unpaced: so many frames at once, and so many under way. A terminal holds 4096 bytes, and nobody is to lose a frame
-#: because this process did not take it in time.
+#: Unpaced: frames sent at once, and frames in flight. A terminal holds 4096 bytes, and no frame may be lost because
+#: this process was too slow to read it.
 _BURST, _UNDER_WAY = 32, 96
-_WARM_UP_RATE, _WARM_UP_FRAMES, _PATIENCE_S = 100.0, 50, 30.0
+_WARM_UP_RATE, _WARM_UP_FRAMES, _TIMEOUT_S = 100.0, 50, 30.0
 _LAST_ONES_S = 0.5
 _READ_SIZE = 65536
 
 
 @dataclass(slots=True)
 class Passage:
-    """What went in at one end, and what came out at the other."""
+    """The frames sent at one end, and those received at the other."""
 
     sent: int = 0
     numbers: set[int] = field(default_factory=set)
@@ -49,12 +49,12 @@ class Passage:
 
     @property
     def lost(self) -> int:
-        """How many frames did not arrive."""
+        """The number of frames that did not arrive."""
         return self.sent - len(self.numbers)
 
 
 class Line:
-    """`tty` is the path for the forwarder to open, `port` the UDP port of the loopback for it to send to."""
+    """`tty`: the path for the forwarder to open; `port`: the UDP port of the loopback for it to send to."""
 
     def __init__(self) -> None:
         self._autopilot, self._held_open = pty.openpty()
@@ -70,21 +70,21 @@ class Line:
         self._heartbeat_at_ns = 0
 
     def close(self) -> None:
-        """Take the line down."""
+        """Close the line."""
         os.close(self._autopilot)
         os.close(self._held_open)
         self._ground.close()
 
     def warm_up(self) -> None:
-        """Send until enough arrives; BenchmarkError if nothing ever does."""
-        end = time.monotonic() + _PATIENCE_S
+        """Send until enough frames arrive; BenchmarkError if none ever does."""
+        end = time.monotonic() + _TIMEOUT_S
         while time.monotonic() < end:
             if len(self.pass_on(_WARM_UP_RATE, 1.0).numbers) > _WARM_UP_FRAMES:
                 return
-        raise BenchmarkError(f"nothing came through within {_PATIENCE_S:.0f} s")
+        raise BenchmarkError(f"no frame arrived within {_TIMEOUT_S:.0f} s")
 
     def pass_on(self, rate: float | None, seconds: float) -> Passage:
-        """Send so many frames a second, or as many as go through (None), and wait for the last ones."""
+        """Send frames at a rate per second, or as fast as they get through (None), and wait for the last ones."""
         passage = Passage()
         first = self._number
         due = time.monotonic_ns()
@@ -107,7 +107,7 @@ class Line:
         return passage
 
     def send(self, pieces: Sequence[bytes], rate: float) -> list[bytes]:
-        """Send anything, so many pieces a second; return the frames that came out, those of heartbeats not."""
+        """Send pieces at a rate per second; returns the received frames except heartbeats."""
         frames: list[bytes] = []
         due = time.monotonic_ns()
         for piece in pieces:
@@ -120,7 +120,7 @@ class Line:
         return [frame for frame in frames if frame[7:10] != bytes(3)]
 
     def frame(self, msgid: int, payload: bytes) -> bytes:
-        """Return the autopilot's next frame."""
+        """The autopilot's next frame."""
         self._seq = (self._seq + 1) & 0xFF
         body = bytes((len(payload), 0, 0, self._seq, _SYSID, _COMPID)) + msgid.to_bytes(3, "little") + payload
         return b"\xfd" + body + mcrf4xx(body + bytes((CRC_EXTRA[msgid],))).to_bytes(_CRC_SIZE, "little")
@@ -140,7 +140,7 @@ class Line:
             os.write(self._autopilot, self.frame(messages.MAVLINK_MSG_ID_HEARTBEAT, _HEARTBEAT))
 
     def _receive(self, passage: Passage, first: int, timeout_s: float) -> bool:
-        """Take what arrives; false if nothing did."""
+        """Receive frames; False if none arrived."""
         frames = self._frames(timeout_s)
         now = time.monotonic_ns()
         for frame in frames:
@@ -152,13 +152,13 @@ class Line:
         return bool(frames)
 
     def _frames(self, timeout_s: float) -> list[bytes]:
-        """Wait for datagrams; return the frames in those that are there."""
+        """Wait for datagrams; returns the frames of those that arrived."""
         end = time.monotonic() + timeout_s
         while True:
             ends = [self._ground.fileno(), self._autopilot]
             readable, _, _ = select.select(ends, [], [], max(0, end - time.monotonic()))
             if self._autopilot in readable:
-                os.read(self._autopilot, _READ_SIZE)  # what the forwarder tells the autopilot is of no interest here
+                os.read(self._autopilot, _READ_SIZE)  # the forwarder's output to the autopilot is not used
             if self._ground.fileno() in readable:
                 return [frame for datagram in self._datagrams() for frame in _whole_frames(datagram)]
             if time.monotonic() >= end:
@@ -173,7 +173,7 @@ class Line:
 
 
 def _whole_frames(datagram: bytes) -> Iterator[bytes]:
-    """Split by the sizes in the headers, whatever the CRCs say."""
+    """Split by the sizes in the headers, regardless of the CRCs."""
     start = 0
     while start < len(datagram):
         end = len(datagram)
@@ -186,7 +186,7 @@ def _whole_frames(datagram: bytes) -> Iterator[bytes]:
 
 @contextmanager
 def on_cpu(cpu: int) -> Iterator[None]:
-    """Keep this process, and those that it starts meanwhile, on one CPU."""
+    """Keep this process and its children on one CPU."""
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {cpu})
     try:

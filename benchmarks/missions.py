@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions of 146 items that the rules take as they are, no two alike."""
+"""Missions of 146 items that the rules accept unchanged, no two alike."""
 
 import random
 
@@ -12,7 +12,7 @@ _COMMANDS = (WpCommand.WAYPOINT, WpCommand.LOITER_TURNS, WpCommand.LOITER_TIME)
 
 
 def random_mission(seed: int) -> list[MissionItem]:
-    """Return home and 145 commands anywhere on earth: coordinates fill their bytes with every value."""
+    """Home and 145 commands anywhere on earth, so that the bytes of coordinates take all values."""
     chance = random.Random(seed)
     return items_from_records(_record(chance, WpCommand.WAYPOINT if seq == 0 else None) for seq in range(COUNT))
 

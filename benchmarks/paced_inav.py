@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m benchmarks.paced_inav`: a simulated INAV on a pseudo-terminal that keeps a UART's pace to the microsecond.
 
-`naze-bridge sim` sleeps until its next byte is due, and an event loop oversleeps by up to a millisecond. Where a frame
-waits for the other that is a third of what is to be measured, so this one does not sleep for the last two of them.
-MSP is served every 50 us, which is as good as at once. The terminal's name is the first line that is printed.
+`naze-bridge sim` sleeps until its next byte is due, and an event loop oversleeps by up to a millisecond. When frames
+wait for each other, that is a third of the measured time, so this program does not sleep for the last two milliseconds.
+MSP is served every 50 us, practically at once. The first line of output is the terminal's path.
 """
 
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The programs under measurement, each in a process of its own, so that only its own CPU and memory count."""
+"""The measured programs, each in its own process, so that only its own CPU and memory count."""
 
 import json
 import os
@@ -15,25 +15,25 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-#: Where figures are kept (git-ignored).
+#: The folder of saved figures (git-ignored).
 RESULTS = ROOT / "benchmarks" / "results"
-#: What is measured starts from compiled bytecode, as an installed daemon does, whatever the shell says about that.
+#: Compiled bytecode, as for an installed daemon, regardless of the shell's PYTHONDONTWRITEBYTECODE.
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"} | {
     "PYTHONPYCACHEPREFIX": str(RESULTS / "bytecode")
 }
 #: The console script, without depending on where it is installed.
 NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main()"]
-_PATIENCE_S = 30.0
+_TIMEOUT_S = 30.0
 _POLL_S = 0.002
 
 
 class BenchmarkError(Exception):
-    """A program under measurement did not do what the measurement needs."""
+    """A measured program did not behave as the measurement needs."""
 
 
 @contextmanager
 def running(command: Sequence[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a program, its output in `log`; end it with SIGTERM."""
+    """Run a program with its output in `log`; end it with SIGTERM."""
     with log.open("wb") as output:
         process = subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stdout=output, stderr=output)
     try:
@@ -45,10 +45,10 @@ def running(command: Sequence[str], log: Path) -> Iterator[subprocess.Popen[byte
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:
     """Wait until `condition` holds; BenchmarkError if it takes too long."""
-    end = time.monotonic() + _PATIENCE_S
+    end = time.monotonic() + _TIMEOUT_S
     while not condition():
         if time.monotonic() > end:
-            raise BenchmarkError(f"waited {_PATIENCE_S:.0f} s in vain until {what}")
+            raise BenchmarkError(f"timed out after {_TIMEOUT_S:.0f} s, waiting until {what}")
         time.sleep(_POLL_S)
 
 
@@ -78,26 +78,26 @@ def simulated_naze(folder: Path, *options: str) -> Iterator[Board]:
     command = [*NAZE_BRIDGE, "sim", "--link", str(board.link), "--control", str(board.control), *options]
     log = folder / "sim.log"
     with running(command, log):
-        wait_for(lambda: b"Simulated Naze at" in log.read_bytes(), "the simulated Naze is there")
+        wait_for(lambda: b"Simulated Naze at" in log.read_bytes(), "the simulated Naze is up")
         yield board
 
 
 @contextmanager
 def inav_on_a_socket(folder: Path) -> Iterator[tuple[str, int]]:
-    """Run `naze-bridge sim --kind inav --tcp`; yield where it listens."""
+    """Run `naze-bridge sim --kind inav --tcp`; yields its address."""
     host, port = "127.0.0.1", free_tcp_port()
     log = folder / "sim.log"
     with running([*NAZE_BRIDGE, "sim", "--kind", "inav", "--tcp", f"{host}:{port}"], log):
-        wait_for(lambda: b"Simulated " in log.read_bytes(), "the simulated INAV is there")
+        wait_for(lambda: b"Simulated " in log.read_bytes(), "the simulated INAV is up")
         yield host, port
 
 
 @contextmanager
 def inav_on_a_uart(folder: Path) -> Iterator[str]:
-    """Run benchmarks.paced_inav; yield the path of its terminal."""
+    """Run benchmarks.paced_inav; yields the path of its terminal."""
     log = folder / "paced.log"
     with running([sys.executable, "-m", "benchmarks.paced_inav"], log):
-        wait_for(lambda: log.read_bytes().endswith(b"\n"), "the simulated INAV is there")
+        wait_for(lambda: log.read_bytes().endswith(b"\n"), "the simulated INAV is up")
         yield log.read_text().strip()
 
 
@@ -106,29 +106,29 @@ class DaemonProcess:
     """A running `naze-bridge run`."""
 
     pid: int
-    started_at: float  # time.time() just before the process was made
+    started_at: float  # time.time() just before the process was created
     _log: Path
 
     def events(self, name: str) -> list[dict[str, Any]]:
-        """Return what it has logged under that name, oldest first."""
+        """The logged events of that name, oldest first."""
         lines = self._log.read_bytes().splitlines(keepends=True)
         events = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"\n")]
         return [event for event in events if event["event"] == name]
 
     def wait_for_event(self, name: str, count: int = 1) -> dict[str, Any]:
-        """Wait until it has logged that event `count` times; return the last of these."""
+        """Wait until an event was logged `count` times; returns the last of them."""
         wait_for(lambda: len(self.events(name)) >= count, f"the daemon logs {name} (see {self._log})")
         return self.events(name)[count - 1]
 
 
 def logged_at(event: dict[str, Any]) -> float:
-    """Return when an event was logged, as time.time() counts."""
+    """The time of a logged event, in the scale of time.time()."""
     return datetime.fromisoformat(event["timestamp"]).timestamp()
 
 
 @contextmanager
 def daemon(folder: Path, fc: Path, gcs: str, *options: str) -> Iterator[DaemonProcess]:
-    """Run the daemon with a mission store of its own."""
+    """Run the daemon with its own mission store."""
     command = [*NAZE_BRIDGE, "run", "--fc", str(fc), "--gcs", gcs, "--state-dir", str(folder / "state"), *options]
     started_at = time.time()
     with running(command, folder / "daemon.log") as process:
@@ -137,14 +137,14 @@ def daemon(folder: Path, fc: Path, gcs: str, *options: str) -> Iterator[DaemonPr
 
 @contextmanager
 def floor_program(folder: Path, *arguments: str) -> Iterator[tuple[int, Path]]:
-    """Run one of benchmarks.floors; yield its process id and the file with its output."""
+    """Run one of benchmarks.floors; yields its process id and the file with its output."""
     log = folder / "floor.log"
     with running([sys.executable, "-m", "benchmarks.floors", *arguments], log) as process:
         yield process.pid, log
 
 
 def free_udp_port() -> int:
-    """Return a port of the loopback on which nobody listens."""
+    """A free UDP port of the loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -152,7 +152,7 @@ def free_udp_port() -> int:
 
 
 def free_tcp_port() -> int:
-    """Return a port of the loopback on which nobody listens for TCP."""
+    """A free TCP port of the loopback."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Push 146 records at 115200 baud, against the time that their bare bytes take at line rate.
+"""A push of 146 records at 115200 baud, compared with the time of its bare bytes at line rate.
 
 The daemon (service.daemon.Daemon with its own port, links and timers) runs on this process's event loop; the simulated
-Naze runs in another process behind a pseudo-terminal and keeps the pace of the UART both ways. The clock is read
-within the conversation itself: it starts when the push hands over its first CHUNK, a little before that frame's first
-byte is written, and stops when the push has judged the reply to COMMIT, whose checksum the flight controller computed
-over its flash. So nothing stands between daemon and terminal that could cost or save time, and what encoding and
-waking up cost is in the figure.
+Naze runs in another process behind a pseudo-terminal and keeps the pace of the UART both ways. The clock is read within
+the conversation: it starts when the push hands over its first CHUNK, just before that frame's first byte is written,
+and stops when the push has checked the reply to COMMIT, whose checksum the flight controller computed over its flash.
+So nothing between daemon and terminal can cost or save time, and the figure includes encoding and wake-ups.
 
 Flash stalls are excluded by a simulated flash that takes no time to program a record (BEGIN, which erases, comes before
-the clock starts). Beside it stands the figure with the time that real flash takes: most of that is hidden behind the
-line, but not what the last chunk brings.
+the clock starts). Another figure includes the real flash's time: most of that overlaps with the line, except for the
+last chunk.
 """
 
 import asyncio
@@ -75,7 +74,7 @@ def _records(seed: int) -> tuple[WpRecord, ...]:
 
 
 async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
-    """Push one list; return the seconds from the first CHUNK to the verified checksum."""
+    """Push one list; returns the seconds from the first CHUNK to the verified checksum."""
     loop = asyncio.get_running_loop()
     dialect = daemon.bridge.missions.dialect
     assert dialect is not None
@@ -93,7 +92,7 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
 def _noting_first_chunk(
     push: Conversation[PushResult[WpRecord]], note: Callable[[], None]
 ) -> Conversation[PushResult[WpRecord]]:
-    """Pass the conversation through, and call `note` when its first CHUNK comes by."""
+    """Pass the conversation through, and call `note` at its first CHUNK."""
     noted = False
     effect = next(push)
     while True:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The figures as a table for people, and as JSON to compare one day with another."""
+"""The figures as a table for people, and as JSON for comparing runs."""
 
 import json
 import platform
@@ -45,7 +45,7 @@ def print_table(figures: Sequence[Figure]) -> None:
 
 
 def keep_json(figures: Sequence[Figure], load: float) -> Path:
-    """Write the figures, and the machine's load before, to a new file below benchmarks/results; return its path."""
+    """Write the figures, and the machine's load before, to a new file below benchmarks/results; returns its path."""
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / time.strftime("%Y-%m-%dT%H-%M-%S.json")
     commit = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S607

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What becomes of whole frames among damaged ones: lost by the forwarder, and damaged ones that it passes on.
+"""Recovery after damaged frames: intact frames lost by a forwarder, and damaged ones that it passes on.
 
-1,500 frames, one in twenty damaged, one kind of damage after the other (benchmarks.damage), at a pace that every
-forwarder keeps.
+1,500 frames, one in twenty damaged, for each kind of damage (benchmarks.damage), at a pace that every forwarder can
+keep.
 """
 
 import tempfile
@@ -26,7 +26,7 @@ _PAYLOAD_SIZE = 29
 
 
 def measure() -> list[Figure]:
-    """Send the same streams through all forwarders that this machine has."""
+    """Send the same streams through all forwarders on this machine."""
     return [figure for forwarder in forwarders() for figure in _figures(forwarder)]
 
 

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long the daemon takes to find a flight controller, and to find it again, and what it makes of noise.
+"""The time in which the daemon finds a flight controller, finds it again, and its verdicts on noise.
 
-Daemon and simulated Naze have a process of their own each. The daemon runs and the port is missing when the clock
-starts: the port appears, a flight controller answers on it, and the clock stops with a line of the daemon's own log, so
-what it takes to notice the port is in the figures. "Sensed" (fc.sensed) is what autosense promises: protocol and speed
-are known. "Identified" (fc.found): the board has also said who it is, everything twice, which at 1200 baud is three
-seconds of line time.
+Daemon and simulated Naze run in separate processes. The daemon is running without a port when the clock starts: the
+port appears with a flight controller on it, and the clock stops with a line of the daemon's log, so the figures include
+the time to notice the port. "Sensed" (fc.sensed): protocol and speed are known. "Identified" (fc.found): the board has
+also identified itself, everything twice, which takes three seconds of line time at 1200 baud.
 
-Noise needs no port: Autosense is fed with it directly, in its own time, as a line at full load would.
+Noise needs no port: Autosense gets it directly, in simulated time, at the rate of a full line.
 """
 
 import random
@@ -87,7 +86,7 @@ def _returns(baud: int) -> list[Figure]:
 
 @contextmanager
 def _waiting_daemon(folder: Path, baud: int) -> Iterator[tuple[Board, DaemonProcess]]:
-    """Run a daemon that looks for a port which is not there yet."""
+    """Run a daemon whose port is still missing."""
     with simulated_naze(folder, "--baud", str(baud)) as board:
         board.tell("unplug")
         with daemon(folder, board.link, f"udpin:127.0.0.1:{free_udp_port()}", "--verbose") as process:
@@ -96,7 +95,7 @@ def _waiting_daemon(folder: Path, baud: int) -> Iterator[tuple[Board, DaemonProc
 
 
 def _plug(board: Board, process: DaemonProcess, baud: int, *before: str) -> _Found:
-    """Let the port appear; return how long the daemon then took. BenchmarkError if it found something else."""
+    """Create the port; returns the time that the daemon took. BenchmarkError if it found something else."""
     known = len(process.events("fc.found"))
     plugged_at = time.time()
     board.tell(*before, "plug")
@@ -108,7 +107,7 @@ def _plug(board: Board, process: DaemonProcess, baud: int, *before: str) -> _Fou
 
 
 def _noise() -> Figure:
-    """Feed random bytes, each search anew after a verdict; every verdict is a wrong one."""
+    """Feed random bytes, with a new search after each verdict; every verdict is a wrong one."""
     chance = random.Random(_SEED)
     wrong = fed = 0
     now = 0.0

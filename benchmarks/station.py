@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station whose own time does not count: frames packed beforehand, clocks read next to the socket."""
+"""A ground station whose own time is not counted: frames are packed beforehand, clocks read next to the socket."""
 
 import socket
 import time
@@ -15,12 +15,12 @@ from protocols.mission_item import MissionItem, MissionResult
 
 _SYSID, _COMPID = 255, 190
 _VEHICLE = (1, 1)
-_PATIENCE_S = 10.0
+_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """How one upload went, seconds.
+    """The times of one upload, seconds.
 
     steps: from each item but the last to the request that answers it. total: from MISSION_COUNT to the final ack.
     last_item_to_ack: while the list is pushed and verified.
@@ -39,14 +39,14 @@ class Station:
         self._writer = FrameWriter(_SYSID, _COMPID)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect(("127.0.0.1", port))
-        self._socket.settimeout(_PATIENCE_S)
+        self._socket.settimeout(_TIMEOUT_S)
 
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
 
     def upload(self, items: Sequence[MissionItem]) -> Upload:
-        """Write a mission; BenchmarkError if it is not taken as it is."""
+        """Write a mission; BenchmarkError if it is not accepted unchanged."""
         count = messages.MAVLink_mission_count_message(*_VEHICLE, len(items))
         frames = [self._writer.frame(pack(item_message(item, *_VEHICLE, as_int=True)), 2) for item in items]
         steps: list[float] = []
@@ -65,7 +65,7 @@ class Station:
         return Upload(steps, came_at - began_at, came_at - sent_at)
 
     def echo(self, size: int) -> float:
-        """Send a datagram to a server that sends it back; return the seconds that took."""
+        """Send a datagram to an echo server; returns the round trip, seconds."""
         sent_at = self._send(bytes(size))
         self._socket.recv(2048)
         return time.perf_counter() - sent_at
@@ -78,7 +78,7 @@ class Station:
         return sent_at
 
     def _receive(self, msgid: int) -> tuple[MavlinkFrame, float]:
-        """Wait for a message; telemetry passes by."""
+        """Wait for a message; telemetry is skipped."""
         while True:
             datagram = self._socket.recv(2048)
             came_at = time.perf_counter()

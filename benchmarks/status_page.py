@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the status page costs: memory and CPU while nobody looks, and time while hostile browsers do.
+"""The cost of the status page: memory and CPU while it is not open, and push times under hostile browsers.
 
-The daemon has everything switched on: the page, zenoh, telemetry log. Then a list of 146 records is pushed again and
-again to a simulated Naze at 115200 baud, first in peace, then while other programs ask for everything the page has from
-three addresses, as fast as they are let in. A push is one conversation with the flight controller: whatever holds the
-loop up makes it longer.
+The daemon has everything switched on: page, zenoh, telemetry log. Then a list of 146 records is pushed repeatedly to a
+simulated Naze at 115200 baud, first undisturbed, then while other programs request everything on the page from three
+addresses, as fast as the limits permit. A push is one conversation with the flight controller: any delay of the loop
+makes it longer.
 """
 
 import select
@@ -33,7 +33,7 @@ _PROMISED_PERCENT = 3.0
 
 
 def measure() -> list[Figure]:
-    """Measure one daemon, idle and then under pressure."""
+    """Measure one daemon, idle and then under attack."""
     with tempfile.TemporaryDirectory() as directory, ExitStack() as stack:
         folder = Path(directory)
         board = stack.enter_context(simulated_naze(folder, "--baud", "115200"))
@@ -83,7 +83,7 @@ def _pushes_ms(state_dir: Path) -> list[float]:
 
 @contextmanager
 def _hostile_browsers(port: int, folder: Path) -> Iterator[None]:
-    """Run them, one process an address; they print how many answers a second each of them got."""
+    """Run the browsers, one process per address; each prints its number of responses per second."""
     with (folder / "browsers.log").open("w") as output:
         command = [sys.executable, "-m", "benchmarks.status_page", str(port)]
         browsers = [
@@ -98,7 +98,7 @@ def _hostile_browsers(port: int, folder: Path) -> Iterator[None]:
 
 
 def _browse(port: int, address: str) -> float:
-    """Ask until standard input ends; return the answers a second."""
+    """Send requests until standard input ends; returns the responses per second."""
     began_at, answers = time.perf_counter(), 0
     while not select.select([sys.stdin], [], [], 0)[0]:
         for path in _PATHS:

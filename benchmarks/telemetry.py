@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What telemetry from MSP costs: CPU at 100 polls a second, the time from a reply to its datagram, and noise.
+"""The cost of telemetry over MSP: CPU at 100 polls per second, the time from a reply to its datagram, and noise.
 
-CPU: the daemon polls a simulated Naze that keeps the pace of a UART, and sends 100 datagrams a second to one ground
-station, which asked for them. Latency: the other end of the terminal is in this process and answers at once; the
-attitude carries a number, so each datagram is matched with its reply. Noise needs no port: a bridge that has found a
-flight controller is fed with it, in simulated time.
+CPU: the daemon polls a simulated Naze that keeps the pace of a UART, and sends the 100 datagrams per second that one
+ground station requested. Latency: the other end of the terminal is in this process and replies at once; each attitude
+is numbered, so that a datagram is matched with its reply. Noise needs no port: a bridge that has found a flight
+controller gets it in simulated time.
 """
 
 import math
@@ -38,7 +38,7 @@ from simulator.flight import Craft, fly
 from simulator.msp_port import MspAnswers, reply
 
 POLLS_HZ = 100
-#: With what is polled anyway (STATUS 4, RC 2, three others 2.5 times a second) these make 100 polls a second.
+#: With the regular polls (STATUS 4 Hz, RC 2 Hz, three others 2.5 Hz) these make 100 polls per second.
 _WISHES_HZ = {
     messages.MAVLINK_MSG_ID_ATTITUDE: 50,
     messages.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 21,
@@ -138,7 +138,7 @@ def _noise() -> list[Figure]:
 
 
 def wish(ground: socket.socket) -> None:
-    """Ask for the rates, as a ground station does."""
+    """Request the rates, as a ground station does."""
     _, sender = ground.recvfrom(2048)
     for msgid, rate_hz in _WISHES_HZ.items():
         wish = messages.MAVLink_command_long_message(1, 1, 511, 0, msgid, 1e6 / rate_hz, 0, 0, 0, 0, 0)
@@ -150,7 +150,7 @@ def _frame(message: messages.MAVLink_message) -> bytes:
 
 
 def drain(ground: socket.socket) -> None:
-    """Read what has come so far, and wait for what comes from now on."""
+    """Read all datagrams received so far, and the following ones."""
     ground.setblocking(False)
     try:
         while True:
@@ -160,7 +160,7 @@ def drain(ground: socket.socket) -> None:
 
 
 def _wait_for_attitude(ground: socket.socket, controller: "Controller") -> float:
-    """Return how long the next attitude was on its way, seconds."""
+    """The delay of the next attitude, seconds."""
     while True:
         data = ground.recv(2048)
         came_at = time.perf_counter()
@@ -171,7 +171,7 @@ def _wait_for_attitude(ground: socket.socket, controller: "Controller") -> float
 
 
 class Controller:
-    """A flight controller that answers at once. `attitudes_at`: when each attitude (its roll) was given."""
+    """A flight controller that replies at once. `attitudes_at`: when each attitude (its roll) was sent."""
 
     def __init__(self) -> None:
         self.asked = 0
@@ -181,7 +181,7 @@ class Controller:
         self._number = 0
 
     def answer(self, data: bytes) -> bytes:
-        """Return the replies to the requests in `data`."""
+        """The replies to the requests in `data`."""
         replies = b""
         for request in self._parser.feed(data):
             self.asked += 1
@@ -196,7 +196,7 @@ class Controller:
 
 @contextmanager
 def instant_controller(link: Path) -> Iterator[Controller]:
-    """Put one behind a pseudo-terminal."""
+    """Run one behind a pseudo-terminal."""
     near, far = os.openpty()
     tty.setraw(far)
     link.symlink_to(os.ttyname(far))
@@ -206,6 +206,6 @@ def instant_controller(link: Path) -> Iterator[Controller]:
         while data := os.read(near, 4096):
             os.write(near, controller.answer(data))
 
-    # It ends with the process: nobody closes the terminal while it waits for a byte.
+    # Ends with the process: the terminal is never closed while it waits for a byte.
     threading.Thread(target=serve, daemon=True).start()
     yield controller

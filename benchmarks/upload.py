@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Upload 146 items over loopback UDP: to a ground station that answers at once, over a slow link, to a slow flash.
+"""An upload of 146 items over loopback UDP: from a station that replies at once, over a slow link, to a slow flash.
 
-The daemon, the simulated Naze behind its pseudo-terminal, and the echo that is the floor have a process of their own
-each; the ground station is this one. A step begins when an item leaves the socket and ends when the request for the
-next one has come, so what is beyond an echo's time is the daemon's own. The echo gets datagrams of an item's size.
+The daemon, the simulated Naze behind its pseudo-terminal, and the echo server for the floor run in separate processes;
+the ground station is this one. A step begins when an item leaves the socket and ends with the arrival of the request
+for the next one, so any time above the echo's is the daemon's own. The echo gets datagrams of an item's size.
 """
 
 import statistics
@@ -27,9 +27,9 @@ _ITEM_SIZE = 48
 
 
 def measure() -> list[Figure]:
-    """Measure uploads, some of each kind."""
+    """Measure several uploads of each kind."""
     with tempfile.TemporaryDirectory() as name, floor_program(Path(name), "echo") as (_, log):
-        wait_for(lambda: log.read_bytes().endswith(b"\n"), "the echo is there")
+        wait_for(lambda: log.read_bytes().endswith(b"\n"), "the echo server is up")
         echo_port = int(log.read_text())
         return [*_steps(echo_port), *_slow_link(echo_port), *_slow_flash()]
 
@@ -50,7 +50,7 @@ def _steps(echo_port: int) -> list[Figure]:
 
 
 def _slow_link(echo_port: int) -> list[Figure]:
-    """Take turns with the floor: both see the same load of the machine.
+    """Alternate with the floor: both see the same load of the machine.
 
     The station waits before it sends, and for the answer to the last item, too: the final ack comes after all 147.
     """
@@ -74,7 +74,7 @@ def _slow_flash() -> list[Figure]:
 
 @contextmanager
 def _bridge(*sim_options: str) -> Iterator[int]:
-    """Run daemon and flight controller; yield the port for ground stations once they have found each other."""
+    """Run daemon and flight controller; yields the port for ground stations once the daemon has found it."""
     port = free_udp_port()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

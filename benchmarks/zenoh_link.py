@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What zenoh costs the daemon: time on the way, CPU for each sample, CPU while nobody reads, memory.
+"""The cost of zenoh for the daemon: latency, CPU per sample, CPU without subscribers, memory.
 
-Time: from a flight controller's reply at the other end of the terminal to the callback of a subscriber, both in this
-process, with the daemon and the router in two others; beside it a bare put through the same router. CPU: the daemon's
-own parts in this process, fed by hand, with a subscriber in another; turns of our samples, of bare puts of the same
-bytes, and of neither alternate, and what neither costs is taken off both.
+Latency: from a flight controller's reply at the other end of the terminal to the callback of a subscriber, both in this
+process, with the daemon and the router in two others; the floor is a bare put through the same router. CPU: the
+daemon's own parts in this process, fed step by step, with a subscriber in another; rounds of our samples, of bare puts
+of the same bytes, and of neither alternate, and the cost of the last is subtracted from both.
 """
 
 import asyncio
@@ -79,7 +79,7 @@ def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
             rate_hz = len(samples) / _WATCHED_S
             found = sorted(milliseconds)
         memory_mb = resident_mb(process.pid)
-    # Some answers, as to IDENT, are of no group.
+    # Some replies, as to IDENT, belong to no group.
     if rate_hz < 0.5 * POLLS_HZ:
         raise BenchmarkError(f"only {rate_hz:.0f} samples a second came")
     floor = "a bare put through the router"
@@ -110,7 +110,7 @@ while True:
 
 
 def _bare_latencies_ms(folder: Path, endpoint: str) -> list[float]:
-    """Return the times of bare puts; perf_counter() is one clock for all processes of a Linux."""
+    """The times of bare puts; on Linux perf_counter() is one clock for all processes."""
     found: list[float] = []
 
     def heard(sample: zenoh.Sample) -> None:
@@ -123,7 +123,7 @@ def _bare_latencies_ms(folder: Path, endpoint: str) -> list[float]:
         session.declare_subscriber("floor", heard),
         running([sys.executable, "-c", _PUTTER, endpoint], folder / "putter.log"),
     ):
-        wait_for(lambda: bool(found), "somebody puts")
+        wait_for(lambda: bool(found), "a bare put arrives")
         found.clear()
         time.sleep(_WATCHED_S / 3)
         return list(found)
@@ -150,7 +150,7 @@ async def _cpu(folder: Path, endpoint: str) -> list[Figure]:
 
 
 async def _first_payload(node: Node, endpoint: str, key: str) -> bytes:
-    """Publish until a subscriber has heard it, and return what it has heard."""
+    """Publish until a subscriber has received a sample; returns what it received."""
     payloads: list[bytes] = []
     with (
         client(endpoint) as session,
@@ -164,23 +164,23 @@ async def _first_payload(node: Node, endpoint: str, key: str) -> bytes:
 
 
 class _Fed:
-    """A daemon whose flight controller is played by hand, in a time of its own."""
+    """A daemon with a scripted flight controller, in simulated time."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
         self._controller = Controller()
-        # An hour ahead: no timer of the loop runs before its time has been played.
+        # An hour ahead: no timer of the loop runs before its simulated time.
         self._now = asyncio.get_running_loop().time() + 3600
         daemon.bridge.fc_opened(self._now)
         while daemon.bridge.session.vehicle.last(Orientation) is None:
             self.step()
 
     def step(self) -> int:
-        """Let a hundredth of a second pass; return how many answers came in it."""
+        """Advance by 10 ms; returns the number of replies in it."""
         bridge, before = self._daemon.bridge, self._controller.asked
         self._now += 0.01
         bridge.tick(self._now)
-        # An answer may bring the next question; flush() would write it to a port that is not open.
+        # A reply may trigger the next request; flush() would write it to a port that is not open.
         while output := bridge.take_fc_output():
             bridge.fc_received(self._controller.answer(b"".join(output)), self._now)
         self._daemon.flush()

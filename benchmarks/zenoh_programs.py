@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What both benchmarks over zenoh need: a router in a process of its own, a client, a process's own clock."""
+"""Helpers of both zenoh benchmarks: a router in its own process, a client, a process's CPU clock."""
 
 import json
 import socket
@@ -20,7 +20,7 @@ ALL_TELEMETRY = f"v{VERSION}/telemetry/*"
 
 @contextmanager
 def router_program(folder: Path) -> Iterator[tuple[str, int]]:
-    """Run a router; yield its endpoint and its process id."""
+    """Run a router; yields its endpoint and its process id."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     log = folder / "router.log"
@@ -30,7 +30,7 @@ def router_program(folder: Path) -> Iterator[tuple[str, int]]:
 
 
 def client(endpoint: str) -> zenoh.Session:
-    """Open a session as a subscriber of somebody's own would."""
+    """Open a session like a user's own subscriber."""
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
@@ -38,7 +38,7 @@ def client(endpoint: str) -> zenoh.Session:
 
 
 def configuration(folder: Path, vehicle: str, endpoint: str) -> Path:
-    """Write a daemon's configuration file that joins zenoh and takes commands."""
+    """Write a daemon's configuration file with zenoh and its commands enabled."""
     path = folder / "config.toml"
     path.write_text(
         f'[zenoh]\nvehicle = "{vehicle}"\nconnect = ["{endpoint}"]\n'
@@ -48,8 +48,8 @@ def configuration(folder: Path, vehicle: str, endpoint: str) -> Path:
 
 
 def cpu_s(pid: int) -> float:
-    """Return the seconds for which a process has had a core, by its own clock: far finer than the ticks in /proc.
+    """The CPU time of a process, seconds, by its own clock: far finer than the ticks in /proc.
 
-    The clock's number is made as clock_getcpuclockid(3) makes it on Linux.
+    The clock id is computed like clock_getcpuclockid(3) on Linux.
     """
     return time.clock_gettime(~pid << 3 | 2)

@@ -4,11 +4,11 @@
 The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
 side; pip fetches them for any architecture on any machine, and nothing is compiled. The target needs no network.
 
-Two libraries have no wheel for armhf. cbor2's last release in pure Python is taken instead (armhf.lock); of pymavlink
-the one for arm64: what is compiled in it, dfindexer, is left out of every package.
+Two libraries have no wheel for armhf. For cbor2 its last pure Python release is used (armhf.lock); for pymavlink the
+arm64 wheel, whose only compiled part, dfindexer, is left out of every package.
 
-pip judges a requirement's `python_version < ...` by the Python that runs it, not by the target's. So far none of ours
-differs between 3.11 and 3.14.
+pip evaluates a requirement's `python_version < ...` for the Python that runs it, not for the target's. So far our
+requirements do not differ between 3.11 and 3.14.
 """
 
 import os
@@ -28,17 +28,17 @@ _DIST = _PROJECT / "dist"
 _PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
 #: Debian 12 (and Raspberry Pi OS of 2023), Ubuntu 24.04, Debian 13.
 _PYTHONS = ("3.11", "3.12", "3.13")
-#: Debian's name of an architecture -> the wheels'.
+#: Debian's name of an architecture -> the name in wheels.
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "armv7l"}
 _NOT_FOR_ARMHF = ("cbor2", "pymavlink")
 #: The machines whose wheels are installed.
 _WHEELS_OF = {"amd64": ("x86_64",), "arm64": ("aarch64",), "armhf": ("armv7l", "aarch64")}
-#: What wheels may ask of the C library; Debian 12 has 2.36.
+#: The C library that wheels may require; Debian 12 has 2.36.
 _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
 
 
 def build(architecture: str) -> Path:
-    """Return the package's file."""
+    """Build the package; returns its path."""
     work = _WORK / architecture
     shutil.rmtree(work, ignore_errors=True)
     wheels = work / "wheels"
@@ -52,7 +52,7 @@ def build(architecture: str) -> Path:
             hashed = ("--require-hashes", "--no-deps", "--requirement", lock)
             _run(*_PIP, "download", *hashed, *target, *platforms, "--dest", wheels)
         target += [word for machine in _WHEELS_OF[architecture] for word in _platforms(machine)]
-        # From the wheels alone, whose hashes were just looked at; what only the build needs stays out.
+        # Only from the wheels, whose hashes were just checked; build tools are left out.
         libraries[python] = work / python
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
         _run(*_PIP, "install", *from_wheels, *target, f"{project['name']}=={project['version']}")
@@ -65,11 +65,11 @@ def build(architecture: str) -> Path:
 
 
 def _locks(architecture: str, work: Path) -> list[tuple[Path, str]]:
-    """Which files of pinned wheels are fetched for which machine."""
+    """The pinned wheel files to fetch for a machine."""
     lock = _PROJECT / "requirements.lock"
     if architecture != "armhf":
         return [(lock, _MACHINES[architecture])]
-    # A requirement goes from its name to the next line that is not indented.
+    # A requirement extends from its name to the next line that is not indented.
     pinned = re.findall(r"^[a-z].*\n(?:[ ].*\n)*", lock.read_text(), re.MULTILINE)
     special = [each for each in pinned if each.startswith(tuple(f"{name}==" for name in _NOT_FOR_ARMHF))]
     usual, of_arm64 = work / "usual.lock", work / "arm64.lock"
@@ -83,7 +83,7 @@ def _platforms(machine: str) -> list[str]:
 
 
 def _run(*command: str | Path) -> None:
-    # The wheel's files get the time of the commit, else every build would differ.
+    # The wheel's files get the commit's time, so that builds are reproducible.
     subprocess.run(command, check=True, env=os.environ | {"SOURCE_DATE_EPOCH": _commit_time()})
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is where in the package."""
+"""The files of the package, and their places."""
 
 import filecmp
 import gzip
@@ -15,7 +15,7 @@ from service.cli.man_page import man_page
 
 _HERE = Path(__file__).resolve().parent
 _LIB = Path("usr/lib/naze-bridge")
-#: Pages outside of docs/ that the docs link to.
+#: Pages outside docs/ that the docs link to.
 _PAGES = (
     *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE"),
     *("firmware/README.md", "systemd/naze-bridge.service", "systemd/60-naze-bridge.rules"),
@@ -29,7 +29,7 @@ _NEEDLESS = ("lxml", "lxml-*", "bin", "share", "pymavlink/tools", "pymavlink/dfi
 
 
 def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: str, architecture: str) -> None:
-    """Make the package's folder of the installed `libraries` of each Python version."""
+    """Lay out the package's folder from the installed `libraries` of each Python version."""
     environment = root / _LIB
     (environment / "bin").mkdir(parents=True)
     (environment / "pyvenv.cfg").write_text("home = /usr/bin\ninclude-system-site-packages = false\n")
@@ -50,7 +50,7 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     (root / "etc/naze-bridge/conf.d").mkdir()
     documents = root / "usr/share/doc/naze-bridge"
     _copy(project / "LICENSE", documents, "copyright")
-    # As in the repository, so that the pages' links lead somewhere.
+    # As in the repository, so that the pages' links work.
     shutil.copytree(project / "docs", documents / "docs")
     for page in _PAGES:
         _copy(project / page, documents / Path(page).parent)
@@ -78,7 +78,7 @@ def _leave_out(site: Path) -> None:
 
 
 def _share(first: Path, *others: Path) -> None:
-    """Make one file of those that are the same for every Python: most are."""
+    """Store files that are the same for every Python once: most are."""
     for other in others:
         for path in other.rglob("*"):
             twin = first / path.relative_to(other)
@@ -104,7 +104,7 @@ def _copy(source: Path, folder: Path, name: str = "") -> None:
 
 
 def _describe(root: Path, version: str, architecture: str) -> None:
-    """Write what dpkg reads."""
+    """Write dpkg's control files."""
     folder = root / "DEBIAN"
     folder.mkdir(mode=0o755)
     files = sorted(path for path in root.rglob("*") if path.is_file() and not path.is_symlink())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hear where every vehicle of a fleet is: `python zenoh_positions.py [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
+"""Prints every vehicle's position: `python zenoh_positions.py [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
 
 The same for the shell, with the zenoh project's own tools: docs/fleet.md. Fields and units: docs/zenoh.md.
 """
@@ -12,7 +12,7 @@ import zenoh
 
 
 def main(endpoint: str) -> None:
-    """Print a line for each position that comes, until Ctrl-C."""
+    """Print a line for each received position, until Ctrl-C."""
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
@@ -24,7 +24,7 @@ def main(endpoint: str) -> None:
         key = str(sample.key_expr)
         vehicle = key.split("/")[1]
         position = json.loads(sample.payload.to_bytes())
-        # The numbers of a key are without gaps: what is missing was lost on the way, as telemetry may be.
+        # The sequence numbers of a key have no gaps: a missing one was lost on the way, which telemetry permits.
         lost = position["seq"] - newest.get(key, position["seq"] - 1) - 1
         newest[key] = position["seq"]
         place = (position["lat_deg"], position["lon_deg"], position["height_m"])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A zenoh router for a small fleet, from the Python package: `python zenoh_router.py [FILE or ENDPOINT...]`.
 
-FILE is a zenoh configuration (zenoh-tls/router.json5); an ENDPOINT is where to listen, "tcp/0.0.0.0:7447" if nothing is
-said. zenohd, the router as a program of its own, does the same and more.
+FILE is a zenoh configuration (zenoh-tls/router.json5); ENDPOINT is an address to listen on, by default
+"tcp/0.0.0.0:7447". zenohd, the stand-alone router, does the same and more.
 """
 
 import json

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Write a mission to one vehicle: `python zenoh_upload.py VEHICLE FILE [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
+"""Writes a mission to one vehicle: `python zenoh_upload.py VEHICLE FILE [ENDPOINT]`. Needs `pip install eclipse-zenoh`.
 
-The vehicle must take commands: `commands = true` in its [zenoh] table, docs/zenoh.md.
+The vehicle must accept commands: `commands = true` in its [zenoh] table, docs/zenoh.md.
 """
 
 import json
@@ -12,7 +12,7 @@ import zenoh
 
 
 def main(vehicle: str, file: str, endpoint: str) -> int:
-    """Print how it goes and how it ends; return the exit status."""
+    """Print the progress and the result; returns the exit status."""
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
@@ -21,7 +21,7 @@ def main(vehicle: str, file: str, endpoint: str) -> int:
             f"fleet/{vehicle}/@cmd/v1/mission/upload",
             payload=Path(file).read_bytes(),
             timeout=120.0,
-            # Without this only the last reply comes, and not the progress before it.
+            # Without this only the last reply arrives, without the progress before it.
             consolidation=zenoh.ConsolidationMode.NONE,
         )
         for reply in replies:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Certificates for a fleet of one's own: `python make_certificates.py FOLDER ROUTER_HOST[,HOST...] NAME...`.
+"""Makes certificates for a fleet: `python make_certificates.py FOLDER ROUTER_HOST[,HOST...] NAME...`.
 
-Needs `pip install trustme`. Makes in FOLDER: ca.pem, which everybody gets, and ca.key, which stays here; router.pem and
-router.key for the router, which is reached under ROUTER_HOST (a name or an address); NAME.pem and NAME.key for each
-vehicle and each person. Run it again with the same FOLDER for further names: what is there is kept.
+Needs `pip install trustme`. Makes in FOLDER: ca.pem, for every member, and ca.key, which stays here; router.pem and
+router.key for the router, which is reached as ROUTER_HOST (a name or an address); NAME.pem and NAME.key for each
+vehicle and each person. To add names, run it again with the same FOLDER: existing files are kept.
 """
 
 import sys
@@ -13,7 +13,7 @@ import trustme
 
 
 def main(folder: Path, hosts: list[str], names: list[str]) -> None:
-    """Make what is not there yet."""
+    """Make the missing files."""
     folder.mkdir(parents=True, exist_ok=True)
     authority = _authority(folder)
     _issue(authority, folder, "router", hosts)
