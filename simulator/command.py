@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim`: a simulated flight controller alone, behind a link that looks like a serial port, or a socket."""
+"""`naze-bridge sim`: a simulated flight controller behind a pseudo-terminal or a TCP socket."""
 
 import asyncio
 from pathlib import Path
@@ -38,7 +38,7 @@ def _load_core(path: Path, capacity: int) -> BootMissions:
         raise click.ClickException(f"Cannot load the core: {error}. Make it with: make -C firmware sim") from error
 
 
-#: What can be chosen with --image; all else is up to the firmware.
+#: The options that --image allows; all else depends on the firmware.
 _IMAGE_OPTIONS = {
     "image", "link", "tcp", "armed", "bit_errors", "lost_bytes", "seed", "hang_after", "power_cut_after", "state",
     "control",

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The firmware's own mission core, compiled for this machine (make -C firmware sim), on the simulated board.
 
-firmware/naze_mission.h is the manual: the core knows only the functions that its board gives it, so the simulated board
-gives it its own, as firmware/harakiri_mission.c gives it Harakiri's.
+firmware/naze_mission.h is the manual: the core calls only functions that its board provides, so the simulated board
+provides its own, as firmware/harakiri_mission.c provides Harakiri's.
 """
 
 import ctypes
@@ -18,14 +18,14 @@ from simulator.flash import FlashError, NorFlash, PowerCutError
 from simulator.mission_slots import flash_size, slot_pages
 from simulator.missions import Board, BootMissions
 
-#: NM_CAPACITY: how many records the core holds, whatever SimOptions would have.
+#: NM_CAPACITY: the core's capacity in records, independent of SimOptions.
 CORE_CAPACITY = 146
-# NM_BUFFER_SIZE would do for what the patched receiver lets through; this holds any MSP payload.
+# NM_BUFFER_SIZE is enough for the patched receiver; this holds any MSP payload.
 _BUFFER = c_uint8 * 255
 
 
 def open_library(path: Path, functions: Mapping[str, tuple[Any, Any]]) -> ctypes.CDLL:
-    """Open a shared library and declare its functions (result, arguments). OSError if it is not the one."""
+    """Open a shared library and declare its functions (result, arguments). OSError if one is missing."""
     library = ctypes.CDLL(str(path.resolve()))
     for name, (result, arguments) in functions.items():
         try:
@@ -44,7 +44,7 @@ def load_core(path: Path) -> BootMissions:
 class CompiledCore:
     """The core as of one boot; see Missions.
 
-    Its limits are its own: of SimOptions it takes the flash's times, and the capacity must be CORE_CAPACITY.
+    Its limits are compiled in: only the flash times come from SimOptions, and the capacity must be CORE_CAPACITY.
     """
 
     def __init__(self, library: ctypes.CDLL, flash: NorFlash, board: Board) -> None:
@@ -56,7 +56,7 @@ class CompiledCore:
         library.nm_start(self._core, _BOARD, self._board)
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """Return the reply's payload; None if the command is none of the core's. PowerCutError."""
+        """The reply's payload; None if it is not one of the core's commands. PowerCutError."""
         self._board.now = now
         buffer = _BUFFER(*payload)
         length = self._library.nm_handle(self._core, command, buffer, len(payload))
@@ -65,7 +65,7 @@ class CompiledCore:
         return None if length < 0 else bytes(buffer[:length])
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if its time is over."""
+        """Drop an open transfer after its timeout."""
         self._board.now = now
         self._library.nm_poll(self._core)
 
@@ -85,12 +85,12 @@ class CompiledCore:
 
     @property
     def writes(self) -> int:
-        """How many lists were ever made valid in this flash."""
+        """The number of lists ever made valid in this flash."""
         return int(self._core.sequence)
 
 
 class _BoardFunctions:
-    """What the core calls. No exception passes through C: without power, flash fails until `power_is_cut` is seen."""
+    """The core's callbacks. Exceptions cannot pass C: without power, flash fails until `power_is_cut` is seen."""
 
     def __init__(self, flash: NorFlash, board: Board) -> None:
         self.now = 0.0
@@ -105,7 +105,7 @@ class _BoardFunctions:
         return self._succeeds(self._nor.erase, page, self._erase_seconds)
 
     def program(self, offset: int, data: int, length: int) -> bool:
-        # In records, as the model does, so that time and flash operations are counted alike.
+        # Record by record, as in the model, so that both count the same time and flash operations.
         contents = ctypes.string_at(data, length)
         return all(
             self._succeeds(self._nor.program, offset + at, contents[at : at + RECORD_SIZE], self._program_seconds)
@@ -131,7 +131,7 @@ class _BoardFunctions:
         self._board.set_wp_radius(radius_cm, self.now)
 
     def list_changed(self, records: int, count: int) -> None:
-        """Nothing of the simulated firmware flies the list."""
+        """Ignored: the simulated firmware does not fly the list."""
 
     def _succeeds(self, operation: Callable[..., None], *arguments: object) -> bool:
         if not self.power_is_cut:
@@ -144,7 +144,7 @@ class _BoardFunctions:
         return not self.power_is_cut
 
 
-# Each is called with the `self` that nm_start() was given, which is the object of the methods.
+# Each is called with the `self` given to nm_start(), which is the object of the methods.
 _CALLBACKS = {
     "erase": CFUNCTYPE(c_bool, py_object, c_uint8)(_BoardFunctions.erase),
     "program": CFUNCTYPE(c_bool, py_object, c_uint16, c_void_p, c_uint16)(_BoardFunctions.program),

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines from a test in another process: switch faults, pull plugs, read the counters.
+"""Control of a simulated board by another process: set faults, pull the plug, read the counters.
 
     FAULT VALUE         a field of the board's faults and a number (switches: 0 or 1)
     power on|off
     plug, unplug
     stats               one line of JSON: counters, state, and the stored records in hex
-    truth               one line of JSON: what the craft is doing at this moment (simulator.flight)
+    truth               one line of JSON: the craft's true state (simulator.flight)
 
 The answer is `ok`, the JSON, or `error: ...`.
 """
@@ -33,26 +33,26 @@ class ControlledBoard(FarEnd, Protocol):
 
     @property
     def counters(self) -> Counters | EmulatedCounters:
-        """What has happened so far."""
+        """The event counts so far."""
 
     @property
     def armed(self) -> bool:
-        """Return whether the craft is armed."""
+        """True if the craft is armed."""
 
     @property
     def power(self) -> Enum:
-        """Return what the CPU is doing."""
+        """The state of the CPU."""
 
     @property
     def protocol(self) -> Enum | None:
-        """Return what the firmware believes to be spoken; None if it speaks one only, or does not run."""
+        """The firmware's present protocol; None if it has only one, or does not run."""
 
     @property
     def stored_records(self) -> list[bytes]:
-        """Return the mission that outlives a power cut."""
+        """The records that survive a power cut."""
 
     def truth(self, now: float) -> Craft | None:
-        """Return what the craft is doing; None while no firmware runs, and from a board that only lies on a bench."""
+        """The craft's true state; None while no firmware runs, and for a board without a simulated flight."""
 
     def power_on(self, now: float) -> None:
         """Supply it."""
@@ -62,20 +62,20 @@ class ControlledBoard(FarEnd, Protocol):
 
 
 class Plug(Protocol):
-    """Where a client finds the board."""
+    """The board's connection to a client."""
 
     def plug(self) -> None:
-        """Make the place. PlugError if it is not to be had."""
+        """Connect. PlugError if that fails."""
 
     def unplug(self) -> None:
-        """Take it away."""
+        """Disconnect."""
 
     def poke(self) -> None:
-        """Make a fault that was just switched count at once."""
+        """Apply a changed fault at once."""
 
 
 class Control:
-    """Obeys control lines."""
+    """Executes control lines."""
 
     def __init__(self, board: ControlledBoard, link: Plug, loop: asyncio.AbstractEventLoop) -> None:
         self._board = board
@@ -84,18 +84,18 @@ class Control:
         self._server: asyncio.Server | None = None
 
     async def listen(self, path: Path) -> None:
-        """Listen on a Unix socket. OSError if it cannot be made."""
+        """Listen on a Unix socket. OSError if it cannot be created."""
         self._server = await asyncio.start_unix_server(self._converse, path)
         self._path = path
 
     def close(self) -> None:
-        """Stop listening and take the socket away."""
+        """Stop listening and remove the socket."""
         if self._server:
             self._server.close()
             self._path.unlink(missing_ok=True)
 
     def obey(self, line: str) -> str:
-        """Carry a line out and return the answer."""
+        """Execute a line; returns the answer."""
         now = self._loop.time()
         match line.split():
             case ["stats"]:

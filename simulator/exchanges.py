@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Takes a UART capture apart: which answer belongs to which request, and what the flight controller sent unasked."""
+"""Matches replies with requests in a UART capture, and separates unsolicited data."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -9,20 +9,20 @@ from itertools import accumulate
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.uart_capture import UartDeed, UartEvent
 
-#: An answer that comes later is none: even a flight controller that writes its flash is faster.
+#: The reply deadline: even a flight controller that writes its flash is faster.
 _LONGEST_WAIT_S = 5.0
-#: What was asked so shortly before the port was closed, or the recording ended, might have been answered.
+#: A request this shortly before the port was closed, or the recording ended, might have been answered.
 _CUT_SHORT_S = 0.5
 
 #: Command and payload of a request.
 Question = tuple[int, bytes]
-#: When bytes were read, where in all that was read, and the bytes.
+#: The read time, the offset in all read bytes, and the bytes.
 Piece = tuple[float, int, bytes]
 
 
 @dataclass(slots=True, eq=False)
 class Exchange:
-    """A request, and its answer in the pieces in which it was read; none if no answer came."""
+    """A request, and its reply in pieces as read; no pieces if there was no reply."""
 
     question: Question
     asked_at: float
@@ -31,22 +31,22 @@ class Exchange:
 
 @dataclass(frozen=True, slots=True)
 class Conversation:
-    """A capture taken apart. `exchanges` in the order of the requests; `unasked` is all else that was read."""
+    """A parsed capture. `exchanges` in the order of the requests; `unasked`: all other received data."""
 
     exchanges: Sequence[Exchange]
     unasked: Sequence[Piece]
 
 
 def take_apart(events: Sequence[UartEvent]) -> Conversation:
-    """Match answers with requests as they were matched then: by command, in their order, after the request.
+    """Match replies with earlier requests by command, in order.
 
-    Requests of which nobody can know whether they would have been answered are left out.
+    Requests that the end of the recording or of the link cut short are omitted.
     """
     exchanges: list[Exchange] = []
     unasked: list[Piece] = []
     waiting: list[Exchange] = []
     unknown: set[Exchange] = set()
-    known: dict[Question, Question] = {}  # each is kept once: there are few, asked by the hundred thousand
+    known: dict[Question, Question] = {}  # each is kept once: few distinct ones, repeated a hundred thousand times
     answers = _answers(events, unasked)
     answered_by, frame, pieces = next(answers, _NO_MORE)
     requests = MspParser()
@@ -62,7 +62,7 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
                     question = found.command, found.payload
                     asked.append(Exchange(known.setdefault(question, question), event.at))
             exchanges += asked
-            # What is asked again was given up before.
+            # A repeated request means that the earlier one was given up.
             questions = {exchange.question for exchange in asked}
             waiting = [earlier for earlier in waiting if earlier.question not in questions] + asked
         while answered_by == number:
@@ -92,14 +92,14 @@ def _asker(waiting: Sequence[Exchange], frame: MspFrame, at: float) -> Exchange 
 
 
 def _answers(events: Sequence[UartEvent], rest: list[Piece]) -> Iterator[_Answer]:
-    """Yield MSP answers with the number of the event that completed each; put all else that was read into `rest`."""
+    """Yield MSP replies with the number of the event that completed each; `rest` gets all other received data."""
     for stretch in _stretches(events):
         done = 0
         for begin, end, frame in stretch.frames():
             rest += stretch.pieces(done, begin)
             done = end
             if frame.direction is Direction.REQUEST:
-                # Our own, from a line that is looped back.
+                # Our own request, from a looped-back line.
                 rest += stretch.pieces(begin, end)
             else:
                 yield stretch.number_at(end - 1), frame, stretch.pieces(begin, end)
@@ -107,7 +107,7 @@ def _answers(events: Sequence[UartEvent], rest: list[Piece]) -> Iterator[_Answer
 
 
 def _stretches(events: Sequence[UartEvent]) -> Iterator["_Stretch"]:
-    """Yield what was read without a change of speed, and without the port being closed in between."""
+    """Yield the received data in stretches without a change of speed or a closed port."""
     reads: list[tuple[int, UartEvent]] = []
     offset = 0
     for number, event in enumerate(events):
@@ -122,7 +122,7 @@ def _stretches(events: Sequence[UartEvent]) -> Iterator["_Stretch"]:
 
 
 class _Stretch:
-    """Bytes that came one behind the other, and which event brought which. `offset`: so many were read before."""
+    """Contiguous bytes, and the event of each. `offset`: the number of bytes read before."""
 
     def __init__(self, reads: Sequence[tuple[int, UartEvent]], offset: int) -> None:
         self._reads = reads
@@ -131,7 +131,7 @@ class _Stretch:
         self.size = self._ends[-1]
 
     def frames(self) -> Iterator[tuple[int, int, MspFrame]]:
-        """Yield each frame with its beginning and its end."""
+        """Yield each frame with its start and end."""
         data = b"".join(event.data for _, event in self._reads)
         end = 0
         for frame in MspParser().feed(data):
@@ -141,11 +141,11 @@ class _Stretch:
             yield begin, end, frame
 
     def number_at(self, at: int) -> int:
-        """Return the number of the event that brought a byte."""
+        """The number of the event that delivered a byte."""
         return self._reads[bisect_right(self._ends, at)][0]
 
     def pieces(self, begin: int, end: int) -> Sequence[Piece]:
-        """Return a part, in the pieces in which it was read."""
+        """A range of bytes, in pieces as read."""
         found: list[Piece] = []
         index = bisect_right(self._ends, begin)
         while begin < end:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may be on the other end of a line: the simulated Naze, or a capture of a real one that is played."""
+"""The far end of a line: a simulated board, or a played capture of a real one."""
 
 from typing import Protocol
 
@@ -9,16 +9,16 @@ class FarEnd(Protocol):
 
     @property
     def baud(self) -> int:
-        """Return its speed at this moment."""
+        """Its present speed."""
 
     def power_on_booted(self, now: float) -> None:
         """Begin."""
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that were sent to it."""
+        """Handle bytes sent to it."""
 
     def advance(self, now: float) -> bytes:
-        """Return the bytes that it has sent until `now` and that were not returned before."""
+        """The bytes sent until `now` since the last call."""
 
     def next_wakeup(self, now: float) -> float:
-        """Tell when it is next worth calling `advance`; infinity if nothing will happen by itself."""
+        """The time for the next call of `advance`; infinity if nothing will happen by itself."""

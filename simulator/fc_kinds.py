@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which boards beside the Naze can be simulated, and how one is made."""
+"""The simulated boards other than the Naze."""
 
 from functools import partial
 
@@ -23,14 +23,14 @@ KINDS = tuple(_FIRMWARE)
 
 
 def new_eeprom(kind: str, options: MspOptions) -> bytearray:
-    """Return the EEPROM of a board on which nothing was ever saved."""
+    """The EEPROM of a factory-new board."""
     return blank_eeprom(options.capacity) if kind == "multiwii" else bytearray(EEPROM_SIZE)
 
 
 def make_board(
     kind: str, options: MspOptions | None = None, faults: Faults | None = None, eeprom: memoryview | None = None
 ) -> MspBoard:
-    """Make a board without power. `eeprom` outlives the board; without it there is a blank one."""
+    """Create a board without power. `eeprom` outlives the board; None: a blank one."""
     options = options or MspOptions()
     if eeprom is None:
         eeprom = memoryview(new_eeprom(kind, options))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri from one boot to the next: its main loop, and its serial port as serialCom has it (serial.c, mw.c).
+"""Harakiri from one boot to the next: its main loop, and its serial port as in serialCom (serial.c, mw.c).
 
-All that lives in RAM lives in this object, so a new one is a reset.
+This object is the RAM, so a new one is a reset.
 """
 
 import contextlib
@@ -26,18 +26,18 @@ from simulator.traps import Trap, TrapCounters
 from simulator.uart import Uart
 
 _AUTOSENSE_SECONDS = 4.0
-#: The option that says how long it takes.
+#: Calibration command -> the option with its duration.
 _CALIBRATIONS: dict[int, str] = {
     HarakiriCommand.ACC_CALIBRATION: "acc_calibration_ms",
     HarakiriCommand.MAG_CALIBRATION: "mag_calibration_ms",
 }
 _FRSKY_BAUD = 9600
 _MINIMOSD_BAUD = 57600
-#: systemReset() waits so long.
+#: The delay in systemReset().
 _CLI_REBOOT_S = 1.0
 #: FDByteSize.
 _FLOPPY_SIZE = 2340
-# Times are seconds as floats: what is due now is due.
+# Tolerance for times, which are floats in seconds.
 _EPSILON = 1e-9
 
 
@@ -46,7 +46,7 @@ class ResetError(Exception):
 
 
 class Protocol(Enum):
-    """What the firmware believes to be spoken on the UART."""
+    """The firmware's present protocol on the UART."""
 
     AUTOSENSE = auto()
     MSP = auto()
@@ -54,7 +54,7 @@ class Protocol(Enum):
 
 
 class Firmware:
-    """Runs one main loop at a time; loops that would have nothing to do need not be run."""
+    """Runs one main loop at a time; idle loops may be skipped."""
 
     def __init__(
         self,
@@ -78,18 +78,18 @@ class Firmware:
         self._looptime = options.looptime_ms / 1000
         self._flown = 0.0
         self._home: tuple[int, int] | None = None
-        # A calibration, and leaving the CLI, freeze all until they restart the board.
+        # A calibration, and leaving the CLI, block everything until the board restarts.
         self._resets_at: float | None = None
 
         self._config = StoredConfig(flash, options)
         self._board = Board(options, faults, self._config.load())
         self._missions = boot_missions(flash, self._board) if faults.extension else None
-        # The extension brings a buffer for its longest CHUNK: mask, number, records.
+        # The extension enlarges the buffer for its longest CHUNK: mask, number, records.
         self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
         self._answers = MspAnswers(lambda: self.craft_at(self._clock))
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
-        # Harakiri's own list and MAVLink upload; with the extension, beside it.
+        # Harakiri's own list and MAVLink upload, also alongside the extension.
         self._floppy = Floppy(flash, self._board, self._missions, self._send_message)
         self._cli = CommandLine(self._cli_status)
         self._schedule = MavlinkSchedule(now)
@@ -99,11 +99,11 @@ class Firmware:
 
     @property
     def armed(self) -> bool:
-        """Whether the craft is armed."""
+        """True if the craft is armed."""
         return self._board.armed
 
     def craft_at(self, now: float) -> Craft:
-        """Return what the sensors would say at a moment that is not before the last loop's."""
+        """The sensor values at `now`, which must not be before the last loop."""
         since = now - self._clock
         flight = fly(now - self._booted_at, self._flown + (since if self.armed else 0.0), self.armed)
         return Craft(flight, self.armed, self._faults.boxes, self._home)
@@ -111,7 +111,7 @@ class Firmware:
     # -- the main loop ---------------------------------------------------------------------------------------
 
     def next_loop(self) -> float | None:
-        """Tell when the next main loop runs that has anything to do; None if it waits for a byte or the pilot."""
+        """The time of the next main loop with work to do; None if it waits for a byte or the pilot."""
         if self._resets_at is not None:
             return self._resets_at
         wanted = [self._uart.next_arrival()]
@@ -123,7 +123,7 @@ class Firmware:
         return None if earliest is None else self.loop_at(earliest)
 
     def loop_at(self, earliest: float) -> float:
-        """Tell when the first main loop at or after `earliest` runs."""
+        """The time of the first main loop at or after `earliest`."""
         loops = ceil((earliest - self._next_loop) / self._looptime - 1e-6)
         return self._next_loop + max(loops, 0) * self._looptime
 
@@ -179,16 +179,16 @@ class Firmware:
             self._write_config()
 
     def _write_config(self) -> None:
-        """Write the whole configuration; the firmware does not look whether it took (writeParams)."""
+        """Write the whole configuration; the firmware does not verify it (writeParams)."""
         self._board.config_write_due = None
         with contextlib.suppress(FlashError):
-            # With the extension first the list, where a power cut costs nothing; without it they are one block.
+            # With the extension the list is written first and survives a power cut; without it they are one block.
             self._floppy.save()
             self._config.save(self._board.wp_radius_cm)
         self._stall()
 
     def _stall(self) -> None:
-        """Let the time pass for which flash held the CPU."""
+        """Let the time of the flash operations pass."""
         seconds = self._flash.take_busy_seconds()
         if seconds:
             self._clock += seconds
@@ -231,7 +231,7 @@ class Firmware:
         self.protocol = protocol
 
     def _telemetry_due(self) -> float | None:
-        """Tell when the firmware next sends, or changes its protocol, by itself."""
+        """The next time that the firmware sends, or changes its protocol, by itself."""
         due = []
         if self.protocol is not Protocol.MSP:
             due.append(self._schedule.next_due(self.protocol is Protocol.AUTOSENSE))
@@ -260,7 +260,7 @@ class Firmware:
             self._uart.write(frsky.frame(self._flight(), self._frsky_number), self._clock)
 
     def _completes_packet(self, byte: int) -> bool:
-        """Give a byte to the receivers that listen."""
+        """Pass a byte to the active receivers."""
         if self.protocol is not Protocol.MSP:
             for frame in self._mavlink.feed(bytes((byte,))):
                 if frame.version == 1:
@@ -290,7 +290,7 @@ class Firmware:
         self._stall()
         self._uart.write(frame, self._clock)
 
-    # -- the CLI, from which only a reset leads back ---------------------------------------------------------
+    # -- the CLI, which only a reset leaves ------------------------------------------------------------------
 
     def _enter_cli(self) -> None:
         self.in_cli = True

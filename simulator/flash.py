@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""NOR flash of an STM32F103: erasing sets a page to ones, programming clears bits, power may go meanwhile."""
+"""NOR flash of an STM32F103: erasing sets a page to ones, programming clears bits, power may fail meanwhile."""
 
 from simulator.options import Faults
 
@@ -8,7 +8,7 @@ ERASED = 0xFF
 
 
 class PowerCutError(Exception):
-    """The supply went away in the middle of a flash operation."""
+    """The power failed during a flash operation."""
 
 
 class FlashError(Exception):
@@ -16,7 +16,7 @@ class FlashError(Exception):
 
 
 class NorFlash:
-    """`memory` is the chip: it outlives power cuts (a bytearray) or even the program (a mapped file)."""
+    """`memory` is the chip: it survives power cuts (a bytearray) or even the program (a mapped file)."""
 
     def __init__(self, memory: memoryview, faults: Faults) -> None:
         self._memory = memory
@@ -30,32 +30,32 @@ class NorFlash:
         return self._memory
 
     def read(self, offset: int, size: int) -> bytes:
-        """Return `size` bytes."""
+        """Read `size` bytes."""
         return bytes(self._memory[offset : offset + size])
 
     def erase(self, page: int, seconds: float) -> None:
-        """Set a page to ones; FlashError if it did not take."""
+        """Set a page to ones; FlashError if that fails."""
         start = page * PAGE_SIZE
         if self._begin(seconds):
-            # Cut short, an erase has set some bits and not others: here those of every other byte.
+            # An interrupted erase has set only some bits: here those of every other byte.
             step = 2 if self._is_cut else 1
             self._memory[start : start + PAGE_SIZE : step] = bytes((ERASED,)) * (PAGE_SIZE // step)
         self._end(self.read(start, PAGE_SIZE) == bytes((ERASED,)) * PAGE_SIZE)
 
     def program(self, offset: int, data: bytes, seconds: float) -> None:
-        """Clear bits; FlashError if the result is not `data`, as when the place had not been erased."""
+        """Clear bits; FlashError if the result is not `data`, for example because the page was not erased."""
         if self._begin(seconds):
             for index in range(len(data) // 2 if self._is_cut else len(data)):
                 self._memory[offset + index] &= data[index]
         self._end(self.read(offset, len(data)) == data)
 
     def take_busy_seconds(self) -> float:
-        """Return how long the chip has held the CPU since the last call."""
+        """The time for which the chip has stalled the CPU since the last call."""
         seconds, self._busy_seconds = self._busy_seconds, 0.0
         return seconds
 
     def _begin(self, seconds: float) -> bool:
-        """Count an operation; False if the flash controller does not carry it out."""
+        """Count an operation; False if the flash controller does not execute it."""
         self.operations += 1
         self._busy_seconds += seconds
         if self._faults.flash_failures > 0 and not self._is_cut:

@@ -22,7 +22,7 @@ _FLIGHT_SAG_VS = 0.003
 
 @dataclass(frozen=True, slots=True)
 class FlightState:
-    """What the sensors say. Angles in degrees (`pitch`: nose down is positive), metres, metres a second, volts."""
+    """Sensor values. Angles in degrees (`pitch`: nose down is positive), metres, metres a second, volts."""
 
     lat_e7: int
     lon_e7: int
@@ -48,7 +48,7 @@ class Craft:
     home: tuple[int, int] | None
 
     def way_home(self) -> tuple[float, float]:
-        """Return metres and degrees; zeros while there is no home."""
+        """Distance in metres and direction in degrees; zeros without a home."""
         if self.home is None:
             return 0.0, 0.0
         lat_e7, lon_e7 = self.home
@@ -58,8 +58,8 @@ class Craft:
 
 
 def fly(uptime: float, flown: float, armed: bool) -> FlightState:
-    """Return the state `uptime` seconds after boot, of which the craft was armed for `flown`."""
-    # Metres north and east of the field's middle on a circle that begins and ends there.
+    """The state `uptime` seconds after boot, of which the craft was armed for `flown`."""
+    # Metres north and east of the field's centre, on a circle that starts and ends there.
     angle = flown * _CRUISE_SPEED_MS / _CIRCLE_RADIUS_M
     north = _CIRCLE_RADIUS_M * math.sin(angle)
     east = _CIRCLE_RADIUS_M * (1 - math.cos(angle))

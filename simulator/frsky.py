@@ -15,7 +15,7 @@ _VOLTS, _DECIVOLTS = 0x3A, 0x3B
 
 
 def frame(flight: FlightState, number: int) -> bytes:
-    """Return what the `number`th period sends: acceleration, every fourth time height, course and battery."""
+    """The frame of the `number`th period: acceleration, every fourth time also height, course and battery."""
     sent = [(identifier, value) for identifier, value in zip(_ACCELERATION, (0, 0, 1000), strict=True)]
     if number % 4 == 0:
         sent += [(_ALTITUDE_M, int(flight.height_m)), (_ALTITUDE_CM, int(flight.height_m * 100) % 100)]

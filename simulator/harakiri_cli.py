@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's command line, as far as a companion meets it (cli.c): status, wpflush, save and exit.
+"""The part of Harakiri's command line that a companion may reach (cli.c): status, wpflush, save and exit.
 
-Nothing is looked at before a whole line has been typed, and an empty line is none.
+Commands take effect at the end of a line; empty lines are ignored.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ _ENTER = b"\r\n"
 
 
 class CliRequest(Enum):
-    """What a command asks of the firmware."""
+    """A command's request to the firmware."""
 
     FLUSH = auto()
     SAVE = auto()
@@ -22,14 +22,14 @@ class CliRequest(Enum):
 
 
 class CommandLine:
-    """Takes typed bytes. `status` gives the lines about the stored missions."""
+    """Takes typed bytes. `status` returns the lines about the stored missions."""
 
     def __init__(self, status: Callable[[], str]) -> None:
         self._status = status
         self._line = bytearray()
 
     def type(self, byte: int) -> tuple[bytes, CliRequest | None]:
-        """Take a byte; return what is printed and what the firmware has to do then."""
+        """Take a byte; returns the output and the request to the firmware."""
         if byte in _ENTER and self._line:
             line, self._line = bytes(self._line), bytearray()
             text, asked = self._run(line.decode("ascii"))

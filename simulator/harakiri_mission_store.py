@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's own mission store and the MAVLink messages that fill it (baseflight_mavlink.c, floppy.c).
 
-The list in RAM is changed item by item. A second after the last item it is written to flash, whether the
-transfer was ended or not; an error before that brings back what is in flash.
+The list in RAM is changed item by item. A second after the last item it is written to flash, even if the
+transfer is incomplete; an error before that reloads the list from flash.
 """
 
 from collections.abc import Callable
@@ -40,8 +40,8 @@ _NOT_ALONE = (WpCommand.SETROI, WpCommand.RETURN_TO_LAUNCH, WpCommand.LAND, WpCo
 class Floppy:
     """One boot's store. `send` packs and sends a message to a partner.
 
-    With the extension, `missions`, that keeps the list, and an upload that breaks off leaves the old one. Without it,
-    the list is written with the configuration, complete or not.
+    With the extension, `missions` keeps the list, and an interrupted upload leaves the old one. Without it, the list
+    is written with the configuration, complete or not.
     """
 
     def __init__(
@@ -65,11 +65,11 @@ class Floppy:
 
     @property
     def count(self) -> int:
-        """How many records the list in RAM has."""
+        """The number of records in RAM."""
         return len(self._list)
 
     def load(self) -> None:
-        """Take the list from flash."""
+        """Load the list from flash."""
         self._list = list(unpack_records(self.stored))
 
     def clear(self) -> None:
@@ -84,13 +84,13 @@ class Floppy:
         (self._missions or self._slots).store(pack_records(self._list))
 
     def drop_stale(self, now: float) -> None:
-        """With the extension, an upload that breaks off leaves the list that was there."""
+        """With the extension, restore the old list after an interrupted upload."""
         if self._missions and self._receiving and now - self._touched > _TIMEOUT_S:
             self._reset()
             self.load()
 
     def take(self, frame: MavlinkFrame, now: float) -> None:
-        """Act on a MAVLink frame."""
+        """Handle a MAVLink frame."""
         message = self._decoder.decode(frame)
         if message is None:
             return
@@ -179,7 +179,7 @@ class Floppy:
             self._request(now)
 
     def _record(self, message: Message, command: WpCommand | None) -> WpRecord | None:
-        """Return what the firmware makes of an item; None if it skips it."""
+        """The firmware's record for an item; None if it skips it."""
         lat_e7, lon_e7 = (int(single(single(degrees) * _E7)) for degrees in (message.x, message.y))
         height = _within(message.z, -32767, 32767) or 2
         if command is None or (command in (*_TO_PLACE, WpCommand.SETROI) and not (lat_e7 and lon_e7)):
@@ -218,5 +218,5 @@ class Floppy:
 
 
 def _within(value: float, low: int, high: int) -> int:
-    """Do as constrain_int, which takes an int."""
+    """Like constrain_int, which takes an int."""
     return min(max(int(value), low), high)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A model of INAV as a copter with GPS and compass, versions 6.1.1 to 9.1.0 (src/main/fc/fc_msp.c).
 
-Its lengths and oddities were compared with INAV's own simulator of each version.
+Its frame sizes and special cases were compared with INAV's own simulator of each version.
 """
 
 import struct
@@ -32,7 +32,7 @@ _FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
 
 
 class InavCommand(IntEnum):
-    """The commands that are simulated."""
+    """The simulated commands."""
 
     API_VERSION = 1
     FC_VARIANT = 2
@@ -87,7 +87,7 @@ class InavFirmware:
 
     @property
     def armed(self) -> bool:
-        """Whether the craft is armed."""
+        """True if the craft is armed."""
         return self._armed
 
     @property
@@ -97,14 +97,14 @@ class InavFirmware:
         return [stored[at : at + WAYPOINT_SIZE] for at in range(0, len(stored), WAYPOINT_SIZE)]
 
     def take_busy_seconds(self) -> float:
-        """Return how long the EEPROM has held the CPU since the last call."""
+        """The time for which the EEPROM has stalled the CPU since the last call."""
         busy, self._busy = self._busy, 0.0
         return busy
 
     # -- the craft -------------------------------------------------------------------------------------------
 
     def follow_pilot(self, now: float) -> None:
-        """Fly until `now`, arm and disarm. CrashError: the check before arming met a JUMP to nowhere."""
+        """Fly until `now`, arm and disarm. CrashError: the check before arming found a JUMP with an invalid target."""
         self._fly_until(now)
         self._follow_sticks()
         flyable = self._armed or self._mission.is_flyable()
@@ -127,7 +127,7 @@ class InavFirmware:
                 self._mission.load()
 
     def craft_at(self, now: float) -> Craft:
-        """Return what the sensors say."""
+        """The sensor values."""
         self._fly_until(now)
         return Craft(self._craft.state(), self._armed, self._flags(), self._home)
 
@@ -144,7 +144,7 @@ class InavFirmware:
         return bool(self._faults.boxes >> self._boxes.index(box) & 1)
 
     def _flags(self) -> int:
-        """Return the modes as MSP_STATUS has them: those of the navigation are what it does, not the switch."""
+        """The modes in MSP_STATUS: navigation modes follow the flight, not the switch."""
         in_mission, returning = self._navigation.is_in_mission, self._navigation.is_returning
         flown = {ARM: self._armed, NAV_WP: in_mission, NAV_RTH: returning}
         if in_mission or returning:
@@ -154,7 +154,7 @@ class InavFirmware:
     # -- MSP -------------------------------------------------------------------------------------------------
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """Return the reply's frame: an error for what is refused or not known."""
+        """The reply frame: an error frame for refused or unknown commands."""
         self._fly_until(now)
         match command:
             case InavCommand.SET_WP:
@@ -190,7 +190,7 @@ class InavFirmware:
         return saved
 
     def _set_waypoint(self, payload: bytes) -> bytes:
-        """Acknowledge any waypoint of the right size, whether or not it is stored."""
+        """Acknowledge any waypoint of the right size, even if it is not stored."""
         if len(payload) != WAYPOINT_SIZE:
             return error(InavCommand.SET_WP)
         closed = self._navigation.is_in_mission if self._version >= (8, 0, 0) else self._armed
@@ -203,7 +203,7 @@ class InavFirmware:
         flight = self._craft.state()
         match number:
             case 0:
-                # With a fix, and this craft always has one, home is here until it arms.
+                # With a fix, which this craft always has, home is its position until it arms.
                 waypoint = NavWaypoint(FAKE.action, *(self._home or self._craft.position), _FIELD_ALTITUDE_CM)
             case 255:
                 waypoint = NavWaypoint(FAKE.action, flight.lat_e7, flight.lon_e7, round(flight.altitude_m * 100))

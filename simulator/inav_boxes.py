@@ -25,5 +25,5 @@ BOXES = {"6.1.1": _BOXES_6, "7.1.2": _BOXES_7, "8.0.1": _BOXES_8, "9.0.1": _BOXE
 
 
 def box_names(boxes: tuple[int, ...]) -> bytes:
-    """Return MSP_BOXNAMES' payload: more than one byte can count."""
+    """MSP_BOXNAMES' payload, which may be longer than 255 bytes."""
     return "".join(f"{_NAMES[box]};" for box in boxes).encode()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's waypoint list in RAM and the copy of it in the EEPROM, with all that it acknowledges and does not do.
+"""INAV's waypoint list in RAM and its copy in the EEPROM, including requests that it acknowledges but ignores.
 
 After setWaypoint, getWaypoint, loadNonVolatileWaypointList and saveNonVolatileWaypointList of INAV 6.1.1 to 9.1.0
 (src/main/navigation/navigation.c).
@@ -14,18 +14,18 @@ CAPACITY = 120
 EEPROM_SIZE = CAPACITY * WAYPOINT_SIZE
 _STORED_ACTIONS = frozenset(Action) - {Action.POSHOLD_UNLIM}
 _GEO_ACTIONS = frozenset((Action.WAYPOINT, Action.POSHOLD_TIME, Action.LAND))
-#: Reading past the end gives this, and so does home until it is known.
+#: The reply past the end of the list, and for home until it is known.
 FAKE = NavWaypoint()
 
 
 class InavMission:
-    """`eeprom`: EEPROM_SIZE bytes; blank ones are zeros, an action that INAV does not take."""
+    """`eeprom`: EEPROM_SIZE bytes; blank ones are zeros, an invalid action for INAV."""
 
     def __init__(self, eeprom: memoryview) -> None:
         self._eeprom = eeprom
-        # Forgotten waypoints stay where they are; the counts say which of them exist.
+        # Deleted waypoints stay in memory; only the counts change.
         self._list = [NavWaypoint(action=0, flag=0)] * CAPACITY
-        #: nav_wp_multi_mission_index: which mission of the store is flown, from 1. The pilot's sticks change it.
+        #: nav_wp_multi_mission_index: the number of the mission to fly, from 1. The pilot's sticks change it.
         self.selected = 1
         self._forget()
 
@@ -37,34 +37,34 @@ class InavMission:
 
     @property
     def stored(self) -> bytes:
-        """The waypoints in the EEPROM, each of WAYPOINT_SIZE bytes, up to the one with the flag of the last."""
+        """The waypoints in the EEPROM, each of WAYPOINT_SIZE bytes, up to the one with the flag LAST."""
         for number in range(1, CAPACITY + 1):
             if self._saved(number).flag == FLAG_LAST:
                 return bytes(self._eeprom[: number * WAYPOINT_SIZE])
         return b""
 
     def known(self, armed: bool) -> int:
-        """Return the count that MSP_WP_GETINFO tells: of all missions of the list while disarmed."""
+        """The count in MSP_WP_GETINFO: of all missions in the list while disarmed."""
         return self._total if self._total and not armed else self.count
 
     def __getitem__(self, index: int) -> NavWaypoint:
-        """A waypoint of the loaded mission by its index from 0, as it is flown: a JUMP's p1 is an index, too."""
+        """A waypoint of the loaded mission by its index from 0, as flown: a JUMP's p1 is an index, too."""
         return self._list[min(self._start + index, CAPACITY - 1)]
 
     @property
     def lands_after_rth(self) -> bool:
-        """Whether a mission's RTH ends on the ground. The last waypoint's p1 decides, whatever its action is."""
+        """True if a mission's RTH ends with a landing. The last waypoint's p1 decides, whatever its action is."""
         return self[self.count - 1].p1 > 0
 
     def read(self, number: int, armed: bool) -> NavWaypoint:
-        """Return waypoint 1..255 as MSP_WP does: a fake one where there is none."""
+        """Waypoint 1..255 as in MSP_WP: FAKE if there is none."""
         if not 1 <= number <= min(self.known(armed), CAPACITY):
             return FAKE
         waypoint = self._list[number - 1 + (self._start if armed else 0)]
         return replace(waypoint, p1=wrap16(waypoint.p1 + 1)) if waypoint.action == Action.JUMP else waypoint
 
     def write(self, number: int, waypoint: NavWaypoint) -> None:
-        """Take over a waypoint, or not: the flight controller acknowledges either way."""
+        """Store a waypoint if it is valid; the flight controller acknowledges it either way."""
         if not 1 <= number <= CAPACITY or waypoint.action not in _STORED_ACTIONS:
             return
         if number not in (1, self.count + 1):
@@ -88,7 +88,7 @@ class InavMission:
         return True
 
     def load(self) -> bool:
-        """Copy the EEPROM's missions into RAM. A blank EEPROM changes nothing, and is an error only if RAM is empty."""
+        """Copy the EEPROM's missions to RAM. A blank EEPROM changes nothing, and is an error only if RAM is empty."""
         for number in range(1, CAPACITY + 1):
             saved = self._saved(number)
             self.write(number, saved)
@@ -106,7 +106,7 @@ class InavMission:
         return self.is_valid
 
     def follow_selection(self) -> None:
-        """Load the selected mission, which an armed INAV does outside of its waypoint mode."""
+        """Load the selected mission; an armed INAV does so outside of its waypoint mode."""
         if self._missions >= 2 and self._loaded != self.selected:
             self._load_selected()
 
@@ -117,7 +117,7 @@ class InavMission:
         self.count = ends[self.selected - 1] + 1 - self._start if len(ends) >= self.selected else 0
 
     def is_flyable(self) -> bool:
-        """Tell whether INAV lets the pilot arm with these JUMPs; it looks whenever it is disarmed. CrashError."""
+        """True if INAV allows arming with these JUMPs; checked whenever it is disarmed. CrashError."""
         for index in range(self.count):
             waypoint = self[index]
             if waypoint.action != Action.JUMP:
@@ -127,14 +127,14 @@ class InavMission:
             if index == 0 or target >= self.count or is_near or waypoint.p2 < -1:
                 return False
             if target < 0:
-                # INAV takes the target for an unsigned number and looks at the waypoint 65,000 places on.
+                # INAV reads the target as unsigned and accesses a waypoint 65,000 places further.
                 raise CrashError
             if self[target].action not in _GEO_ACTIONS:
                 return False
         return True
 
     def start_jumps(self) -> None:
-        """Set each JUMP's counter, which INAV keeps in p3."""
+        """Set the counter of each JUMP, which INAV keeps in p3."""
         for index in range(self.count):
             if self[index].action == Action.JUMP:
                 self.set_jump(index, self[index].p2)

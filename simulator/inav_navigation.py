@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's waypoint mode as a copter flies it: the states of its navigation that a mission goes through.
+"""INAV's waypoint mode of a copter: the navigation states of a mission.
 
 After navOnEnteringState_NAV_STATE_WAYPOINT_... of INAV 9.1.0 (src/main/navigation/navigation.c). Not simulated: the
 pilot's sticks, safe distances, and the climb before a return home.
@@ -22,7 +22,7 @@ _MEAN_SEA_LEVEL = 1
 
 
 class Phase(Enum):
-    """What it does, and how MSP_NAV_STATUS tells it: mode, state, error."""
+    """The flight phases, with their values in MSP_NAV_STATUS: mode, state, error."""
 
     IDLE = (Mode.NONE, State.NONE, Error.NONE)
     PRE_ACTION = (Mode.NAV, State.PROCESS_NEXT, Error.NONE)
@@ -53,12 +53,12 @@ class InavNavigation:
 
     @property
     def is_in_mission(self) -> bool:
-        """Whether the flight mode is NAV WP; on the way home of a mission it is NAV RTH."""
+        """True if the flight mode is NAV WP; during a mission's RTH it is NAV RTH."""
         return self.phase is not Phase.IDLE and not self.is_returning
 
     @property
     def is_returning(self) -> bool:
-        """Whether the flight mode is NAV RTH."""
+        """True if the flight mode is NAV RTH."""
         return self.phase in _RETURNING
 
     def arm(self) -> None:
@@ -66,20 +66,20 @@ class InavNavigation:
         self._home = self._craft.position
 
     def disarm(self) -> None:
-        """End whatever it does; the mission begins anew after the next arming."""
+        """Stop; the mission restarts after the next arming."""
         self.phase = Phase.IDLE
         self._restarts = True
         self.index = 0
 
     def status(self) -> NavStatus:
-        """Return what MSP_NAV_STATUS tells, which names a waypoint at all times."""
+        """The content of MSP_NAV_STATUS, which always names a waypoint."""
         mode, state, error = self.phase.value
         number = self.index + 1
         return NavStatus(mode, state, self._mission[self.index].action, number, error, round(self._craft.heading))
 
-    def step(self, seconds: float, is_wished: bool) -> None:
-        """Let time pass in flight; `is_wished`: the pilot's switch NAV WP is on. CrashError."""
-        if not is_wished:
+    def step(self, seconds: float, is_requested: bool) -> None:
+        """Advance the flight; `is_requested`: the pilot's switch NAV WP is on. CrashError."""
+        if not is_requested:
             self.phase = Phase.IDLE
         elif self.phase is Phase.IDLE and self._mission.is_valid and self._mission.count:
             self._begin()
@@ -108,7 +108,7 @@ class InavNavigation:
         self._pre_action()
 
     def _pre_action(self) -> None:
-        """Carry out what is no place, which takes INAV 10 ms each, up to the next leg. CrashError."""
+        """Execute waypoints without a place up to the next leg, which takes INAV 10 ms each. CrashError."""
         for _ in range(CAPACITY):
             waypoint = self._mission[self.index]
             match waypoint.action:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a wire does to bytes: a UART at another speed, and noise."""
+"""Line effects on bytes: a UART at another speed, and noise."""
 
 import random
 
@@ -7,11 +7,11 @@ _FRAME_BITS = 10
 
 
 def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
-    """Return what a receiver at `read_baud` gets from `data` sent back to back at `sent_baud`.
+    """The bytes that a receiver at `read_baud` gets from `data` sent back to back at `sent_baud`.
 
-    8N1 as the STM32 does it: wait for the falling edge, sample each bit in its middle, and deliver a byte whose stop
-    bit is low all the same. So a wrong speed gives the very bytes that it would give on a wire, the harmful ones too.
-    Speed 0 is a port that is hung up.
+    8N1 as on the STM32: wait for the falling edge, sample each bit in its middle, and deliver a byte even if its stop
+    bit is low. So a wrong speed gives exactly the bytes that it would give on a wire, including harmful ones. Speed 0
+    is a disconnected port.
     """
     if sent_baud == read_baud:
         return data
@@ -22,7 +22,7 @@ def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
     received = bytearray()
     edge = wire.find(0)
     while edge >= 0:
-        # The idle line after the end is high.
+        # The idle line is high.
         samples = (int(edge + (index + 0.5) * sent_bits_per_read) for index in range(_FRAME_BITS))
         _, *bits, stop = (wire[at] if at < len(wire) else 1 for at in samples)
         received.append(sum(bit << shift for shift, bit in enumerate(bits)))
@@ -34,7 +34,7 @@ def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
 
 
 def disturb(data: bytes, lost_byte_rate: float, bit_error_rate: float, dice: random.Random) -> bytes:
-    """Lose bytes and flip bits; the rates are probabilities."""
+    """Drop bytes and flip bits; the rates are probabilities."""
     if not (data and (lost_byte_rate or bit_error_rate)):
         return data
     kept = (byte for byte in data if dice.random() >= lost_byte_rate) if lost_byte_rate else data

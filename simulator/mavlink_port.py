@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's MAVLink 1 stream: what it sends, when, and as whom (baseflight_mavlink.c).
+"""Harakiri's MAVLink 1 stream: its messages, schedule and ids (baseflight_mavlink.c).
 
-Payloads are packed here rather than by pymavlink: the firmware sends them without the fields that MAVLink 2
-added.
+Payloads are packed here and not by pymavlink, because the firmware sends them without MAVLink 2's extra fields.
 """
 
 import math
@@ -29,13 +28,12 @@ _SENSORS = 35843 | 4100 | 8200 | 16416
 _SENSORS_HEALTHY = _SENSORS & 1023
 _RSSI = 230
 
-#: The stream is cut into slots of 10 ms; a message goes out in each slot whose number its divisor divides,
-#: one a slot.
+#: The stream has slots of 10 ms; a message is sent in each slot whose number its divisor divides, one per slot.
 SLOT_SECONDS = 0.010
 
 
 class Stream(Enum):
-    """A message of the stream: divisor (the first that divides wins), message id, payload layout."""
+    """The messages of the stream: divisor (the first that divides wins), message id, payload layout."""
 
     SCALED_PRESSURE = (199, 29, "<Iffh")
     HEARTBEAT = (101, 0, "<IBBBBB")
@@ -47,25 +45,25 @@ class Stream(Enum):
 
 
 class MavlinkSchedule:
-    """Decides which message is due. `only_heartbeat`: the firmware is in AUTOSENSE."""
+    """The schedule of messages. `only_heartbeat`: the firmware is in AUTOSENSE."""
 
     def __init__(self, now: float) -> None:
         self._slot = 0
         self._time = now
 
     def resume(self, now: float) -> None:
-        """Go on from `now`, after a time in which the firmware did not come here."""
+        """Continue from `now`, after a time without calls by the firmware."""
         self._time = now
 
     def next_due(self, only_heartbeat: bool) -> float:
-        """Tell when the next message is due."""
+        """The time of the next message."""
         ahead = 1
         while self._message(self._slot + ahead, only_heartbeat) is None:
             ahead += 1
         return self._time + ahead * SLOT_SECONDS
 
     def take_due(self, now: float, only_heartbeat: bool) -> list[Stream]:
-        """Return the messages that are due by `now`."""
+        """The messages due by `now`."""
         due = []
         while self._time + SLOT_SECONDS <= now + 1e-9:
             self._time += SLOT_SECONDS
@@ -88,18 +86,18 @@ class MavlinkSender:
         self._writer = FrameWriter(_SYSID, _COMPID)
 
     def telemetry(self, message: Stream, craft: Craft, uptime: float) -> bytes:
-        """Encode a message of this moment; `uptime` in seconds."""
+        """Encode a message with the present values; `uptime` in seconds."""
         _, msgid, layout = message.value
         payload = struct.pack(layout, *_fields(message, craft, round(uptime * 1000)))
         return self.frame(Packed(msgid, payload, payload))
 
     def frame(self, packed: Packed) -> bytes:
-        """Make the frame of any message."""
+        """Encode any message."""
         return self._writer.frame(packed, 1)
 
 
 def _fields(message: Stream, craft: Craft, uptime_ms: int) -> tuple[float, ...]:
-    """Return a message's fields in the order of the wire."""
+    """A message's fields in wire order."""
     flight, armed = craft.flight, craft.armed
     heading = round(flight.heading) % 360
     throttle = 45 if armed else 0

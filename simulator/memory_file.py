@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A file that keeps what a simulated board's flash or EEPROM holds."""
+"""A file with the content of a simulated board's flash or EEPROM."""
 
 import mmap
 from pathlib import Path
@@ -8,7 +8,7 @@ import click
 
 
 def open_memory(path: Path, blank: bytes, hint: str) -> memoryview:
-    """Map the file; a new one is `blank`. click.ClickException, with a hint if it is another board's."""
+    """Map the file; a new one is `blank`. click.ClickException, with a hint if the file is of another board."""
     try:
         if not path.exists():
             path.write_bytes(blank)

@@ -26,14 +26,14 @@ _LIST = struct.Struct("<HI")
 _READ = struct.Struct("<HBB")
 _RECORDS_HEADER = struct.Struct("<BH")
 _RADIUS = struct.Struct("<HH")
-#: Flash writes that requests may cause in a row, and how often one more is allowed.
+#: The burst of flash writes that requests may cause, and the interval at which one more is allowed.
 _WRITE_BURST = 64
 _WRITE_INTERVAL_MS = 300_000
 
 
 @dataclass(slots=True)
 class _Upload:
-    """A list that is being staged. `touched`: when its last request came, seconds."""
+    """A list being staged. `touched`: the time of its last request, seconds."""
 
     identity: ListIdentity
     touched: float
@@ -41,7 +41,7 @@ class _Upload:
 
 
 class MissionCommands:
-    """State of the extension since boot: the slots, and an open transfer or none; see Missions."""
+    """State of the extension since boot: the slots, and the open transfer if any; see Missions."""
 
     def __init__(self, flash: NorFlash, board: Board) -> None:
         self._board = board
@@ -52,7 +52,7 @@ class MissionCommands:
         self._intervals = 0
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """Return the reply's payload; None if the command is none of the extension's. PowerCutError."""
+        """The reply's payload; None if it is not one of the extension's commands. PowerCutError."""
         self.drop_stale(now)
         body = unmask(payload)
         match command:
@@ -73,7 +73,7 @@ class MissionCommands:
         return None
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if the craft is armed or it has been silent for too long; add to the write budget."""
+        """Drop an open transfer if the craft is armed or at its timeout; add to the write budget."""
         intervals = int(now * 1000) // _WRITE_INTERVAL_MS
         self._writes_left = min(self._writes_left + intervals - self._intervals, _WRITE_BURST)
         self._intervals = intervals
@@ -95,7 +95,7 @@ class MissionCommands:
 
     @property
     def writes(self) -> int:
-        """How many lists were ever made valid in this flash."""
+        """The number of lists ever made valid in this flash."""
         return self._slots.writes
 
     def _info(self) -> Info:
@@ -136,7 +136,7 @@ class MissionCommands:
         return False
 
     def _progress(self, status: Status) -> Progress:
-        """Where the transfer stands, whatever the status; zeros without one."""
+        """The progress of the transfer, with `status`; zeros without one."""
         staged = self._transfer.next if self._transfer else 0
         return Progress(status, staged, self._slots.staged_checksum(staged))
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two flash slots for the mission, of which the newest valid one counts, and the configuration's page.
+"""Two flash slots for the mission, of which the newest valid one is used, and the configuration's page.
 
-The layout is that of firmware/naze_mission.h: a header, then the records. The header is programmed after them and its
-seal last of all: until then the other slot is the list. Staging needs no RAM.
+The layout is that of firmware/naze_mission.h: a header, then the records. The header is programmed after them, its
+seal last: until then the other slot is the list. Staging needs no RAM.
 """
 
 import struct
@@ -25,17 +25,17 @@ _BLANK = bytes((ERASED,)) * PAGE_SIZE
 
 
 def slot_pages(capacity: int) -> int:
-    """Return how many pages a slot of `capacity` records takes."""
+    """The pages of a slot of `capacity` records."""
     return -(-(_RECORDS_AT + capacity * RECORD_SIZE) // PAGE_SIZE)
 
 
 def flash_size(options: SimOptions) -> int:
-    """Return the size of the flash that the options ask for, bytes."""
+    """The size of the flash for these options, bytes."""
     return (_SLOTS * slot_pages(options.capacity) + 1) * PAGE_SIZE
 
 
 class MissionSlots:
-    """The stored list, and the one that is being staged in the other slot."""
+    """The stored list, and the one being staged in the other slot."""
 
     def __init__(self, flash: NorFlash, options: SimOptions) -> None:
         self._flash = flash
@@ -49,7 +49,7 @@ class MissionSlots:
         self.load()
 
     def load(self) -> None:
-        """Find the newest valid slot, as at boot."""
+        """Find the newest valid slot, as done at boot."""
         self.stored, self.writes = ListIdentity(0, 0), 0
         for slot in range(_SLOTS):
             header = self._flash.read(self._start(slot), _SEAL_AT + len(_SEAL))
@@ -61,17 +61,17 @@ class MissionSlots:
                     self._active, self.stored, self.writes = slot, identity, writes
 
     def read(self, first: int, count: int) -> bytes:
-        """Return the bytes of stored records, fewer at the list's end."""
+        """The bytes of stored records; fewer at the end of the list."""
         count = min(count, self.stored.count - first)
         return self._flash.read(self._record(self._active, first), count * RECORD_SIZE)
 
     @property
     def is_prepared(self) -> bool:
-        """True if the slot that is not in use is blank."""
+        """True if the unused slot is blank."""
         return all(self._is_blank(page) for page in self._unused_pages)
 
     def prepare(self) -> None:
-        """Erase the slot that is not in use, except for blank pages. FlashError, PowerCutError."""
+        """Erase the unused slot, except for blank pages. FlashError, PowerCutError."""
         for page in self._unused_pages:
             if not self._is_blank(page):
                 self._flash.erase(page, self._erase_seconds)
@@ -81,7 +81,7 @@ class MissionSlots:
         self._flash.program(self._record(self._unused, index), record, self._program_seconds)
 
     def staged_checksum(self, count: int) -> int:
-        """Compute the checksum of the first `count` staged records from what is in flash."""
+        """The checksum of the first `count` staged records, read from flash."""
         return self._checksum(self._unused, count)
 
     def commit(self, identity: ListIdentity) -> None:
@@ -92,7 +92,7 @@ class MissionSlots:
         try:
             self._flash.program(start + _SEAL_AT, _SEAL, self._program_seconds)
         except FlashError:
-            # A seal that reads wrong now might read right at the next start.
+            # A seal that reads wrong now might read correctly at the next boot.
             self._flash.erase(self._unused_pages[0], self._erase_seconds)
             raise
         self._active = self._unused
@@ -100,7 +100,7 @@ class MissionSlots:
         self.writes += 1
 
     def store(self, records: bytes) -> None:
-        """Make a whole list the stored one, unless it is that already. FlashError, PowerCutError."""
+        """Make a whole list the stored one, unless it already is. FlashError, PowerCutError."""
         identity = ListIdentity(len(records) // RECORD_SIZE, zlib.crc32(records))
         if identity != self.stored:
             self.prepare()
@@ -135,7 +135,7 @@ def _sealed(header: bytes) -> bytes:
 
 
 class StoredConfig:
-    """The one setting that matters here. A power cut while it is written loses it, as in Harakiri."""
+    """The only simulated setting. A power cut during a write loses it, as in Harakiri."""
 
     def __init__(self, flash: NorFlash, options: SimOptions) -> None:
         self._flash = flash
@@ -144,7 +144,7 @@ class StoredConfig:
         self._seconds = options.config_write_ms / 1000 / 2
 
     def load(self) -> int:
-        """Return gps_wp_radius, cm; the default if the page is not valid."""
+        """gps_wp_radius, cm; the default if the page is not valid."""
         value, inverse = _CONFIG.unpack(self._flash.read(self._page * PAGE_SIZE, _CONFIG.size))
         return int(value) if value ^ inverse == 0xFFFF else self._default_cm
 

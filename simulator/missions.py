@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The seam between the firmware and its mission extension: two things fit it, the model and the compiled core."""
+"""The interface of the mission extension, which the model and the compiled core implement."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from simulator.options import Faults, SimOptions
 
 @dataclass(slots=True)
 class Board:
-    """What the extension sees and changes of the rest of the firmware. Times are seconds."""
+    """The extension's access to the rest of the firmware. Times are seconds."""
 
     options: SimOptions
     faults: Faults
@@ -21,11 +21,11 @@ class Board:
 
     @property
     def write_pending(self) -> bool:
-        """Whether a write of the configuration is scheduled."""
+        """True if a write of the configuration is scheduled."""
         return self.config_write_due is not None or self.faults.busy
 
     def set_wp_radius(self, radius_cm: int, now: float) -> None:
-        """Take over another gps_wp_radius, which is stored a little later."""
+        """Set gps_wp_radius; it is stored a little later."""
         self.wp_radius_cm = radius_cm
         self.config_write_due = now + self.options.config_write_delay_ms / 1000
 
@@ -34,22 +34,22 @@ class Missions(Protocol):
     """The extension from one boot to the next (docs/msp-mission.md)."""
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """Return the reply's payload; None if the command is none of the extension's. PowerCutError."""
+        """The reply's payload; None if it is not one of the extension's commands. PowerCutError."""
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if the craft is armed, or if nothing was heard of it for too long."""
+        """Drop an open transfer if the craft is armed, or at its timeout."""
 
     @property
     def stored(self) -> bytes:
         """The stored list's records."""
 
     def store(self, records: bytes) -> None:
-        """Make records the stored list that the firmware got some other way (nm_store). FlashError, PowerCutError."""
+        """Store records that the firmware received by other means (nm_store). FlashError, PowerCutError."""
 
     @property
     def writes(self) -> int:
-        """How many lists were ever made valid in this flash."""
+        """The number of lists ever made valid in this flash."""
 
 
-#: Boots an extension, which finds its list in the flash.
+#: Boots an extension, which loads its list from flash.
 BootMissions = Callable[[NorFlash, Board], Missions]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board with MSP that is no Harakiri: power, wires and EEPROM around a firmware, without a clock.
+"""A simulated MSP board other than Harakiri's: power, wires and EEPROM around a firmware, without a clock.
 
-As SimulatedNaze is, but simpler: these boards speak nothing but MSP, at one speed.
+Simpler than SimulatedNaze: these boards speak only MSP, at one speed.
 """
 
 import random
@@ -20,12 +20,12 @@ from simulator.serial_ring import SerialRing
 _CLI_PROMPT = b"\r\n# "
 _CLI_BANNER = b"\r\nEntering CLI Mode, type 'exit' to reboot" + _CLI_PROMPT
 _NO_SPEED = 115200
-#: A pilot whom the firmware does not let arm tries again after this long.
-_PILOTS_PATIENCE_S = 0.1
+#: The interval at which the pilot retries a refused arming.
+_ARM_RETRY_S = 0.1
 
 
 class MspPower(Enum):
-    """What the CPU is doing. Out of CRASHED and BOOTLOADER only a switch of the power leads."""
+    """The state of the CPU. CRASHED and BOOTLOADER end only by a power cycle."""
 
     OFF = auto()
     BOOTING = auto()
@@ -36,7 +36,7 @@ class MspPower(Enum):
 
 
 class MspBoard:
-    """A board made without power: see `power_on`. `faults` may be changed and `counters` read at any time.
+    """A board, created without power: see `power_on`. `faults` may be changed and `counters` read at any time.
 
     `eeprom` outlives resets and power cuts.
     """
@@ -55,7 +55,7 @@ class MspBoard:
         self._firmware: MspFirmware | None = None
         self._receiver = MspReceiver()
         self._boots_at = self._next_task = self._next_look = 0.0
-        # How long the present run of the task takes longer than usual.
+        # The extra time of the present run of the task.
         self._busy = 0.0
         # An unserved '#' or 'R', and when the last byte was read.
         self._pending: str | None = None
@@ -63,31 +63,31 @@ class MspBoard:
 
     @property
     def baud(self) -> int:
-        """The speed of its port; a socket has none, so any will do."""
+        """The speed of its port; any value for a socket, which has none."""
         return self.options.baud or _NO_SPEED
 
     @property
     def armed(self) -> bool:
-        """Whether the craft is armed, which `faults.armed` only wishes."""
+        """True if the craft is armed; `faults.armed` is only the pilot's request."""
         return self._firmware is not None and self._firmware.armed
 
     @property
     def protocol(self) -> None:
-        """It speaks MSP and nothing else."""
+        """It speaks only MSP."""
         return None
 
     @property
     def is_alive(self) -> bool:
-        """Whether its port would be there if the board were a program."""
+        """True if its port would exist if the board were a program."""
         return self.power not in (MspPower.OFF, MspPower.CRASHED, MspPower.BOOTLOADER)
 
     @property
     def stored_records(self) -> list[bytes]:
-        """The waypoints that the next boot would find."""
+        """The waypoints that the next boot would load."""
         return self._boot_firmware(self._boot_at(self._next_task)).stored
 
     def truth(self, now: float) -> Craft | None:
-        """Return what the craft is doing; None while no firmware runs."""
+        """The craft's true state; None while no firmware runs."""
         self._run_until(now)
         try:
             return self._firmware.craft_at(now) if self._firmware else None
@@ -96,17 +96,17 @@ class MspBoard:
             return None
 
     def power_on(self, now: float) -> None:
-        """Supply the board; it boots."""
+        """Switch the power on; the board boots."""
         if self.power is MspPower.OFF:
             self.power = MspPower.BOOTING
             self._boots_at = now + self.options.boot_ms / 1000
 
     def power_on_booted(self, now: float) -> None:
-        """Supply the board as if long enough ago that it has booted by `now`."""
+        """Switch the power on early enough that the board has booted by `now`."""
         self.power_on(now - self.options.boot_ms / 1000)
 
     def power_off(self, now: float) -> None:
-        """Cut the supply: RAM and everything under way is lost."""
+        """Cut the power: RAM and bytes in transit are lost."""
         self._run_until(now)
         self._ring.clear()
         self._stop(MspPower.OFF)
@@ -118,12 +118,12 @@ class MspBoard:
             self._ring.receive(self._disturb(data), now)
 
     def advance(self, now: float) -> bytes:
-        """Return the frames that have left until `now` and were not returned before."""
+        """The frames sent until `now` since the last call."""
         self._run_until(now)
         return self._disturb(self._ring.sent(now))
 
     def next_wakeup(self, now: float) -> float:
-        """Tell when it is next worth calling `advance`; infinity if nothing will happen by itself."""
+        """The time for the next call of `advance`; infinity if nothing will happen by itself."""
         due = self._next_event()
         departure = self._ring.next_departure()
         if due is not None and self._firmware:
@@ -157,13 +157,13 @@ class MspBoard:
             else:
                 self._run_task(at)
         if self._firmware and self._next_task <= now:
-            # Nothing waits: the runs in between need not be simulated.
+            # Nothing is pending: skip the runs in between.
             self._next_task = self._task_at(now) + self.options.serial_task_ms / 1000
 
     def _start(self, at: float) -> None:
         self._ring.arrive(at)
         while self._ring.read() is not None:
-            """Nobody listened while it booted."""
+            """Data received during the boot is lost."""
         self.power = MspPower.RUNNING
         self._firmware = self._boot_firmware(self._boot_at(at))
         habits = self._firmware.habits
@@ -201,7 +201,7 @@ class MspBoard:
                 self._serve_letter(at)
         except CrashError:
             self._crash()
-        self._next_look = at + _PILOTS_PATIENCE_S
+        self._next_look = at + _ARM_RETRY_S
         self._next_task = at + self.options.serial_task_ms / 1000 + self._busy
 
     def _serve_msp(self, firmware: MspFirmware, at: float) -> None:

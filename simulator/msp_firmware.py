@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The seam between a simulated board with MSP and its firmware: INAV, MultiWii, and those with telemetry only."""
+"""The interface between a simulated MSP board and its firmware: INAV, MultiWii, and those with telemetry only."""
 
 import struct
 from collections.abc import Callable
@@ -17,16 +17,16 @@ _HIGHEST_V1_COMMAND = 255
 
 
 class CrashError(Exception):
-    """The firmware has run into memory that is not there: the board is dead until its power is switched."""
+    """The firmware accessed invalid memory: the board is dead until a power cycle."""
 
 
 @dataclass(frozen=True, slots=True)
 class PortHabits:
-    """What a firmware does with bytes from the wire.
+    """The serial behaviour of a firmware.
 
     `buffer_size`: the largest payload. `cli_guard_s`: the silence after a '#' that opens the CLI; None without a CLI.
-    `obeys_r`: an 'R' restarts it into its bootloader. `writes_first`: an answer waits until the EEPROM is written.
-    `speaks_v2`: it understands MSP v2, too.
+    `obeys_r`: an 'R' restarts it into its bootloader. `writes_first`: replies wait until the EEPROM is written.
+    `speaks_v2`: it also understands MSP v2.
     """
 
     buffer_size: int
@@ -38,7 +38,7 @@ class PortHabits:
 
 @dataclass(frozen=True, slots=True)
 class Boot:
-    """What a firmware finds when it starts. `now` in seconds."""
+    """The inputs of a firmware at boot. `now` in seconds."""
 
     options: MspOptions
     faults: Faults
@@ -54,30 +54,30 @@ class MspFirmware(Protocol):
 
     @property
     def armed(self) -> bool:
-        """Whether the craft is armed."""
+        """True if the craft is armed."""
 
     @property
     def stored(self) -> list[bytes]:
-        """The waypoints that outlive a reset, each as the firmware keeps it."""
+        """The waypoints that survive a reset, each in the firmware's own format."""
 
     def follow_pilot(self, now: float) -> None:
-        """Fly until `now` and do what the pilot wishes. CrashError."""
+        """Fly until `now` and follow the pilot's switches. CrashError."""
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """Return the reply's frame, or None for silence."""
+        """The reply frame, or None for silence."""
 
     def take_busy_seconds(self) -> float:
-        """Return for how long, since the last call, the firmware has done nothing else."""
+        """The time for which the firmware has been blocked since the last call."""
 
     def craft_at(self, now: float) -> Craft:
-        """Return what the sensors would say."""
+        """The sensor values."""
 
 
 BootFirmware = Callable[[Boot], MspFirmware]
 
 
 def reply(command: int, payload: bytes = b"") -> bytes:
-    """Encode a reply frame; from 255 bytes on it is a jumbo frame: size 255, command, the real size as 16 bits."""
+    """Encode a reply frame; from 255 bytes up a jumbo frame: size 255, command, the real size as 16 bits."""
     if command > _HIGHEST_V1_COMMAND:
         return frame_v2(">", command, payload)
     if len(payload) < _JUMBO:

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a simulated board with MSP that is no Harakiri can be made to be."""
+"""The options of simulated MSP boards other than Harakiri's."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MspOptions:
-    """`baud` None: a socket. `version` is INAV's. `receiver`: whether MSP_RC has channels.
+    """`baud` None: a socket. `version` is INAV's. `receiver`: True if MSP_RC has channels.
 
     `platform`: INAV's platform_type (mixer_profile.h), 0 a multirotor, 1 an aeroplane.
-    `serial_task_ms`: how often MSP is served, one request at a time: INAV's simulator 0.5, its boards 10.
-    `ring_size`: bytes that fit in before the next run: a UART's 256, INAV's simulator 2048.
+    `serial_task_ms`: the interval of the MSP task, which serves one request: INAV's simulator 0.5, its boards 10.
+    `ring_size`: of the receive ring, bytes: a UART's 256, INAV's simulator 2048.
     `capacity`: of MultiWii's EEPROM, waypoints. `seed`: of the random faults.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's MSP: the receiver that works byte by byte, and the answers to its commands (serial.c)."""
+"""Harakiri's MSP: the byte-by-byte receiver, and the replies to its commands (serial.c)."""
 
 import struct
 from collections.abc import Callable
@@ -21,7 +21,7 @@ _BOXES = (
     "ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO", "PASSTHRU",
     "HEADFREE", "BEEPER", "HEADADJ", "OSD SW", "GTUNE",
 )  # fmt: skip
-#: Of roll and pitch, whose P the firmware divides by.
+#: Roll and pitch, whose P the firmware divides by.
 _CLAMPED_PIDS = (0, 3)
 _PIDS = ("ROLL", "PITCH", "YAW", "ALT", "Pos", "PosR", "NavR", "LEVEL", "MAG", "VEL")
 _RSSI = 230
@@ -83,10 +83,10 @@ _ACKNOWLEDGED = frozenset(
 
 
 class MspReceiver:
-    """Finds requests as the firmware does: it trusts a header's size and never looks back.
+    """Finds requests as the firmware does: it trusts a header's size and never rescans.
 
-    `buffer_size`: the largest payload; a larger size byte is refused. The stock firmware takes 64 and has
-    no time-out: after a cut frame it swallows the next one's bytes until its count is full.
+    `buffer_size`: the largest payload; a larger size byte is refused. The stock firmware takes 64 and has no
+    timeout: after a truncated frame it consumes the next one's bytes until its count is reached.
     """
 
     def __init__(self, buffer_size: int = _STOCK_BUFFER) -> None:
@@ -99,12 +99,12 @@ class MspReceiver:
 
     @property
     def in_frame(self) -> bool:
-        """Tell whether a frame has begun."""
+        """True if a frame has begun."""
         return self._state != 0
 
     @property
     def leftover(self) -> bytes:
-        """What the buffer holds of earlier frames: the firmware reads it where a payload is missing."""
+        """The buffer's content from earlier frames, which the firmware reads if a payload is missing."""
         return bytes(self._buffer)
 
     def overwrite(self, data: bytes) -> None:
@@ -116,7 +116,7 @@ class MspReceiver:
         self._state = 0
 
     def push(self, byte: int) -> tuple[int, bytes] | None:
-        """Take a byte; return command and payload when it completes a request whose checksum is right."""
+        """Take a byte; returns command and payload if it completes a request with a valid checksum."""
         match self._state:
             case 0 | 1 | 2:
                 self._state = self._state + 1 if byte == b"$M<"[self._state] else 0
@@ -140,7 +140,7 @@ class MspReceiver:
 
 
 class MspAnswers:
-    """Answers to the stock commands. `craft` gives the state of this moment."""
+    """The replies to the stock commands. `craft` returns the present state."""
 
     def __init__(self, craft: Callable[[], Craft]) -> None:
         self._craft = craft
@@ -151,7 +151,7 @@ class MspAnswers:
         }
 
     def answer(self, command: int, payload: bytes) -> bytes:
-        """Return the whole reply frame. WP without a payload is up to the caller."""
+        """The whole reply frame. The caller handles WP without a payload."""
         if command == HarakiriCommand.WP:
             return self._waypoint(payload)
         if command in _SETTERS:

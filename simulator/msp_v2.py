@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MSP v2 as INAV and Betaflight receive and send it, beside v1 on the same port (src/main/msp/msp_serial.c)."""
+"""MSP v2 as in INAV and Betaflight, alongside v1 on the same port (src/main/msp/msp_serial.c)."""
 
 import struct
 
@@ -10,7 +10,7 @@ _DOLLAR, _V2 = ord("$"), ord("X")
 
 
 class MspReceiverV2(MspReceiver):
-    """Finds requests of either version. It trusts a header's size and never looks back."""
+    """Finds requests of either version. It trusts a header's size and never rescans."""
 
     def __init__(self, buffer_size: int) -> None:
         super().__init__(buffer_size)
@@ -20,11 +20,11 @@ class MspReceiverV2(MspReceiver):
 
     @property
     def in_frame(self) -> bool:
-        """Whether a frame has begun."""
+        """True if a frame has begun."""
         return bool(self._frame) or super().in_frame
 
     def push(self, byte: int) -> tuple[int, bytes] | None:
-        """Take a byte; return command and payload when it completes a request whose checksum is right."""
+        """Take a byte; returns command and payload if it completes a request with a valid checksum."""
         if self._frame:
             self._frame.append(byte)
             return self._look()

@@ -15,7 +15,7 @@ from simulator.waypoint_craft import WaypointCraft
 
 _STEP_S = 0.05
 _VERSION, _QUADX, _MSP_VERSION = 241, 3, 0
-_CAPABILITY = 0x7000_0010  # version of the navigation 7, and that there is one
+_CAPABILITY = 0x7000_0010  # navigation version 7, and the navigation bit
 _SENSORS = 0b1111
 _EEPROM_BYTE_S = 0.0033
 _BOX_NAMES = {
@@ -29,7 +29,7 @@ _HOME, _HOLD = 0, 255
 
 
 class MultiWiiCommand(IntEnum):
-    """The commands that are simulated."""
+    """The simulated commands."""
 
     IDENT = 100
     STATUS = 101
@@ -74,7 +74,7 @@ class MultiWiiFirmware:
 
     @property
     def armed(self) -> bool:
-        """Whether the craft is armed."""
+        """True if the craft is armed."""
         return self._armed
 
     @property
@@ -83,7 +83,7 @@ class MultiWiiFirmware:
         return self._mission.stored
 
     def take_busy_seconds(self) -> float:
-        """Return how long the EEPROM has held the CPU since the last call."""
+        """The time for which the EEPROM has stalled the CPU since the last call."""
         busy, self._busy = self._busy, 0.0
         return busy
 
@@ -100,7 +100,7 @@ class MultiWiiFirmware:
             self._craft.rest()
 
     def craft_at(self, now: float) -> Craft:
-        """Return what the sensors say."""
+        """The sensor values."""
         self._fly_until(now)
         return Craft(self._craft.state(), self._armed, self._flags(), self._home)
 
@@ -116,7 +116,7 @@ class MultiWiiFirmware:
         return kept | self._armed << _ARM | (self._navigation.state is not State.NONE) << _MISSION
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """Return the reply's frame; silence for a waypoint while a mission is flown."""
+        """The reply frame; none for a waypoint while a mission is flown."""
         self._fly_until(now)
         match command:
             case MultiWiiCommand.SET_WP:
@@ -141,7 +141,7 @@ class MultiWiiFirmware:
         return reply(MultiWiiCommand.SET_WP)
 
     def _waypoint(self, number: int) -> bytes:
-        """Answer with the step that was touched last, of which only some fields are replaced."""
+        """Reply with the last used step, of which only some fields are replaced."""
         navigation = self._navigation
         home = self._home or (0, 0)
         if number in (_HOME, _HOLD):

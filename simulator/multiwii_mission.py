@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii's waypoints: each has its place in the EEPROM, with a checksum of its own (EEPROM.cpp)."""
+"""MultiWii's waypoints: each has its own EEPROM slot and checksum (EEPROM.cpp)."""
 
 import struct
 
@@ -10,12 +10,12 @@ _BLANK = NavWaypoint(action=0, flag=0)
 
 
 def blank_eeprom(capacity: int) -> bytearray:
-    """Return an EEPROM as it leaves the factory: no waypoint's checksum is right."""
+    """A factory-new EEPROM: no waypoint's checksum is valid."""
     return bytearray(b"\xff" * (SLOT_SIZE * (capacity + 1)))
 
 
 class MultiWiiMission:
-    """Waypoints 1 to `capacity`. There is no list: a mission is what is found at 1, 2, 3, ... when it is flown."""
+    """Waypoints 1 to `capacity`. There is no list: a mission reads waypoints 1, 2, 3, ... as it is flown."""
 
     def __init__(self, eeprom: memoryview, capacity: int) -> None:
         self._eeprom = eeprom
@@ -23,7 +23,7 @@ class MultiWiiMission:
 
     @property
     def stored(self) -> list[bytes]:
-        """The waypoints from number 1 on whose checksum is right."""
+        """The waypoints from number 1 on with a valid checksum."""
         found = []
         for number in range(1, self._capacity + 1):
             slot = self._slot(number)
@@ -33,14 +33,14 @@ class MultiWiiMission:
         return found
 
     def recall(self, number: int) -> tuple[NavWaypoint, bool]:
-        """Return a waypoint, and whether its checksum is right."""
+        """A waypoint, and True if its checksum is valid."""
         if number > self._capacity:
             return _BLANK, False
         slot = self._slot(number)
         return unpack_waypoint(slot[:-1])[1], _is_sound(slot)
 
     def store(self, number: int, waypoint: NavWaypoint) -> bool:
-        """Write one; False if there is no place with this number."""
+        """Write one; False if the number is out of range."""
         if not 1 <= number <= self._capacity:
             return False
         packed = waypoint.pack(number)

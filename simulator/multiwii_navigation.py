@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii 2.4's mission mode (GPS.cpp): it fetches one step after the other out of the EEPROM.
+"""MultiWii 2.4's mission mode (GPS.cpp): it fetches one step after the other from the EEPROM.
 
-Not simulated: safe distances, the settling before a landing, and a mission that goes on where it was interrupted.
+Not simulated: safe distances, the settling before a landing, and resuming an interrupted mission.
 """
 
 from simulator.multiwii_mission import MultiWiiMission
@@ -11,13 +11,13 @@ from simulator.waypoint_craft import WaypointCraft
 
 _CRUISE_MS = 3.0
 _HOVER_HEIGHT_M = 10.0
-#: NAV_CONFIG's rth_altitude: the way home is flown no lower than this, or than the step says.
+#: NAV_CONFIG's rth_altitude: the lowest altitude of an RTH, unless the step's own is higher.
 _RTH_HEIGHT_M = 20.0
 _NO_JUMP = -10
 
 
 class MultiWiiNavigation:
-    """Flies `craft`. `step` is the waypoint that was touched last, by the mission or by MSP."""
+    """Flies `craft`. `step` is the last used waypoint, by the mission or by MSP."""
 
     def __init__(self, mission: MultiWiiMission, craft: WaypointCraft) -> None:
         self._mission = mission
@@ -32,18 +32,18 @@ class MultiWiiNavigation:
         self.number = 0
 
     def end(self) -> None:
-        """Give up whatever it does: disarmed, or the switch is off."""
+        """Stop: disarmed, or the switch is off."""
         self.state = State.NONE
         self._error = Error.NONE
 
     def status(self) -> NavStatus:
-        """Return what MSP_NAV_STATUS tells."""
+        """The content of MSP_NAV_STATUS."""
         mode = Mode.NONE if self.state is State.NONE else Mode.NAV
         return NavStatus(mode, self.state, self.step.action, self.number, self._error, round(self._craft.heading))
 
-    def fly(self, seconds: float, is_wished: bool) -> None:
-        """Let time pass in flight; `is_wished`: the pilot's switch MISSION is on."""
-        if not is_wished:
+    def fly(self, seconds: float, is_requested: bool) -> None:
+        """Advance the flight; `is_requested`: the pilot's switch MISSION is on."""
+        if not is_requested:
             self.end()
         elif self.state is State.NONE:
             self._next_step, self._jumps = 1, _NO_JUMP
@@ -127,7 +127,7 @@ class MultiWiiNavigation:
             self.state = State.PROCESS_NEXT
 
     def _hold(self, seconds: float) -> None:
-        """1000 * p1 is counted in the AVR's 16 bits."""
+        """The AVR counts 1000 * p1 in 16 bits."""
         self._held_s += seconds
         self._craft.hover(self._craft.height_m, seconds)
         if self._held_s >= (1000 * self.step.p1 % 0x10000) / 1000:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What MSP_NAV_STATUS tells, in MultiWii's numbers, which INAV kept and added to (mwState, mwError)."""
+"""MSP_NAV_STATUS in MultiWii's numbers, which INAV kept and extended (mwState, mwError)."""
 
 import struct
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Error(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class NavStatus:
-    """`number` is the waypoint's, from 1; `heading` what is steered, degrees."""
+    """`number`: of the waypoint, from 1; `heading`: the target heading, degrees."""
 
     mode: Mode
     state: State
@@ -59,5 +59,5 @@ class NavStatus:
     heading: int = 0
 
     def pack(self) -> bytes:
-        """Return the payload."""
+        """The payload."""
         return struct.pack("<5Bh", self.mode, self.state, self.action, self.number & 0xFF, self.error, self.heading)

@@ -11,7 +11,7 @@ FLAG_LAST = 0xA5
 
 
 class Action(IntEnum):
-    """What a waypoint asks for; the numbers are MultiWii's."""
+    """A waypoint's action, in MultiWii's numbers."""
 
     WAYPOINT = 1
     POSHOLD_UNLIM = 2
@@ -25,7 +25,7 @@ class Action(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class NavWaypoint:
-    """`action` may be any byte. Degrees * 1e7 and centimetres; what p1 to p3 mean hangs on the action."""
+    """`action` may be any byte. Degrees * 1e7 and centimetres; the meaning of p1 to p3 depends on the action."""
 
     action: int = Action.RTH
     lat_e7: int = 0
@@ -37,17 +37,17 @@ class NavWaypoint:
     flag: int = FLAG_LAST
 
     def pack(self, number: int) -> bytes:
-        """Return the 21 bytes of the wire."""
+        """The 21 payload bytes."""
         position = (self.lat_e7, self.lon_e7, self.alt_cm)
         return _LAYOUT.pack(number, self.action, *position, self.p1, self.p2, self.p3, self.flag)
 
 
 def unpack_waypoint(payload: bytes) -> tuple[int, NavWaypoint]:
-    """Return number and waypoint; struct.error unless there are 21 bytes."""
+    """Number and waypoint; struct.error unless there are 21 bytes."""
     number, *fields = _LAYOUT.unpack(payload)
     return number, NavWaypoint(*fields)
 
 
 def wrap16(value: int) -> int:
-    """Return what a signed 16-bit field makes of a number."""
+    """Wrap a number to a signed 16-bit field."""
     return (value + 0x8000) % 0x10000 - 0x8000

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated board: power, wires and flash around the firmware, without a clock of its own.
 
-Time is passed in (seconds of any monotonic clock). Whatever happens between two calls is computed at its nominal time,
-so a caller who comes late changes nothing but the moment at which bytes are collected.
+Time is passed in (seconds of any monotonic clock). Events between two calls are computed at their nominal times, so a
+late call changes only the time at which bytes are collected.
 """
 
 import random
@@ -23,7 +23,7 @@ from simulator.uart import GATHER_SECONDS, Uart
 
 
 class Power(Enum):
-    """What the CPU is doing."""
+    """The state of the CPU."""
 
     OFF = auto()
     BOOTING = auto()
@@ -32,7 +32,7 @@ class Power(Enum):
 
 
 class SimulatedNaze:
-    """A Naze32 with Harakiri, made without power: see `power_on`.
+    """A Naze32 with Harakiri, created without power: see `power_on`.
 
     `faults` may be changed and `counters` read at any time. `memory` is the flash chip, of `flash_size(options)` bytes;
     without it the board has a blank one of its own. `boot_missions` makes the mission extension, at every boot.
@@ -55,40 +55,40 @@ class SimulatedNaze:
         self._uart = Uart(self.options.baud, self.counters, self.options.tree.value)
         self._random = random.Random(self.options.seed)
         self._hazards = HazardWatch()
-        # No firmware while the board boots, and no such time while it has no power.
+        # No firmware while the board boots, and no boot time while it has no power.
         self._boots_at: float | None = None
         self._firmware: Firmware | None = None
 
     @property
     def baud(self) -> int:
-        """The speed of the UART at this moment."""
+        """The present speed of the UART."""
         return self._uart.baud
 
     @property
     def power(self) -> Power:
-        """What the CPU is doing."""
+        """The state of the CPU."""
         if self._firmware:
             return Power.CLI if self._firmware.in_cli else Power.RUNNING
         return Power.OFF if self._boots_at is None else Power.BOOTING
 
     @property
     def protocol(self) -> Protocol | None:
-        """What the firmware believes to be spoken; None while there is no firmware running."""
+        """The firmware's present protocol; None while no firmware runs."""
         return self._firmware.protocol if self._firmware else None
 
     @property
     def armed(self) -> bool:
-        """Whether the craft is armed, which `faults.armed` only wishes."""
+        """True if the craft is armed; `faults.armed` is only the pilot's request."""
         return self._firmware is not None and self._firmware.armed
 
     def truth(self, now: float) -> Craft | None:
-        """Return what the craft is doing, as nobody but the simulation knows; None while no firmware runs."""
+        """The craft's true state, which only the simulation knows; None while no firmware runs."""
         self._run_until(now)
         return self._firmware.craft_at(now) if self._firmware else None
 
     @property
     def stored(self) -> bytes:
-        """The mission records that are valid in flash, as the next boot would find them."""
+        """The valid mission records in flash, as the next boot would load them."""
         return self._boot_missions(self._flash, Board(self.options, self.faults, self.options.wp_radius_cm)).stored
 
     @property
@@ -99,20 +99,20 @@ class SimulatedNaze:
 
     @property
     def flash_operations(self) -> int:
-        """Erases and programs so far, as `faults.power_cut_at_flash_operation` counts them."""
+        """The number of erases and programs so far, as counted by `faults.power_cut_at_flash_operation`."""
         return self._flash.operations
 
     def power_on(self, now: float) -> None:
-        """Supply the board; it boots."""
+        """Switch the power on; the board boots."""
         if self.power is Power.OFF:
             self._boot(now)
 
     def power_on_booted(self, now: float) -> None:
-        """Supply the board as if long enough ago that it has booted by `now`."""
+        """Switch the power on early enough that the board has booted by `now`."""
         self.power_on(now - self.options.boot_ms / 1000)
 
     def power_off(self, now: float) -> None:
-        """Cut the supply: RAM and everything under way is lost, flash stays as it is."""
+        """Cut the power: RAM and bytes in transit are lost, flash is kept."""
         self._run_until(now)
         self._cut_power()
 
@@ -125,14 +125,14 @@ class SimulatedNaze:
             self._uart.receive(data, now)
 
     def advance(self, now: float) -> bytes:
-        """Return the bytes that have left the TX pin until `now` and were not returned before."""
+        """The bytes sent from the TX pin until `now` since the last call."""
         self._run_until(now)
         return self._disturb(self._uart.transmitted(now))
 
     def next_wakeup(self, now: float) -> float:
-        """Tell when it is next worth calling `advance`; infinity if nothing will happen by itself.
+        """The time for the next call of `advance`; infinity if nothing will happen by itself.
 
-        Loops that run late are computed as if in time, so requests that follow each other closely are taken together.
+        Late loops are computed at their nominal times, so close requests are handled in one call.
         """
         work = self._next_event()
         if work is None:
@@ -142,7 +142,7 @@ class SimulatedNaze:
         return max(now, min(work, self._uart.next_departure() or inf))
 
     def _next_event(self) -> float | None:
-        """Tell when the CPU next has something to do."""
+        """The next time that the CPU has work to do."""
         if self.faults.hang:
             return None
         return self._firmware.next_loop() if self._firmware else self._boots_at

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a simulated Naze can be made to be, and what it has counted."""
+"""The options, faults and counters of a simulated Naze."""
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 
 class TelemetryProtocol(IntEnum):
-    """The CLI's `tele_prot`: what the UART speaks while the craft is armed."""
+    """The CLI's `tele_prot`: the protocol of the UART while the craft is armed."""
 
     MSP = 0
     FRSKY_9600 = 1
@@ -30,7 +30,7 @@ class SimOptions:
     looptime_ms: float = 3.0
     tree: Tree = Tree.TESTCODE3
     boot_ms: float = 7100.0
-    #: What comes before this is lost; what comes later waits in the ring for the end of the boot.
+    #: Bytes before this are lost; later ones wait in the ring for the end of the boot.
     reception_ms: float = 470.0
     tele_prot: TelemetryProtocol = TelemetryProtocol.MSP
 
@@ -43,11 +43,11 @@ class SimOptions:
     transfer_timeout_ms: int = 5000
     wp_radius_cm: int = 200
 
-    # What the CPU does nothing else for.
+    # Times for which the CPU is stalled.
     flash_erase_ms: float = 100.0
     record_program_ms: float = 0.45
     config_write_ms: float = 180.0
-    #: From setting the radius to the write: it is done in the next main loop.
+    #: From setting the radius to the write, which happens in the next main loop.
     config_write_delay_ms: float = 0.0
     # Gyro, then 3100 samples at 500 Hz; 525 averages of five at 42 Hz (sensors.c).
     acc_calibration_ms: float = 9400.0
@@ -56,14 +56,14 @@ class SimOptions:
 
 @dataclass(slots=True, kw_only=True)
 class Faults:
-    """Switches that may be turned at any moment.
+    """Switches that may be changed at any time.
 
-    The rates are probabilities a bit and a byte, in both directions. `armed` is the pilot's wish: the firmware refuses
-    it while a configuration write is scheduled. `boxes`: the other switches, one bit for each of BOXNAMES.
-    `extension` counts from the next boot. Without `msp` only MAVLink is answered. The power goes in the middle of
-    that flash operation (page erases and 16-byte programs, from 1; 0: never), or so many of them fail.
-    `arming_blockers`: INAV's flags (runtime_config.h) of what keeps it from arming. `stick_loads`: how often the pilot
-    has made INAV load its saved missions by the sticks. `selected_mission`: the one that he chose; 0: none.
+    The rates are probabilities per bit and per byte, in both directions. `armed` is the pilot's request: the firmware
+    refuses it while a configuration write is scheduled. `boxes`: the other switches, one bit for each of BOXNAMES.
+    `extension` takes effect at the next boot. Without `msp` only MAVLink is answered. The power fails during the given
+    flash operation (page erases and 16-byte programs, from 1; 0: never), or the given number of them fail.
+    `arming_blockers`: INAV's arming flags (runtime_config.h). `stick_loads`: the number of times the pilot has loaded
+    the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none.
     """
 
     bit_error_rate: float = 0.0
@@ -83,13 +83,13 @@ class Faults:
 
 @dataclass(slots=True)
 class Counters:
-    """What happened to the board since it was made.
+    """Event counts since the board was created.
 
     hazard_runs: three equal hazard bytes in a row on the RX pin, acted on or not.
-    rx_overflows, tx_overflows: how often a ring was lapped while the firmware ran.
+    rx_overflows, tx_overflows: rings overrun while the firmware ran.
     max_outstanding_reply_bytes: of the 255 that the TX ring holds.
-    cli_entered, bootloader_entered, crashes: ways into a state that only a reset ends.
-    flash_writes: mission lists that were ever made valid in this flash, as of the last mission command.
+    cli_entered, bootloader_entered, crashes: entries into states that only a reset ends.
+    flash_writes: mission lists ever made valid in this flash, as of the last mission command.
     """
 
     hazard_runs: int = 0

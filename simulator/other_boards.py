@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim --kind`: a flight controller with MSP that is no Naze."""
+"""`naze-bridge sim --kind`: an MSP flight controller other than the Naze."""
 
 import asyncio
 from dataclasses import replace
@@ -14,18 +14,18 @@ from simulator.options import Faults
 from simulator.run_board import Running, run_board
 
 _NAMES = {"inav": "INAV", "multiwii": "MultiWii", "betaflight": "Betaflight", "baseflight": "baseflight"}
-#: These are about Harakiri and its mission extension.
+#: Options of Harakiri and its mission extension.
 _OF_THE_NAZE = ("tele_prot", "no_extension", "flash_stall", "program_stall", "wp_radius_cm", "core", "play", "speed")
 
 
 def run_other_board(kind: str, options: MspOptions, faults: Faults, running: Running, state: Path | None) -> None:
-    """Run one until Ctrl-C. `state`: the file that keeps its EEPROM."""
+    """Run one until Ctrl-C. `state`: the file with its EEPROM."""
     context = click.get_current_context()
     for name in _OF_THE_NAZE:
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name.replace('_', '-')} is for a Naze; leave it away with --kind {kind}")
     if running.tcp:
-        # A socket is served at once, and its ring is that of INAV's own simulator.
+        # A socket is served at once, with the ring of INAV's own simulator.
         options = replace(options, baud=None, ring_size=2048, serial_task_ms=0.01)
     eeprom = open_memory(state, bytes(new_eeprom(kind, options)), "name another file") if state else None
     board = make_board(kind, options, faults, eeprom)

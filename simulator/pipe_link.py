@@ -9,7 +9,7 @@ from simulator.pump import Pump
 
 
 class SimLink:
-    """Connects a SimulatedNaze with whoever holds the socket that `start` returns. Speeds always match."""
+    """Connects a SimulatedNaze with the socket that `start` returns. Speeds always match."""
 
     def __init__(self, naze: SimulatedNaze, loop: asyncio.AbstractEventLoop) -> None:
         self._naze = naze
@@ -18,9 +18,9 @@ class SimLink:
         self._pump: Pump | None = None
 
     async def start(self) -> socket.socket:
-        """Supply the board, booted, and return the non-blocking far end, which is the caller's to close.
+        """Switch on the board, booted; returns the non-blocking far end, which the caller must close.
 
-        Called again it is the port's return: an older far end reads end-of-file, the board goes on as it was.
+        Called again it reconnects the port: an older far end reads end-of-file, the board keeps running.
         """
         self.stop()
         self._near, far = socket.socketpair()
@@ -39,6 +39,6 @@ class SimLink:
             self._pump = self._near = None
 
     def poke(self) -> None:
-        """Make a fault that was just switched count at once."""
+        """Apply a changed fault at once."""
         if self._pump:
             self._pump.poke()

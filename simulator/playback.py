@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plays the flight controller of a UART capture: a user's field problem on a desk, or in simulated time in a test.
+"""Replays the flight controller of a UART capture, to reproduce field problems, or in simulated time in a test.
 
-What it sent of its own accord comes at its time. What it answered comes when it is asked: the bridge that listens now
-may ask earlier, later, or something else than the one that was recorded. So each request gets the answer that the
-same request got at this time of the recording, as fast as then, and none if it got none. What is made up:
+Unsolicited data is sent at its recorded time, replies on request: the present bridge may send requests earlier, later,
+or other ones than the recorded bridge. So each request gets the reply that the same request got at this time of the
+recording, with the same delay, and none if it got none. Invented replies:
 
-- A request that was never sent gets MSP's error frame, as from firmware that does not know it, if the flight
-  controller answered at that time at all.
-- A request that was sent only later (a mission is uploaded earlier now) gets the answers that it got then, in order.
-- After the end the last answers are given for ever.
+- A request that was never recorded gets MSP's error frame, as from firmware that does not know it, if the flight
+  controller answered anything at that time.
+- A request that was recorded only later (a mission is uploaded earlier now) gets its later replies, in order.
+- After the end the last replies are repeated for ever.
 """
 
 import heapq
@@ -21,29 +21,29 @@ from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.uart_capture import UartDeed, UartEvent
 from simulator.exchanges import Exchange, take_apart
 
-#: The speed of a line that has none.
+#: A speed for lines without one.
 _ANY_SPEED = 115200
-#: What is asked so much earlier or later than in the recording is the same request.
+#: The tolerance for matching a request with a recorded one.
 _JITTER_S = 0.25
-#: After how long the error frame comes that nobody recorded.
+#: The delay of an invented error frame.
 _GUESSED_DELAY_S = 0.005
 
 
 class _Story:
-    """What became of one question, each time that it was asked."""
+    """The recorded exchanges of one request."""
 
     def __init__(self) -> None:
         self._exchanges: list[Exchange] = []
         self._times: list[float] = []
-        self._ahead = -1  # the last answer that was given before its time
+        self._ahead = -1  # the last reply given before its time
 
     def add(self, exchange: Exchange) -> None:
-        """Add what became of it the next time."""
+        """Add the next exchange."""
         self._exchanges.append(exchange)
         self._times.append(exchange.asked_at)
 
     def at(self, time: float) -> Exchange:
-        """Return what becomes of it if it is asked now."""
+        """The exchange to replay for a request at this time."""
         index = bisect_right(self._times, time) - 1
         if index + 1 < len(self._times):
             early = self._times[index + 1] - time
@@ -55,7 +55,7 @@ class _Story:
 
 
 class CapturePlayer:
-    """Stands in for SimulatedNaze on a line. `tempo`: how many times faster than it was recorded."""
+    """Takes the place of SimulatedNaze on a line. `tempo`: the speed relative to the recording."""
 
     def __init__(self, events: Sequence[UartEvent], tempo: float = 1.0) -> None:
         self._tempo = tempo
@@ -82,34 +82,34 @@ class CapturePlayer:
 
     @property
     def baud(self) -> int:
-        """The speed that the recorded port had at this time: what it read is exact only at the same speed."""
+        """The recorded port's speed at this time: the recorded bytes are exact only at the same speed."""
         index = max(bisect_right(self._speed_times, self._time) - 1, 0)
         return self._speeds[index] if self._speeds else _ANY_SPEED
 
     @property
     def duration_s(self) -> float:
-        """How long it plays."""
+        """The duration of the replay."""
         return self._ends_at / self._tempo
 
     @property
     def outages(self) -> list[tuple[float, float]]:
-        """When the port was closed and opened again, in seconds from the beginning of the play."""
+        """The times at which the port was closed and opened again, in seconds from the start of the replay."""
         return [(closed / self._tempo, opened / self._tempo) for closed, opened in self._outages]
 
     def power_on_booted(self, now: float) -> None:
-        """Begin to play."""
+        """Start the replay."""
         if self._began_at is None:
             self._began_at = now
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes from the line."""
+        """Handle bytes from the line."""
         time = self._set_time(now)
         for frame in self._parser.feed(data):
             if frame.direction is Direction.REQUEST and not self._is_closed(time):
                 self._answer(frame, time)
 
     def advance(self, now: float) -> bytes:
-        """Return the bytes that have come until `now` and were not returned before."""
+        """The bytes sent until `now` since the last call."""
         time = self._set_time(now)
         found: list[tuple[tuple[float, int], int, bytes]] = []
         while self._unasked_done < len(self._unasked) and self._unasked[self._unasked_done][0] <= time:
@@ -121,7 +121,7 @@ class CapturePlayer:
         return b"".join(data for _, _, data in sorted(found))
 
     def next_wakeup(self, now: float) -> float:
-        """Tell when it is next worth calling `advance`; infinity if nothing will come by itself."""
+        """The time for the next call of `advance`; infinity if nothing will happen by itself."""
         due = self._going_out[0][0][0] if self._going_out else inf
         if self._unasked_done < len(self._unasked):
             due = min(due, self._unasked[self._unasked_done][0])
@@ -129,7 +129,7 @@ class CapturePlayer:
         return max(now, self._began_at + due / self._tempo)
 
     def _set_time(self, now: float) -> float:
-        """Return the time in the recording, to the microsecond as there."""
+        """The time in the recording, to the microsecond."""
         assert self._began_at is not None
         self._time = round((now - self._began_at) * self._tempo, 6)
         return self._time
@@ -145,12 +145,12 @@ class CapturePlayer:
                 self._send(piece, round(time + at - exchange.asked_at, 6), offset)
 
     def _was_answering(self, time: float) -> bool:
-        """Tell whether one of the last two requests before was answered."""
+        """True if one of the last two requests before this time was answered."""
         index = bisect_right(self._asked_times, time)
         return any(exchange.answer for exchange in self._exchanges[max(index - 2, 0) : index])
 
     def _send(self, data: bytes, at: float, offset: int) -> None:
-        """Send when it is due, but never before what was sent earlier."""
+        """Send at the given time, but never before earlier data."""
         self._last_answer = max(self._last_answer, (at, offset))
         self._answers += 1
         heapq.heappush(self._going_out, (self._last_answer, self._answers, data))

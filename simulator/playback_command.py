@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim --play`: the flight controller of a UART capture, behind a link that looks like a serial port."""
+"""`naze-bridge sim --play`: the flight controller of a UART capture, behind a pseudo-terminal."""
 
 import asyncio
 import signal
@@ -11,12 +11,12 @@ from protocols.uart_capture import read_capture
 from simulator.playback import CapturePlayer
 from simulator.pty_link import PlugError, PtyLink
 
-#: These say what and where to play; the others are about a simulated board.
+#: The options for a replay; all others are about a simulated board.
 _OPTIONS_OF_PLAYING = ("play", "link", "speed")
 
 
 def play_capture(path: Path, link: Path, tempo: float) -> None:
-    """Play until Ctrl-C. The port comes and goes as it did in the recording."""
+    """Replay until Ctrl-C. The port appears and disappears as in the recording."""
     context = click.get_current_context()
     for name in context.params:
         given = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE

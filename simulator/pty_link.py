@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board on a pseudo-terminal that looks like a serial port, speed included."""
+"""A simulated board on a pseudo-terminal, which behaves like a serial port, speed included."""
 
 import asyncio
 import fcntl
@@ -17,18 +17,18 @@ _BAUD_BY_CODE = {getattr(termios, name): int(name[1:]) for name in dir(termios) 
 _CODE_BY_BAUD = {baud: code for code, baud in _BAUD_BY_CODE.items()}
 _INPUT_SPEED, _OUTPUT_SPEED = 4, 5
 _TERMINALS = Path("/dev/pts")
-#: struct flock: the whole file, for writing. Not flock(2), with which a client takes the port for itself.
+#: struct flock: the whole file, for writing. Not flock(2), which clients use to lock the port.
 _WHOLE_FILE = struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
 
 
 class PlugError(Exception):
-    """The link cannot be made; one sentence."""
+    """The link cannot be created; one sentence."""
 
 
 class PtyLink:
     """The board's USB plug: `path` is a symbolic link to the terminal while it is plugged in.
 
-    A client that has set another speed than the board's gets and gives what a wire would make of it.
+    If a client sets another speed than the board's, both receive garbled bytes as on a real wire.
     """
 
     def __init__(self, board: FarEnd, path: Path, loop: asyncio.AbstractEventLoop) -> None:
@@ -39,9 +39,9 @@ class PtyLink:
         self._near = self._far = -1
 
     def plug(self) -> None:
-        """Make the terminal and the link. PlugError if something is in the way or it cannot be made.
+        """Create the terminal and the link. PlugError if the path is taken or the link cannot be created.
 
-        Only a link to a terminal of no living simulator is replaced: one that was killed left it behind.
+        Only a stale link is replaced, which a killed simulator left behind.
         """
         if self._pump:
             return
@@ -61,12 +61,12 @@ class PtyLink:
             if isinstance(error, FileExistsError):
                 raise PlugError(f"{self._path} is in the way: name another --link, or remove it") from error
             raise PlugError(f"{self._path} cannot be made: {error.strerror}") from error
-        # Our own copy of the far end stays open: the terminal keeps its settings between two clients.
+        # Our own copy of the far end stays open, so the terminal keeps its settings between clients.
         self._pump = Pump(self._board, self._near, self._loop, far_baud=self._far_baud)
         self._pump.start()
 
     def unplug(self) -> None:
-        """Take the terminal away: a client that has it open sees it hung up. The board keeps its power."""
+        """Remove the terminal: a client that has it open sees a hang-up. The board keeps its power."""
         if self._pump:
             self._pump.stop()
             self._pump = None
@@ -76,7 +76,7 @@ class PtyLink:
             self._close()
 
     def poke(self) -> None:
-        """Make a fault that was just switched count at once."""
+        """Apply a changed fault at once."""
         if self._pump:
             self._pump.poke()
 
@@ -84,7 +84,7 @@ class PtyLink:
         return self._path.readlink() if self._path.is_symlink() else self._path
 
     def _is_anothers(self) -> bool:
-        """Tell whether the terminal behind the link is that of a simulator that runs; numbers are given out again."""
+        """True if a running simulator owns the terminal behind the link; terminal numbers are reused."""
         if self._leads_to().parent != _TERMINALS:
             return False
         try:
@@ -113,5 +113,5 @@ class PtyLink:
 
 
 def _lock(terminal: int) -> None:
-    """Mark a terminal as a simulator's for as long as it is open. BlockingIOError if it is another one's."""
+    """Mark a terminal as a simulator's while it is open. BlockingIOError if another simulator owns it."""
     fcntl.fcntl(terminal, fcntl.F_OFD_SETLK, _WHOLE_FILE)

@@ -10,15 +10,15 @@ from simulator.far_end import FarEnd
 from simulator.line import garble
 
 _READ_SIZE = 4096
-# A fault that was switched meanwhile is noticed after this long at the latest.
+# The longest delay until a changed fault is noticed.
 _LONGEST_SLEEP = 0.25
 
 
 class Pump:
-    """Owns nothing but its timer and reader: `fd` is non-blocking and stays the caller's.
+    """Owns only its timer and reader: `fd` is non-blocking and stays the caller's.
 
-    `far_baud` tells the speed that the other end has set; without it both ends always agree. `on_hangup` is
-    called when the other end has gone.
+    `far_baud` returns the speed set at the other end; without it both ends always agree. `on_hangup` is
+    called when the other end is gone.
     """
 
     def __init__(
@@ -38,19 +38,19 @@ class Pump:
         self._timer: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
-        """Begin to move bytes."""
+        """Start moving bytes."""
         self._loop.add_reader(self._fd, self._on_readable)
         self.poke()
 
     def stop(self) -> None:
-        """Stop; the descriptor may be closed then."""
+        """Stop; afterwards the descriptor may be closed."""
         self._loop.remove_reader(self._fd)
         if self._timer:
             self._timer.cancel()
             self._timer = None
 
     def poke(self) -> None:
-        """Collect what the board has sent by now and sleep until it has more."""
+        """Collect the board's output and sleep until there is more."""
         if self._timer:
             self._timer.cancel()
         now = self._loop.time()
@@ -63,7 +63,7 @@ class Pump:
             return
         if self._far_baud:
             data = garble(data, self._board.baud, self._far_baud())
-        # Nobody reads: as on a real wire, what is not taken is gone.
+        # As on a real wire, bytes without a reader are lost.
         with contextlib.suppress(BlockingIOError, BrokenPipeError, ConnectionResetError):
             os.write(self._fd, data)
 

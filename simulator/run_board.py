@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board behind its plug, from its first moment to Ctrl-C."""
+"""Runs a simulated board until Ctrl-C."""
 
 import asyncio
 import signal
@@ -16,9 +16,9 @@ from simulator.tcp_link import SimTcpLink
 
 @dataclass(frozen=True, slots=True)
 class Running:
-    """Where the board is to be found, and what is to happen to it. Times in seconds.
+    """The board's connections and scheduled events. Times in seconds.
 
-    `link`: of a pseudo-terminal; `tcp`: host and port; one of them is there. `control`: a Unix socket.
+    `link`: of a pseudo-terminal; `tcp`: host and port; one of them is set. `control`: a Unix socket.
     """
 
     link: Path | None = None
@@ -29,7 +29,7 @@ class Running:
 
 
 async def run_board(board: ControlledBoard, name: str, running: Running, is_alive: Callable[[], bool]) -> None:
-    """Run it. click.ClickException if its place cannot be had."""
+    """Run it. click.ClickException if its link or address is not available."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The serial port of a simulated MSP board: two wires at a baud rate, a receive ring, and a queue to send.
+"""The serial port of a simulated MSP board: two wires at a baud rate, a receive ring, and a send queue.
 
 Harakiri's own UART, whose transmit ring overwrites itself, is in uart.py.
 """
@@ -9,7 +9,7 @@ from collections import deque
 from simulator.options import Counters
 
 _BITS_PER_BYTE = 10
-# Times are seconds as floats: a byte that ends exactly now has ended.
+# Times are floats in seconds: with this tolerance a byte that ends exactly now has ended.
 _EPSILON_BYTES = 1e-3
 
 
@@ -27,33 +27,33 @@ class SerialRing:
         self._tx_free_at = 0.0
 
     def clear(self) -> None:
-        """Forget everything that is under way, as without power."""
+        """Drop all bytes in transit, as without power."""
         self._arriving.clear()
         self._unread.clear()
         self._leaving.clear()
         self._rx_free_at = self._tx_free_at = 0.0
 
     def receive(self, data: bytes, now: float) -> None:
-        """Put bytes on the wire to the board, behind those that are on it already."""
+        """Put bytes on the wire to the board, behind those already there."""
         if data:
             start = max(now, self._rx_free_at)
             self._arriving.append((start, data))
             self._rx_free_at = start + len(data) * self._byte_time
 
     def next_arrival(self) -> float | None:
-        """Tell when there is a byte to read; the past if it is in the ring."""
+        """The arrival time of the next byte; in the past if it is in the ring."""
         if self._unread:
             return 0.0
         return self._arriving[0][0] + self._byte_time if self._arriving else None
 
     def last_arrival(self) -> float:
-        """Tell when the last byte on the wire will be there."""
+        """The arrival time of the last byte on the wire."""
         return self._rx_free_at
 
     def arrive(self, now: float) -> int:
-        """Move what arrived until `now` into the ring; return how many bytes can be read.
+        """Move the bytes that arrived until `now` into the ring; returns the number of readable bytes.
 
-        A writer who laps the reader is not noticed by the firmware: only the distance of the two positions is left.
+        The firmware does not notice an overrun: it sees only the distance between the two positions.
         """
         while self._arriving:
             start, data = self._arriving[0]
@@ -75,7 +75,7 @@ class SerialRing:
         return len(self._unread)
 
     def read(self) -> int | None:
-        """Return the next byte of the ring; None if it is empty."""
+        """The next byte of the ring; None if it is empty."""
         return self._unread.pop(0) if self._unread else None
 
     def write(self, data: bytes, now: float) -> None:
@@ -86,12 +86,12 @@ class SerialRing:
         self._counters.max_outstanding_reply_bytes = max(self._counters.max_outstanding_reply_bytes, unsent)
 
     def sent(self, now: float) -> bytes:
-        """Return the frames whose last byte has left until `now` and that were not returned before."""
+        """The frames whose last byte was sent until `now`, since the last call."""
         out = bytearray()
         while self._leaving and self._leaving[0][0] <= now + self._byte_time * _EPSILON_BYTES:
             out += self._leaving.popleft()[1]
         return bytes(out)
 
     def next_departure(self) -> float | None:
-        """Tell when the next frame has left."""
+        """The time at which the next frame is completely sent."""
         return self._leaving[0][0] if self._leaving else None

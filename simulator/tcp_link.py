@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board behind a TCP port, as INAV's own simulator and serial adapters on Wi-Fi are."""
+"""A simulated board behind a TCP port, like INAV's own simulator and Wi-Fi serial adapters."""
 
 import asyncio
 import socket
@@ -14,9 +14,9 @@ _LOOK_SECONDS = 0.1
 
 
 class SimTcpLink:
-    """One client is served at a time; who comes meanwhile is connected and hears nothing until its turn.
+    """One client is served at a time; further clients are connected but receive nothing until their turn.
 
-    The port is there while `is_alive` says that the board is.
+    The port is open while `is_alive` returns True.
     """
 
     def __init__(
@@ -33,20 +33,20 @@ class SimTcpLink:
         self._look: asyncio.TimerHandle | None = None
 
     def plug(self) -> None:
-        """Listen. PlugError if the address is not to be had."""
+        """Listen. PlugError if the address is not available."""
         if self._look is None:
             self._listen()
             self._watch()
 
     def unplug(self) -> None:
-        """Hang up on everybody and close the port. The board keeps its power."""
+        """Disconnect all clients and close the port. The board keeps its power."""
         if self._look:
             self._look.cancel()
             self._look = None
         self._close()
 
     def poke(self) -> None:
-        """Make a fault that was just switched count at once."""
+        """Apply a changed fault at once."""
         if self._pump:
             self._pump.poke()
         else:
@@ -101,7 +101,7 @@ class SimTcpLink:
     def _serve_next(self) -> None:
         if self._waiting:
             self._client = self._waiting.popleft()
-            # What was sent to the one before is not for this one. A frame that it left half sent still is.
+            # Drop output for the previous client. A partial frame from it stays in the receiver.
             self._board.advance(self._loop.time())
             self._pump = Pump(self._board, self._client.fileno(), self._loop, on_hangup=self._on_hangup)
             self._pump.start()

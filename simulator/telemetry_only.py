@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flight controllers that are simulated for their telemetry only: Betaflight 4.5 and baseflight.
+"""Flight controllers simulated for their telemetry only: Betaflight 4.5 and baseflight.
 
 Betaflight: src/main/msp/msp.c; baseflight: src/serial.c. Neither flies missions. In the air they circle (flight.fly).
 """
@@ -18,7 +18,7 @@ _LOWEST, _MIDDLE, _HIGHEST = 1000, 1500, 2000
 
 
 class TelemetryCommand(IntEnum):
-    """The commands that both know."""
+    """The commands that both support."""
 
     STATUS = 101
     RC = 105
@@ -36,10 +36,10 @@ _ABOUT_GPS = (TelemetryCommand.RAW_GPS, TelemetryCommand.COMP_GPS)
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """What tells one from another. `tails`: what follows a command's usual payload.
+    """The differences between them. `tails`: extra bytes after a command's usual payload.
 
-    `constants`: the whole payload of commands that always answer the same. `boxes`: names by permanent id. `has_gps`:
-    Betaflight, as its own simulator is built, has no GPS and no messages about one.
+    `constants`: the payloads of commands with a constant reply. `boxes`: names by permanent id. `has_gps`: False for
+    Betaflight's own simulator, which is built without GPS and its messages.
     """
 
     habits: PortHabits
@@ -51,7 +51,7 @@ class Dialect:
     has_gps: bool = True
 
 
-#: Its STATUS goes on with load, gyro cycle, no further flags, and what keeps it from arming; ANALOG with 0.01 V.
+#: Its STATUS continues with load, gyro cycle, no further flags, and arming blockers; ANALOG with 0.01 V.
 BETAFLIGHT = Dialect(
     PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=True),
     {1: bytes((0, 1, 46)), 2: b"BTFL", 3: bytes((4, 5, 0)), 102: struct.pack("<9h", 0, 0, 512, 0, 0, 0, 0, 0, 0)},
@@ -73,7 +73,7 @@ BASEFLIGHT = Dialect(
     PortHabits(buffer_size=128, cli_guard_s=0.0, obeys_r=True),
     {
         100: struct.pack("<BBBI", 231, 3, 4, 0xC000_000C),
-        # It has a home and a hold position under numbers 0 and 16, in a layout of its own, and acknowledges any number.
+        # It has home and a hold position as numbers 0 and 16, in its own layout, and acknowledges any number.
         118: bytes(18),
         209: b"",
         102: struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430),
@@ -100,16 +100,16 @@ class TelemetryFirmware:
 
     @property
     def armed(self) -> bool:
-        """Whether the craft is armed."""
+        """True if the craft is armed."""
         return self._armed
 
     @property
     def stored(self) -> list[bytes]:
-        """It keeps no mission."""
+        """None: it has no missions."""
         return []
 
     def take_busy_seconds(self) -> float:
-        """It writes nothing."""
+        """0: it writes nothing."""
         return 0.0
 
     def follow_pilot(self, now: float) -> None:
@@ -120,7 +120,7 @@ class TelemetryFirmware:
             self._home = (flight.lat_e7, flight.lon_e7)
 
     def craft_at(self, now: float) -> Craft:
-        """Return what the sensors say."""
+        """The sensor values."""
         boxes = self._faults.boxes & ~(1 << self._arm_bit) | self._armed << self._arm_bit
         return Craft(self._fly(now), self._armed, boxes & (1 << len(self._dialect.boxes)) - 1, self._home)
 
@@ -130,7 +130,7 @@ class TelemetryFirmware:
         return fly(now - self._booted_at, self._flown, self._armed)
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """Return the reply's frame: an error for what is not known."""
+        """The reply frame: an error frame for unknown commands."""
         if command in _ABOUT_GPS and not self._dialect.has_gps:
             return error(command)
         answer = self._dialect.constants.get(command, self._read(command, self.craft_at(now)))
@@ -168,5 +168,5 @@ class TelemetryFirmware:
         return None
 
     def _heading(self, degrees: float) -> int:
-        """Return whole degrees, counted from 0 or from -180."""
+        """Whole degrees, from 0 or from -180."""
         return round(degrees - self._dialect.heading_from) % 360 + self._dialect.heading_from

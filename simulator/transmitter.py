@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated pilot's transmitter: which switch position turns on which box of a Harakiri (mw.c, GetRCandAuxfromBuf).
+"""The simulated pilot's transmitter: the switch positions for Harakiri's boxes (mw.c, GetRCandAuxfromBuf).
 
-MSP_BOX has one word a box: three bits an aux channel, for low (below 1300 us), middle, and high (above 1700 us).
+MSP_BOX has one word per box, with three bits per aux channel: low (below 1300 us), middle, and high (above 1700 us).
 """
 
 import struct
 
 _LOW, _MIDDLE, _HIGH = 1000, 1500, 2000
-#: The bits of aux 1..4 begin here.
+#: The bit offsets of aux 1..4.
 _AUX1, _AUX2, _AUX3, _AUX4 = 0, 3, 6, 9
 _AT_MIDDLE, _AT_HIGH = 0b010, 0b100
 
@@ -24,12 +24,12 @@ _ACTIVATION = {
 
 
 def box_activation(boxes: int) -> bytes:
-    """The payload of MSP_BOX for so many boxes."""
+    """The payload of MSP_BOX for this many boxes."""
     return struct.pack(f"<{boxes}H", *(_ACTIVATION.get(box, 0) for box in range(boxes)))
 
 
 def channels_us(armed: bool, boxes: int) -> tuple[int, ...]:
-    """Roll, pitch, yaw, throttle, aux 1..4 of a pilot who wants these boxes, one bit each."""
+    """Roll, pitch, yaw, throttle, aux 1..4 for these boxes, one bit each."""
     aux = [_HIGH if armed else _LOW]
     for middle, high in ((0, 1), (2, 7), (6, 8)):
         aux.append(_HIGH if boxes >> high & 1 else _MIDDLE if boxes >> middle & 1 else _LOW)

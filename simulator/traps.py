@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes on which Harakiri acts outside of any protocol (serialCom): into the CLI, or into a reset."""
+"""Bytes that Harakiri acts on outside of any protocol (serialCom): entering the CLI, or a reset."""
 
 from enum import Enum, auto
 
@@ -9,20 +9,20 @@ _CARRIAGE_RETURN, _NUMBER_SIGN, _LETTER_R = 0x0D, 0x23, 0x52
 
 
 class Trap(Enum):
-    """Where a run of bytes leads."""
+    """The effect of a run of bytes."""
 
     CLI = auto()
     RESET = auto()
 
 
 class TrapCounters:
-    """The firmware's three counters. Those for AUTOSENSE stand still outside of it: they are not cleared."""
+    """The firmware's three counters. Those for AUTOSENSE keep their value outside of it."""
 
     def __init__(self) -> None:
         self._returns = self._number_signs = self._letters_r = 0
 
     def count(self, byte: int, autosense: bool, armed: bool) -> Trap | None:
-        """Count a byte of the input, whatever frame it belongs to."""
+        """Count an input byte, regardless of frames."""
         if autosense:
             self._number_signs = self._number_signs + 1 if byte == _NUMBER_SIGN else 0
             if self._number_signs >= RUN_LENGTH:
@@ -35,13 +35,13 @@ class TrapCounters:
 
 
 class HazardWatch:
-    """Counts the runs that a careful sender never sends, acted on or not: a run of any length counts once."""
+    """Counts the runs that a careful sender avoids, even if they had no effect: a run of any length counts once."""
 
     def __init__(self) -> None:
         self._byte, self._length = -1, 0
 
     def runs_in(self, data: bytes) -> int:
-        """Return how many runs these bytes complete."""
+        """The number of runs that these bytes complete."""
         runs = 0
         for byte in data:
             self._length = self._length + 1 if byte == self._byte else 1

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""USART1 of the board: two wires at the baud rate, and a ring behind each (drv_uart.c)."""
+"""USART1 of the board: two wires at the baud rate, each with a ring (drv_uart.c)."""
 
 from collections import deque
 
 from simulator.options import Counters
 
 _BITS_PER_BYTE = 10
-# Times are seconds as floats: a byte that ends exactly now has ended.
+# Times are floats in seconds: with this tolerance a byte that ends exactly now has ended.
 _EPSILON_BYTES = 1e-3
-#: How long a finished frame may wait for the next one, so that neither end is woken for each.
+#: The time that a finished frame may wait for the next one, to save wake-ups at both ends.
 GATHER_SECONDS = 0.004
 
 
@@ -20,11 +20,11 @@ class Uart:
         self._counters = counters
         self._size = ring_size
         self._byte_time = _BITS_PER_BYTE / baud
-        # Incoming: what is still on the wire, as (time the first start bit begins, bytes).
+        # Incoming: bytes on the wire, as (time of the first start bit, bytes).
         self._wire: deque[tuple[float, bytes]] = deque()
         self._wire_free_at = 0.0
         self._unread = bytearray()
-        # Outgoing: the ring, the DMA's running transfer of it, and where each written burst ends.
+        # Outgoing: the ring, the running DMA transfer, and the end of each written burst.
         self._ring = bytearray(ring_size)
         self._head = 0
         self._tail = 0
@@ -35,7 +35,7 @@ class Uart:
         self._burst_ends: deque[float] = deque()
 
     def set_baud(self, baud: int, now: float) -> None:
-        """Initialise the UART anew, as the firmware does on arming: what is in the rings is lost."""
+        """Reinitialise the UART, as the firmware does on arming: the rings are cleared."""
         self._transmit(now)
         self.baud = baud
         self._byte_time = _BITS_PER_BYTE / baud
@@ -45,7 +45,7 @@ class Uart:
         self._burst_ends.clear()
 
     def power_off(self) -> None:
-        """Forget everything that is under way."""
+        """Drop all bytes in transit."""
         self._wire.clear()
         self._wire_free_at = 0.0
         self._unread.clear()
@@ -57,7 +57,7 @@ class Uart:
     # -- incoming --------------------------------------------------------------------------------------------
 
     def receive(self, data: bytes, now: float) -> None:
-        """Put bytes on the RX wire, behind those that are on it already."""
+        """Put bytes on the RX wire, behind those already there."""
         if not data:
             return
         start = max(now, self._wire_free_at)
@@ -65,34 +65,34 @@ class Uart:
         self._wire_free_at = start + len(data) * self._byte_time
 
     def next_arrival(self) -> float | None:
-        """Tell when the next byte to read is there; the past if it is in the ring."""
+        """The arrival time of the next unread byte; in the past if it is in the ring."""
         if self._unread:
             return 0.0
         return self._wire[0][0] + self._byte_time if self._wire else None
 
     def last_arrival(self) -> float:
-        """Tell when the last byte on the wire will be there."""
+        """The arrival time of the last byte on the wire."""
         return self._wire_free_at
 
     def discard_arrived(self, now: float) -> None:
-        """Drop what arrived until `now`, while no receiver was running."""
+        """Drop bytes that arrived until `now`, while no receiver was running."""
         self._leave_wire(now)
         self._unread.clear()
 
     def keep_arrived(self, now: float) -> None:
-        """Keep what arrived until `now`, while nobody read it: a lapped ring is no client's fault then."""
+        """Keep bytes that arrived unread until `now`; an overrun is then not counted against the client."""
         self._leave_wire(now)
         self._drop_lapped()
 
     def read(self, now: float) -> int | None:
-        """Return the next unread byte; None when there is none."""
+        """The next unread byte; None if there is none."""
         self._arrive(now)
         return self._unread.pop(0) if self._unread else None
 
     def _arrive(self, now: float) -> None:
         self._leave_wire(now)
         if len(self._unread) >= self._size:
-            # The DMA has lapped the reader, who sees only the distance between the two positions.
+            # The DMA has overrun the reader, which sees only the distance between the two positions.
             self._counters.rx_overflows += 1
             self._drop_lapped()
 
@@ -115,7 +115,7 @@ class Uart:
     # -- outgoing --------------------------------------------------------------------------------------------
 
     def write(self, data: bytes, now: float) -> None:
-        """Put bytes into the TX ring, which nothing keeps from overwriting what has not been sent."""
+        """Put bytes into the TX ring, which overwrites unsent bytes without a check."""
         self._transmit(now)
         outstanding = self._outstanding() + len(data)
         counters = self._counters
@@ -131,7 +131,7 @@ class Uart:
         self._burst_ends.append(self._dma_time + self._outstanding() * self._byte_time)
 
     def transmitted(self, now: float) -> bytes:
-        """Return the bytes that have left the TX pin since the last call."""
+        """The bytes sent from the TX pin since the last call."""
         self._transmit(now)
         while self._burst_ends and self._burst_ends[0] <= now:
             self._burst_ends.popleft()
@@ -140,7 +140,7 @@ class Uart:
         return sent
 
     def next_departure(self) -> float | None:
-        """Tell when it is worth calling `transmitted`: at the end of a burst, or of one soon after it."""
+        """The time for the next call of `transmitted`: the end of a burst, or of one soon after it."""
         if not self._burst_ends:
             return None
         latest = self._burst_ends[0] + GATHER_SECONDS

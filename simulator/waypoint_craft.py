@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A craft that flies straight lines at constant speed: what the navigation of a simulated board steers."""
+"""A craft that flies straight lines at constant speed, steered by the navigation of a simulated board."""
 
 import math
 
@@ -16,7 +16,7 @@ _BANK_DEG, _NOSE_DOWN_DEG = 2.0, 8.0
 
 
 class WaypointCraft:
-    """Sits on its field until it is moved. Metres, seconds, degrees; positions are degrees * 1e7."""
+    """Starts on its field. Metres, seconds, degrees; positions are degrees * 1e7."""
 
     def __init__(self) -> None:
         self._north = self._east = 0.0
@@ -32,7 +32,7 @@ class WaypointCraft:
         return lat, FIELD_LON_E7 + round(self._east / _METRES_PER_DEGREE_EAST * 1e7)
 
     def rest(self) -> None:
-        """Stand still on the ground."""
+        """Stay on the ground."""
         self.height_m = self._speed = self._climb = 0.0
 
     def hover(self, height_m: float, seconds: float) -> None:
@@ -42,7 +42,7 @@ class WaypointCraft:
         self._approach_height(height_m, seconds)
 
     def fly_to(self, target: tuple[int, int], height_m: float, speed_ms: float, seconds: float) -> bool:
-        """Fly towards a position; tell whether it is reached."""
+        """Fly towards a position; True once it is reached."""
         north = (target[0] - FIELD_LAT_E7) / 1e7 * _METRES_PER_DEGREE - self._north
         east = (target[1] - FIELD_LON_E7) / 1e7 * _METRES_PER_DEGREE_EAST - self._east
         distance = math.hypot(north, east)
@@ -57,7 +57,7 @@ class WaypointCraft:
         return share >= 1.0
 
     def state(self) -> FlightState:
-        """Return what the sensors say."""
+        """The sensor values."""
         lat_e7, lon_e7 = self.position
         is_moving = self._speed > 0
         return FlightState(

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions on disk. Knows SQLite and nothing of MAVLink or MSP."""
+"""Missions on disk. Uses SQLite and knows nothing about MAVLink or MSP."""

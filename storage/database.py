@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Open the database file: see that it is whole, make commits durable, bring it to this release's schema.
+"""Open the database file: check its integrity, make commits durable, migrate it to this release's schema.
 
-Damage is looked for at every start, because SD cards rot and lose power. A damaged file is neither repaired
-nor deleted: it is kept aside under a name that `sqlite3` can still open, and a new one takes its place.
+Every start checks for damage, because SD cards decay and lose power. A damaged file is neither repaired
+nor deleted: it is renamed so that `sqlite3` can still open it, and a new one takes its place.
 """
 
 import sqlite3
@@ -14,24 +14,24 @@ from pathlib import Path
 
 from storage.store_error import FAILURES, StoreError, explained, primary_code
 
-# SQLite's companions of a database file. The log holds commits that are not in the main file yet.
+# SQLite's auxiliary files of a database. The log holds commits that are not in the main file yet.
 _LOG = "-wal"
 _COMPANIONS = (_LOG, "-shm", "-journal")
 
-# The magic number says in which byte order the log's checksums are (https://sqlite.org/fileformat2.html, 4).
+# The magic number gives the byte order of the log's checksums (https://sqlite.org/fileformat2.html, 4).
 _LOG_HEADER = struct.Struct(">8I")
 _LOG_MAGIC = {0x377F0682: "<6I", 0x377F0683: ">6I"}
 
-# SQLITE_ERROR is "table already exists" and such: the file is not of the schema that it says.
+# SQLITE_ERROR is "table already exists" and such: the file does not have its claimed schema.
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
 
 def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | None]:
-    """Open or make the database; also return where a damaged one was kept, if there was one.
+    """Open or create the database; also returns the new path of a damaged one, if there was one.
 
-    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's StateLock: nobody
-    else may have a file open that is put aside. StoreError if the file cannot be opened, made or written, or
-    is of a newer release.
+    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's StateLock: no other
+    process may have a file open that is renamed. StoreError if the file cannot be opened, created or written,
+    or is of a newer release.
     """
     failure = f"cannot open the mission store {path}"
     try:
@@ -54,9 +54,9 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
 
 
 def read_database(path: Path) -> sqlite3.Connection:
-    """Open the database to read it, beside a daemon or without one; StoreError if that is impossible."""
+    """Open the database read-only, with or without a running daemon; StoreError if that fails."""
     with explained(f"cannot read the mission store {path}"):
-        # Not created, not changed: the file may be another user's.
+        # Neither created nor changed: the file may be another user's.
         return _configured(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.5))
 
 
@@ -68,22 +68,22 @@ def memory_database() -> sqlite3.Connection:
 
 
 def _connect(path: Path | str) -> sqlite3.Connection:
-    # Transactions are begun and ended in our own words (isolation_level). One thread at a time uses the
-    # connection, which the caller promises; it need not be the one that opened it. Only a curious person's
-    # program can hold a lock, and a ground station waits meanwhile: hence the short time-out (seconds).
+    # Transactions are explicit (isolation_level). The caller ensures that one thread at a time uses the
+    # connection, not necessarily the one that opened it. Only a tool such as sqlite3 can hold a lock, and a
+    # ground station waits meanwhile: hence the short timeout (seconds).
     connection = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
     return _configured(connection)
 
 
 def _configured(connection: sqlite3.Connection) -> sqlite3.Connection:
     connection.row_factory = sqlite3.Row
-    # A rotten byte in one text must not hide all the other missions.
+    # A corrupt byte in one text must not hide all the other missions.
     connection.text_factory = lambda raw: raw.decode(errors="replace")
     return connection
 
 
 def _make_ready(connection: sqlite3.Connection, path: Path) -> bool:
-    """Prepare the connection if the log, every page and the schema are sound; tell whether they are."""
+    """Prepare the connection if the log, every page and the schema are sound; False if not."""
     if _log_was_lost(path):
         return False
     try:
@@ -100,10 +100,10 @@ def _make_ready(connection: sqlite3.Connection, path: Path) -> bool:
 
 
 def _log_was_lost(path: Path) -> bool:
-    """Tell whether commits were in a log that SQLite would throw away without a word.
+    """True if the log holds commits that SQLite would discard silently.
 
-    It does so beside an empty main file, and with a log whose header is damaged. A header of zeros, or a part
-    of one, is no damage: the power went before the first commit.
+    It does so if the main file is empty, or the log's header damaged. A header of zeros, or a partial one, is not
+    damage: the power failed before the first commit.
     """
     log = path.with_name(path.name + _LOG)
     try:
@@ -111,10 +111,10 @@ def _log_was_lost(path: Path) -> bool:
             header = file.read(_LOG_HEADER.size)
         if not any(header):
             return False
-        if path.stat().st_size <= 1:  # to SQLite one byte is nothing, too
+        if path.stat().st_size <= 1:  # SQLite takes one byte for empty, too
             return True
     except OSError:
-        return False  # no log; or SQLite will say better why it cannot be read
+        return False  # no log, or unreadable, for which SQLite has a better message
     if len(header) < _LOG_HEADER.size:
         return False
     *words, first_sum, second_sum = _LOG_HEADER.unpack(header)
@@ -132,9 +132,9 @@ def _log_checksum(words: tuple[int, ...]) -> tuple[int, int]:
 
 
 def _keep_aside(path: Path, now: float) -> Path:
-    """Rename the file and its companions; return the new name.
+    """Rename the file and its auxiliary files; returns the new name.
 
-    The main file goes last: were it gone first, a power cut here would leave a log that SQLite deletes.
+    The main file goes last: if it went first, a power cut here would leave a log that SQLite deletes.
     """
     stamp = datetime.fromtimestamp(now, UTC).strftime("%Y%m%d-%H%M%S")
     aside = path.with_name(f"{path.name}.corrupt-{stamp}")
@@ -156,13 +156,13 @@ def _keep_aside(path: Path, now: float) -> Path:
 
 
 def _prepare(connection: sqlite3.Connection, path: Path) -> None:
-    """Make commits durable and bring the file to this release's schema."""
+    """Make commits durable and migrate the file to this release's schema."""
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")  # NORMAL would lose the last commits in a power cut
-    # KiB. The 2 MB of the default would be a part of the daemon that grows with every mission.
+    # KiB. The default of 2 MB would let the daemon grow with every mission.
     connection.execute("PRAGMA cache_size = -256")
     (version,) = connection.execute("PRAGMA user_version").fetchone()
-    # A file that may not be written is found now, not when a mission comes. Rolled back, it costs no space.
+    # Finds a read-only file now, not when a mission arrives. Rolled back, it takes no space.
     connection.executescript(f"BEGIN; PRAGMA user_version = {version}; ROLLBACK")
     latest = len(_schema_steps())
     if version > latest:
@@ -174,13 +174,13 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def _schema_steps() -> list[str]:
-    """Return the schema files' text in the order of their numbers; step n makes version n of version n-1."""
+    """The schema files' texts in the order of their numbers; step n migrates version n-1 to n."""
     folder = resources.files("storage") / "schema"
     return [file.read_text() for file in sorted(folder.iterdir(), key=lambda file: file.name)]
 
 
 def _apply_schema(connection: sqlite3.Connection, version: int) -> None:
-    """Take the steps that a file of this version lacks, each in a transaction of its own."""
+    """Apply the steps after `version`, each in its own transaction."""
     for number, sql in enumerate(_schema_steps()[version:], start=version + 1):
         try:
             connection.executescript(f"BEGIN IMMEDIATE;\n{sql}\nPRAGMA user_version = {number};\nCOMMIT;")
@@ -191,11 +191,11 @@ def _apply_schema(connection: sqlite3.Connection, version: int) -> None:
 
 
 def _has_our_schema(connection: sqlite3.Connection) -> bool:
-    """Compare the schema with what its files make: quick_check lets a rotten column name pass."""
+    """Compare the schema with that of the schema files: quick_check misses a corrupt column name."""
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as sample:
         _apply_schema(sample, version=0)
         expected, found = (
             {(str(name), str(sql)) for name, sql in database.execute("SELECT name, sql FROM sqlite_schema")}
             for database in (sample, connection)
         )
-    return expected <= found  # a person may have added a view of their own
+    return expected <= found  # the user may have added a view

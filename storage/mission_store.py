@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every mission that came in, accepted or not: what was sent, what it became, the craft's answer."""
+"""Every received mission, accepted or not: as sent, as stored, and the craft's answer."""
 
 import builtins
 import json
@@ -28,11 +28,11 @@ __all__ = [
 ]
 
 PENDING = "PENDING"  # the outcome until conclude(); for ever, if the daemon died in between
-VERIFIED = "VERIFIED"  # the outcome by which latest_verified() finds a mission
+VERIFIED = "VERIFIED"  # the outcome that latest_verified() looks for
 
-#: Bytes of missions that are kept.
+#: The size limit of the store, bytes.
 BUDGET = 200 << 20
-#: This part of the budget is freed at once when it is reached, so that not every mission pays for the search.
+#: The fraction of the budget that is freed at once, so that not every mission pays for the search.
 _FREED_PART = 50
 _DELETED_AT_ONCE = 20
 _BUDGET_IN_MEMORY = 8 << 20
@@ -40,13 +40,13 @@ _BUDGET_IN_MEMORY = 8 << 20
 
 @dataclass(frozen=True, slots=True)
 class ReceivedMission:
-    """A mission list and what the rules made of it.
+    """A mission list and its verdict.
 
-    The dictionaries hold what JSON can hold, and NaN and infinities. received_at: unix seconds. source: who
-    sent it, e.g. "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED.
-    ack: the MAV_MISSION_ name. stored_items: as the flight controller is to hold them. records: the bytes
-    pushed, `record_count` of them. checksum: their CRC-32. roi_commands: the command number with which each
-    stored region of interest was sent, by its seq.
+    The dictionaries hold JSON values, NaN and infinities. received_at: unix seconds. source: the sender, e.g.
+    "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED. ack: the
+    MAV_MISSION_ name. stored_items: as the flight controller should hold them. records: the bytes written, of
+    `record_count` records. checksum: their CRC-32. roi_commands: the command number that each stored region of
+    interest was sent as, by its seq.
     """
 
     received_at: float
@@ -82,7 +82,7 @@ class MissionSummary:
 
 @dataclass(frozen=True, slots=True)
 class StoredMission:
-    """A mission as it came in, and what became of it."""
+    """A mission as received, and its outcome."""
 
     number: int
     received: ReceivedMission
@@ -94,7 +94,7 @@ class StoredMission:
 class MissionStore:
     """The missions of one state directory. One thread at a time; every method may raise StoreError.
 
-    What add() and conclude() have returned from survives a kill and a power cut.
+    Once add() or conclude() has returned, its data survives a kill and a power cut.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path, budget: int = BUDGET) -> None:
@@ -109,14 +109,14 @@ class MissionStore:
         self.close()
 
     def close(self) -> None:
-        """Close the file; nothing is lost without it."""
+        """Close the file; optional, as nothing is lost without it."""
         with explained(f"cannot close {self._path}"):
             self._connection.close()
 
     def add(self, received: ReceivedMission) -> int:
-        """Store a mission with the outcome PENDING and return its number, which grows with every mission.
+        """Store a mission with the outcome PENDING; returns its number, which increases with every mission.
 
-        A full store loses others for it: first those that were rejected or cancelled, last those that were verified.
+        A full store drops others first: rejected and cancelled ones before the rest, verified ones last.
         """
         contents = (
             json.dumps(received.items),
@@ -151,7 +151,7 @@ class MissionStore:
         return number
 
     def conclude(self, number: int, outcome: str, detail: str, at: float) -> None:
-        """Store the flight controller's answer. outcome: VERIFIED, REFUSED, FAILED...; at: unix seconds."""
+        """Store the outcome. outcome: VERIFIED, REFUSED, FAILED...; at: unix seconds."""
         with self._transaction(f"cannot store the outcome of mission {number}"):
             changed = self._connection.execute(
                 "UPDATE missions SET outcome = ?, detail = ?, concluded_at = ? WHERE number = ?",
@@ -161,7 +161,7 @@ class MissionStore:
             raise StoreError(f"there is no mission {number} in {self._path}")
 
     def get(self, number: int) -> StoredMission | None:
-        """Return a mission, None if there is none of this number; StoreError too if it rotted on the disk."""
+        """The mission with this number, None if there is none; StoreError also if it is corrupt."""
         with explained(f"cannot read mission {number} from {self._path}"):
             row = self._connection.execute(
                 "SELECT * FROM missions JOIN mission_contents USING (number) WHERE number = ?",
@@ -187,7 +187,7 @@ class MissionStore:
         return StoredMission(number, received, row["outcome"], row["detail"], row["concluded_at"])
 
     def latest_verified(self, count: int, checksum: int) -> StoredMission | None:
-        """Return the youngest mission with these records that the flight controller was seen to hold."""
+        """The newest mission with these records that was verified."""
         with explained(f"cannot search {self._path}"):
             row = self._connection.execute(
                 f"SELECT max(number) FROM missions"  # noqa: S608 - a constant; only so is the partial index used
@@ -197,11 +197,11 @@ class MissionStore:
         return None if row[0] is None else self.get(row[0])
 
     def pending(self) -> builtins.list[MissionSummary]:
-        """Return the missions that were never concluded, oldest first."""
+        """The missions without a conclusion, oldest first."""
         return self._summaries(f"WHERE outcome = '{PENDING}' ORDER BY number")
 
     def list(self, limit: int) -> builtins.list[MissionSummary]:
-        """Return the `limit` youngest missions, youngest first."""
+        """The `limit` newest missions, newest first."""
         return self._summaries("ORDER BY number DESC LIMIT ?", limit)
 
     def _summaries(self, which: str, *values: int) -> builtins.list[MissionSummary]:
@@ -229,7 +229,7 @@ class MissionStore:
                 self._connection.execute("DELETE FROM missions WHERE number = ?", (number,))
 
     def _size(self) -> int:
-        """Bytes in use; pages that were freed are used again before the file grows."""
+        """Bytes in use; freed pages are reused before the file grows."""
         pages, free, page_size = (
             self._connection.execute(f"PRAGMA {name}").fetchone()[0]
             for name in ("page_count", "freelist_count", "page_size")
@@ -238,7 +238,7 @@ class MissionStore:
 
     @contextmanager
     def _transaction(self, failure: str) -> Iterator[None]:
-        """All or nothing; when it returns, it is on the disk."""
+        """A transaction; once it returns, the data is on disk."""
         with explained(f"{failure} in {self._path}"):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
@@ -252,7 +252,7 @@ class MissionStore:
 
 @dataclass(frozen=True, slots=True)
 class OpenedStore:
-    """A store ready for use. `set_aside`: where a damaged one was kept; `salvaged`: how many missions it still gave."""
+    """A store ready for use. `set_aside`: the path of a damaged one; `salvaged`: the missions recovered from it."""
 
     store: MissionStore
     set_aside: Path | None
@@ -260,9 +260,9 @@ class OpenedStore:
 
 
 def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:
-    """Open the store in file `path`, or make it and its directory.
+    """Open the store in file `path`, or create it and its directory.
 
-    `now`: unix seconds, for the name of a damaged file. `budget`: bytes of missions that are kept. The caller holds
+    `now`: unix seconds, for the name of a damaged file. `budget`: size limit, bytes. The caller holds
     the directory's StateLock.
     StoreError if it cannot be opened or written, or is of a newer release.
     """
@@ -272,12 +272,12 @@ def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:
 
 
 def store_in_memory() -> MissionStore:
-    """A store that ends with the process, for a disk that cannot be written."""
+    """A store in memory, for a disk that cannot be written."""
     return MissionStore(memory_database(), Path("memory"), _BUDGET_IN_MEMORY)
 
 
 def read_store(path: Path) -> MissionStore:
-    """Open the store in file `path` only to read it, without the StateLock; StoreError if that is impossible."""
+    """Open the store in file `path` read-only, without the StateLock; StoreError if that fails."""
     return MissionStore(read_database(path), path)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies the missions that are still whole from a damaged store into a new one.
+"""Copies intact missions from a damaged store into a new one.
 
-A mission counts as whole if its contents have their checksum. It is looked for by its number, so that a damaged page
-costs the missions on it and no others.
+A mission is intact if its contents match their checksum. Missions are looked up by number, so a damaged page loses
+only the missions on it.
 """
 
 import shutil
@@ -19,14 +19,14 @@ _MISSION = (
     "number, received_at, source, verdict, ack, item_count, finding_count, record_count, checksum, outcome, detail,"
     " concluded_at"
 )
-CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records")  # what crc32 is computed over
+CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records")  # the columns that crc32 covers
 #: A damaged table may claim any number; a store within its budget holds fewer.
 _MOST = 200_000
 _WAL = "-wal"
 
 
 def contents_crc32(contents: Iterable[str | bytes]) -> int:
-    """SQLite notices a damaged page structure, not a changed byte in a mission; this does."""
+    """Detects a changed byte in a mission; SQLite only detects damaged page structures."""
     crc = 0
     for part in contents:
         crc = zlib.crc32(part if isinstance(part, bytes) else part.encode(errors="surrogateescape"), crc)
@@ -34,9 +34,9 @@ def contents_crc32(contents: Iterable[str | bytes]) -> int:
 
 
 def salvage(damaged: Path, store: sqlite3.Connection) -> int:
-    """Copy whole missions from the file `damaged`, which is not touched; how many there were.
+    """Copy the intact missions from the file `damaged`, which is not changed; returns their number.
 
-    The copy that SQLite reads is put beside it: a log is taken in, and no disk is fuller than it can hold.
+    SQLite reads a copy in the same directory, because opening applies the log, and /tmp may be too small.
     """
     try:
         with TemporaryDirectory(prefix="salvage-", dir=damaged.parent) as folder:
@@ -88,7 +88,7 @@ def _copy_mission(number: int, source: sqlite3.Connection, store: sqlite3.Connec
         return 0
     store.execute("SAVEPOINT mission")
     try:
-        # STRICT tables refuse what is of the wrong type.
+        # STRICT tables reject values of the wrong type.
         store.execute(f"INSERT INTO missions ({_MISSION}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", mission)  # noqa: S608
         store.execute(
             f"INSERT INTO mission_contents (number, {', '.join(CONTENTS)}, crc32) VALUES (?, ?, ?, ?, ?, ?, ?)",  # noqa: S608

@@ -13,11 +13,11 @@ _NAME = "lock"
 
 
 class StateUnusableError(StoreError):
-    """The directory cannot be made or written."""
+    """The directory cannot be created or written."""
 
 
 class StateLock:
-    """Holds the directory while it is entered; the kernel lets go when the process dies, however it dies.
+    """Locks the directory while it is entered; the kernel releases the lock when the process dies.
 
     The lock file holds the holder's process id. It is never removed: a second process could hold the removed
     file and a third one a new file.
@@ -35,9 +35,9 @@ class StateLock:
         self.release()
 
     def acquire(self) -> None:
-        """Make the directory if need be and lock it at once.
+        """Create the directory if necessary and lock it without waiting.
 
-        StoreError if another process holds it, its kind StateUnusableError if it cannot be made or written.
+        StoreError if another process holds it; StateUnusableError if it cannot be created or written.
         """
         path = self._directory / _NAME
         try:
@@ -58,12 +58,12 @@ class StateLock:
                 f"stop that one, or name another directory with --state-dir"
             ) from error
         self._descriptor = descriptor
-        with contextlib.suppress(OSError):  # the number is only for that sentence: a full disk must not stop us
+        with contextlib.suppress(OSError):  # the id is only for the message: a full disk must not stop us
             os.ftruncate(descriptor, 0)
             os.write(descriptor, f"{os.getpid()}\n".encode())
 
     def release(self) -> None:
-        """Let go; nothing happens if it is not held."""
+        """Release the lock, if held."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None

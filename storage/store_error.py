@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one error of this package, and SQLite's error codes in a person's words."""
+"""The error of this package, and SQLite's error codes as plain sentences."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -7,10 +7,10 @@ from contextlib import contextmanager
 
 
 class StoreError(Exception):
-    """One sentence for a person: what could not be done, where, why, and what to do about it."""
+    """One sentence for the user: the failed operation, where, why, and what to do about it."""
 
 
-# By primary result code (https://sqlite.org/rescode.html); an extended code adds which system call it was.
+# By primary result code (https://sqlite.org/rescode.html); extended codes add the system call.
 _REASONS = {
     sqlite3.SQLITE_FULL: "the disk is full; free some space",
     sqlite3.SQLITE_IOERR: "the disk is full or failing; look at df and dmesg",
@@ -23,12 +23,12 @@ _REASONS = {
 }
 
 
-# What the sqlite3 module raises; the second where it cannot read SQLite's own complaint about rotten names.
+# Raised by the sqlite3 module; the second if SQLite's own message contains a corrupt name.
 FAILURES = (sqlite3.Error, UnicodeDecodeError)
 
 
 def primary_code(error: Exception) -> int:
-    """Return the primary result code of one of FAILURES; SQLITE_MISUSE if it is of Python's own making."""
+    """The primary result code of one of FAILURES; SQLITE_MISUSE if Python itself raised it."""
     if isinstance(error, UnicodeDecodeError):
         return sqlite3.SQLITE_CORRUPT
     return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_MISUSE) & 0xFF
@@ -36,7 +36,7 @@ def primary_code(error: Exception) -> int:
 
 @contextmanager
 def explained(failure: str) -> Iterator[None]:
-    """Turn what SQLite raises into a StoreError that starts with `failure`, e.g. "cannot open /x/y.db"."""
+    """Convert SQLite's errors to a StoreError that starts with `failure`, e.g. "cannot open /x/y.db"."""
     try:
         yield
     except FAILURES as error:
