@@ -31,14 +31,14 @@ from service.version import version
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission, StoreError
 
 _MAX_LINE = 1 << 20
-#: More clients at a time are hung up on.
+#: Further clients are disconnected.
 _MAX_CLIENTS = 16
-#: For a request to arrive whole, and for its answer to be read.
+#: The timeout for receiving a request, and for sending its reply.
 _REQUEST_TIMEOUT_S = 5.0
 _ANSWER_TIMEOUT_S = 10.0
-#: Where a pushed list comes from, as every ground station is shown it.
+#: The source of a pushed list, as shown to every ground station.
 _MAX_SOURCE = 100
-#: Missions in one answer: a thousand are 300 kB.
+#: Missions in one reply: a thousand are 300 kB.
 _MOST_LISTED = 1000
 _LAST_ANSWERS_S = 0.05
 _log = structlog.get_logger()
@@ -46,7 +46,7 @@ T = TypeVar("T")
 
 
 class MissionJobs:
-    """What can be asked of a daemon, as coroutines with plain data."""
+    """The requests to a daemon, as coroutines with plain data."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
@@ -75,7 +75,7 @@ class MissionJobs:
     async def push(
         self, items: list[MissionItem], source: str, progress: Callable[[Json], None], *, may_erase: bool = True
     ) -> Json:
-        """Check, push and verify a list; no items clear what is there. `may_erase`: see LocalMissions.push."""
+        """Check, push and verify a list; an empty one clears the mission. `may_erase`: see LocalMissions.push."""
         future: asyncio.Future[Json] = self._loop.create_future()
 
         def done(outcome: Delivery | Refusal, arrived: ArrivedMission | None) -> None:
@@ -98,7 +98,7 @@ class MissionJobs:
         return await future
 
     async def check(self, items: list[MissionItem]) -> Json:
-        """Tell what would become of a list on the present flight controller."""
+        """The verdict on a list for the present flight controller."""
         future: asyncio.Future[Verdict[Any] | Refusal] = self._loop.create_future()
         self._daemon.bridge.local.check(items, lambda verdict: _resolve(future, verdict), self._loop.time())
         self._daemon.flush()
@@ -108,7 +108,7 @@ class MissionJobs:
         return verdict_data(verdict)
 
     async def pull(self) -> Json:
-        """Read what the flight controller holds."""
+        """Read the mission of the flight controller."""
         future: asyncio.Future[HeldMission | Refusal] = self._loop.create_future()
         self._daemon.bridge.local.pull(lambda held: _resolve(future, held), self._loop.time())
         self._daemon.flush()
@@ -118,7 +118,7 @@ class MissionJobs:
         return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.missions.others]}
 
     def status(self) -> Json:
-        """Tell how the bridge stands."""
+        """The status of the bridge."""
         bridge = self._daemon.bridge
         session = bridge.session
         controller = session.controller
@@ -163,15 +163,15 @@ class MissionJobs:
         }
 
     async def list_missions(self, limit: int) -> Json:
-        """List what came in, newest first."""
+        """List the received missions, newest first."""
         return await self._daemon.store.ask(lambda store: listed(store, limit))
 
     async def show_mission(self, number: int) -> Json:
-        """Return one mission with all that is known of it."""
+        """One mission with everything known about it."""
         return await self._daemon.store.ask(lambda store: shown(store, number))
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:
-        """Push a stored mission again, as it was sent then: the rules of today apply."""
+        """Push a stored mission again, as it was sent; the present rules apply."""
         data = await self.show_mission(number)
         return await self.push(mission_items(data["received"]["items"]), f"restore of mission {number}", progress)
 
@@ -205,7 +205,7 @@ class ControlServer:
         self._clients: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
-        """Listen; ControlError if that is impossible.
+        """Listen; ControlError if that fails.
 
         A socket that a killed daemon left behind is replaced: the state lock says that it is dead.
         """
@@ -225,12 +225,12 @@ class ControlServer:
             raise ControlError(f"the control socket {self._path} cannot be made: {reason}") from error
 
     async def close(self) -> None:
-        """Stop listening, and tell those who wait for an answer that none will come."""
+        """Stop listening, and tell waiting clients that they get no reply."""
         if self._server is not None:
             self._server.close()
             self._path.unlink(missing_ok=True)
         if self._clients:
-            # Who has an answer by now shall have it.
+            # Finished replies are still sent.
             await asyncio.wait(self._clients, timeout=_LAST_ANSWERS_S)
         for client in self._clients:
             client.cancel()
@@ -249,7 +249,7 @@ class ControlServer:
         finally:
             self._clients.discard(client)
             if writer.transport.get_write_buffer_size():
-                # An answer that nobody reads would stay in memory.
+                # Replies to a client that does not read would pile up in memory.
                 writer.transport.abort()
             writer.close()
 
@@ -274,7 +274,7 @@ class ControlServer:
 
 
 async def _send_all(writer: asyncio.StreamWriter) -> None:
-    """Wait until the client has read it all, but not for ever."""
+    """Wait until the client has read everything, with a timeout."""
     writer.transport.set_write_buffer_limits(high=0)
     with suppress(TimeoutError):
         await asyncio.wait_for(writer.drain(), _ANSWER_TIMEOUT_S)
@@ -298,13 +298,13 @@ def _request(line: bytes) -> Json:
 
 
 def _resolve(future: asyncio.Future[T], result: T) -> None:
-    # Whoever asked may be gone by now.
+    # The client may have disconnected.
     if not future.done():
         future.set_result(result)
 
 
 def _fields(thing: MissionSummary | StoredMission | ReceivedMission) -> Json:
-    """Return the fields by name. Unlike asdict() it copies nothing: for 146 items that takes 8 ms of the loop."""
+    """The fields by name. Unlike asdict() it copies nothing: for 146 items that would take 8 ms of the loop."""
     return {field.name: getattr(thing, field.name) for field in fields(thing)}
 
 

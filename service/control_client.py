@@ -38,7 +38,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
             remedy = "start one (sudo systemctl start naze-bridge, or naze-bridge run), or use --fc directly"
             raise NoDaemonError(f"no daemon answers on {path}: {remedy}") from error
         with suppress(ConnectionError):
-            # Who is refused in the middle of a long request has its answer to read all the same.
+            # A refusal may arrive in the middle of a long request: read it.
             connection.sendall(to_json(request).encode() + b"\n")
         with suppress(ConnectionError):
             for answer in _lines(connection):

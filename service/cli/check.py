@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge check`: what would become of a mission file, offline."""
+"""`naze-bridge check`: how a flight controller would store a mission file, checked offline."""
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
@@ -31,7 +31,7 @@ _RULES: Mapping[str, Callable[[RuleSettings], MissionRules]] = {
 
 
 class ExitCode(IntEnum):
-    """The answer to a script; of several files the worst one's."""
+    """The exit status; of several files the worst one's."""
 
     ACCEPTED = 0
     REJECTED = 1
@@ -147,7 +147,7 @@ def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]
 
 def _summary(sent: int, verdict: Verdict[Any]) -> str:
     if verdict.result is not Result.ACCEPTED:
-        # One item of zeros, by which MAVSDK clears, has no findings.
+        # A single item of zeros, with which MAVSDK clears, has no findings.
         why = verdict.findings[-1].text() if verdict.findings else "Mission erased: one item of zeros"
         return f"MAV_MISSION_{verdict.ack.name}, {why}"
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)

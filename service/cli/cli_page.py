@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reference page of the command line, docs/cli.md: what each command says to --help (`make cli-page`)."""
+"""The reference page of the command line, docs/cli.md: the --help text of each command (`make cli-page`)."""
 
 import sys
 from collections.abc import Iterator
@@ -18,14 +18,14 @@ file, 74 the output cannot be written, 130 interrupted.
 
 
 def page() -> str:
-    """Return the page."""
+    """The page."""
     return _HEAD + "".join(f"\n## {name}\n\n```\n{text}\n```\n" for name, text in helps(main))
 
 
 def helps(
     command: click.Command, name: str = "naze-bridge", parent: click.Context | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Yield each command's full name with what it says to --help."""
+    """Yield each command's full name with its --help text."""
     short = name.split()[-1]
     widths = {"terminal_width": _WIDTH, "max_content_width": _WIDTH}
     context = click.Context(command, parent=parent, info_name=short, **{**command.context_settings, **widths})

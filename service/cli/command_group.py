@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A group of commands that says which one may have been meant, and that imports a command only when it is used."""
+"""A group of commands that suggests the nearest name for a misspelt one, and imports a command only when it is used."""
 
 import difflib
 import importlib
@@ -26,14 +26,14 @@ class CommandGroup(click.Group):
 
 
 class LazyCommand(NamedTuple):
-    """Where a command is, as "module:name", and its line in the list of commands."""
+    """The location of a command, as "module:name", and its line in the list of commands."""
 
     source: str
     summary: str
 
 
 class LazyGroup(CommandGroup):
-    """Knows its commands by a table: neither the list of them nor its completion imports any."""
+    """A group given by a table, so that neither the list of commands nor completion imports them."""
 
     def __init__(self, *args: Any, commands: Mapping[str, LazyCommand], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

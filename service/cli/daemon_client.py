@@ -18,14 +18,14 @@ from storage.store_error import StoreError
 _INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 _GOES_ON = "interrupted; the daemon goes on with it: see `naze-bridge status` and `naze-bridge missions list`"
 _CANCELLED = "interrupted; what was not finished within 2 s was given up: see `naze-bridge pull`"
-#: Where the service keeps its missions.
+#: The service's state directory.
 SERVICE_STATE = Path("/var/lib/naze-bridge")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def daemon_options(command: F) -> F:
-    """Add the options that say which daemon is meant."""
+    """Add the options that select a daemon."""
     state_dir = click.option(
         "--state-dir",
         type=click.Path(path_type=Path),
@@ -37,7 +37,7 @@ def daemon_options(command: F) -> F:
 
 
 def bridge_options(command: F) -> F:
-    """Add the options that say which bridge is meant, be it a daemon's or one of the command's own."""
+    """Add the options that select a bridge: a daemon's, or one of the command's own."""
     fc = click.option("--fc", metavar="FC", help="Talk to this flight controller directly, without a daemon.")
     return daemon_options(fc(command))
 

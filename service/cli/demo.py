@@ -37,7 +37,7 @@ _CONNECT_TIMEOUT_S = 15.0
 def demo(file: Path, once: bool, port: int) -> None:
     """Start the daemon on a simulated Naze, write a mission FILE to it over UDP, and show the result."""
     console = Console(highlight=False)
-    # The daemon is a child of this program: whoever ends the one ends the other, also by closing its terminal.
+    # The daemon is a child of this program, so that both end together, also when the terminal is closed.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda number, _frame: sys.exit(128 + number))
     try:
@@ -108,7 +108,7 @@ def _daemon(port: int, state_dir: Path, console: Console) -> Iterator[tuple[int,
 
 
 def _free_port(wanted: int, console: Console) -> int:
-    """Return `wanted`, or another port if a ground station on this machine holds it."""
+    """`wanted`, or another port if a ground station on this machine uses it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("0.0.0.0", wanted))  # noqa: S104  # the port is to be reached over Wi-Fi
@@ -120,7 +120,7 @@ def _free_port(wanted: int, console: Console) -> int:
 
 
 def _own_addresses() -> list[str]:
-    """Return the address by which this machine reaches its network, found without sending anything."""
+    """The machine's address on its network, found without sending anything."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))

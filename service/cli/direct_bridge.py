@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bridge of a command's own (`--fc`), for one request."""
+"""A command's own bridge (`--fc`), for one request."""
 
 import asyncio
 from collections.abc import Callable
@@ -24,7 +24,7 @@ _TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
 
 
 async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
-    """Ask a bridge of our own on this port; ControlError or StoreError say why there is no answer."""
+    """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply."""
     set_up_logging("error")
     daemon = Daemon(Settings(fc, takeoff_max_m=takeoff_limit_m()))
     jobs = MissionJobs(daemon)
@@ -42,7 +42,7 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
             await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
         return await jobs.do(request, lambda answer: progress(answer["progress"]))
     except asyncio.CancelledError:
-        # A mission is either finished or given up cleanly, never left in the middle.
+        # A mission is either finished or aborted cleanly, never left half-written.
         await daemon.finish()
         raise
     finally:
@@ -52,7 +52,7 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
 
 
 async def _wait(condition: Callable[[], bool], seconds: float) -> None:
-    """Wait until something is so, but not longer than that."""
+    """Wait until a condition holds, with a timeout."""
     for _ in range(int(seconds / _INTERVAL_S)):
         if condition():
             return

@@ -49,7 +49,7 @@ class _Main(LazyGroup):
             if error.errno not in _UNWRITABLE:
                 raise
             click.echo(f"naze-bridge: the output cannot be written: {error.strerror}", err=True)
-            # What is still in the buffer would fail once more at the interpreter's end.
+            # The unwritten buffer would fail once more at the interpreter's exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(os.EX_IOERR)
         sys.exit(code if isinstance(code, int) else 0)
@@ -61,7 +61,7 @@ class _Main(LazyGroup):
 
 
 def _load_structlog_alone() -> None:
-    """Import structlog as if there were no rich, which it would load for tracebacks: 5 MB that no daemon needs."""
+    """Import structlog without rich, which it would load for tracebacks: 5 MB that a daemon does not need."""
     if "structlog" in sys.modules or "rich" in sys.modules:
         return
     sys.modules["rich"] = None  # type: ignore[assignment]

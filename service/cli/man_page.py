@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manual page, naze-bridge(1), from what each command says to --help: `python -m service.cli.man_page`."""
+"""The manual page, naze-bridge(1), from the --help texts: `python -m service.cli.man_page`."""
 
 import sys
 

@@ -105,7 +105,7 @@ def clear(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
 
 
 def show_delivery(delivery: Json, *, as_json: bool) -> None:
-    """Print what was sent beside what is held now; end the program with status 1 or 3 if it was not accepted."""
+    """Print the list as sent and as held; ends the program with status 1 or 3 if it was not accepted."""
     if as_json:
         print_json(delivery)
     else:

@@ -14,7 +14,7 @@ MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are abou
 
 
 def load_mission(path: Path) -> list[MissionItem]:
-    """Read the mission file at `path`; MissionFileError also where the disk says no. Notes go to standard error."""
+    """Read the mission file at `path`; MissionFileError also if the disk fails. Notes go to standard error."""
     name = click.format_filename(path)
 
     def note(text: str) -> None:
@@ -24,7 +24,7 @@ def load_mission(path: Path) -> list[MissionItem]:
 
 
 def mission_bytes(path: Path) -> bytes:
-    """Return what is in the mission file at `path`, not yet understood; MissionFileError where the disk says no."""
+    """The bytes of the mission file at `path`; MissionFileError if it cannot be read."""
     try:
         return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:
@@ -33,7 +33,7 @@ def mission_bytes(path: Path) -> bytes:
 
 
 def save_mission(path: Path, text: str) -> None:
-    """Write the file in one step: a full disk must not cost the one that was there; MissionFileError if it cannot be.
+    """Write a file in one step: a full disk must not destroy the old one. MissionFileError if that fails.
 
     A link stays a link, and only regular files are replaced: as root, renaming over a device would destroy it.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission as it was sent beside what is stored of it, for a terminal."""
+"""A mission as sent and as stored, side by side, for a terminal."""
 
 import math
 from collections.abc import Sequence
@@ -16,15 +16,15 @@ from service.mission_data import Json, mission_items
 _CHANGED = "yellow"
 _DROPPED = "red"
 _ADDED = "green"
-#: Names of commands that are stored are never cut up.
+#: Names of stored commands are never shortened.
 _LONGEST_STORED = len("RETURN_TO_LAUNCH")
 
 
 def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]) -> Table:
-    """Make one row per item sent, with "sent->stored" where a value or the item's number became another.
+    """One row per item sent, with "sent->stored" for each changed value or item number.
 
-    `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` tell which items are missing
-    in it, and stand below the table with their reasons.
+    `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
+    and are printed below the table with their reasons.
     """
     reasons = Text("".join(f"\n{finding.text()}" for finding in findings))
     table = _empty_table(reasons)
@@ -50,7 +50,7 @@ def _empty_table(caption: Text) -> Table:
 
 
 def difference_table(rows: Sequence[Json], first: str, second: str) -> Table:
-    """Make one row per item that differs (see service.web.comparison.difference), values as "first->second"."""
+    """One row per item that differs (see service.web.comparison.difference), values as "first->second"."""
     table = _empty_table(Text(f"\n{first} -> {second}"))
     for row in rows:
         left, right = (None if row[side] is None else _values(_shown_item(row[side])) for side in ("left", "right"))

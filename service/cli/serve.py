@@ -40,7 +40,7 @@ def serve(settings: Settings, load: Callable[[], Settings]) -> None:
 def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
     assert settings.state_dir is not None
     with ExitStack() as stack:
-        # A disk that cannot be written keeps nobody on the ground: the store says so, and keeps missions in memory.
+        # An unwritable disk must not prevent a flight: the store reports it, and keeps missions in memory.
         with suppress(StateUnusableError):
             stack.enter_context(StateLock(settings.state_dir))
         asyncio.run(_main(settings, load, socket_of_daemon(settings.state_dir)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge missions`: what came in, and what became of it."""
+"""`naze-bridge missions`: the received missions and their results."""
 
 from datetime import datetime
 from pathlib import Path

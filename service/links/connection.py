@@ -149,7 +149,7 @@ def family_of(host: str) -> socket.AddressFamily:
 
 
 def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
-    """Read "HOST:PORT", the `rest` of `text`; AddressError says what is wrong with `text`, and which `forms` it has."""
+    """Read "HOST:PORT", the `rest` of `text`; AddressError names `text` and its valid `forms`."""
     host, colon, port = rest.rpartition(":")
     if host.startswith("[") and host.endswith("]"):
         host = host[1:-1]

@@ -19,7 +19,7 @@ class ShareSettings:
 
 
 def parse_share(entry: object, _folder: Path) -> ShareSettings:
-    """Read one entry of `share`, or one [[share]] table; AddressError says what is wrong."""
+    """Read one entry of `share`, or one [[share]] table; AddressError explains problems."""
     if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
         raise AddressError(f'share: {entry!r} is no table with address = "tcpin:127.0.0.1:5761"')
     address, write = parse_gcs(entry["address"]), entry.get("write", False)

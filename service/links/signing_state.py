@@ -63,7 +63,7 @@ class SigningState:
         self._timer: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
-        """Keep the file ahead of what was signed. Must be called on a running event loop."""
+        """Keep the file ahead of the signed timestamps. Must be called on a running event loop."""
         if self._signings and self._path is not None:
             self._look(asyncio.get_running_loop(), self._path)
 
