@@ -238,11 +238,11 @@ class Vehicle:
             self._place_home(has_armed=False)
 
     def _estimated(self, reading: Reading) -> Reading:
-        """What is left of a battery, where the flight controller does not say."""
+        """Fill in cells and remaining charge if the flight controller does not report them."""
         assert isinstance(reading, Power)
         if reading.voltage_v is None or reading.remaining_percent is not None:
             return reading
-        # Never fewer than before: a battery that runs down is not one of fewer cells.
+        # Never fewer than before: a discharging battery does not lose cells.
         self._cells = max(self._cells, reading.cells or least_cells(reading.voltage_v))
         return replace(reading, cells=self._cells, remaining_percent=remaining_percent(reading.voltage_v, self._cells))
 
