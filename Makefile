@@ -37,7 +37,7 @@ BIN := $(VENV)/bin
 BROWSER_PACKAGES := chromium chromium-driver
 BROWSER := { command -v chromium && command -v chromedriver; } >/dev/null
 # For tests of the installed Debian package: needs permission to create namespaces, which some containers lack.
-BARE_ROOT := { $(BIN)/python tests/service/bare_root.py; } >/dev/null 2>&1
+BARE_ROOT := { $(BIN)/python tests/support/bare_root.py; } >/dev/null 2>&1
 IN_BARE_ROOT := tests/service/test_debian_package.py::test_in_a_bare_root
 INSTALL = if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  echo "installing $(1)"; \
@@ -67,7 +67,7 @@ bench: $(VENV)/.test-ready
 
 # The docs' pictures of the status page, taken by its tests.
 pictures: $(VENV)/.test-ready
-	PYTHONPATH=.:tests/e2e:tests/web $(BIN)/python tests/web/take_pictures.py
+	PYTHONPATH=. $(BIN)/python tests/support/take_pictures.py
 
 real-board: $(VENV)/.test-ready
 	@test -n '$(IMAGE)' || { echo 'Say which image: make real-board IMAGE=path/to/X.elf' >&2; exit 1; }
@@ -126,7 +126,7 @@ cli-page: $(VENV)/.test-ready
 
 # The table of INAV's and MultiWii's treatment of each command.
 inav-page: $(VENV)/.test-ready
-	PYTHONPATH=. $(BIN)/python tests/simulator/nav_rows.py > docs/inav.table
+	PYTHONPATH=. $(BIN)/python tests/support/nav_rows.py > docs/inav.table
 	sed -i -e '/begin: make inav-page/,/end: make inav-page/{/make inav-page -->/!d}' -e '/begin: make inav-page/r docs/inav.table' docs/inav.md
 	rm docs/inav.table
 

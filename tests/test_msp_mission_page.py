@@ -2,15 +2,12 @@
 """The worked exchange on docs/msp-mission.md is what the encoders and the simulated Naze really say."""
 
 import re
-import sys
 from pathlib import Path
 
 from protocols.mission_record import identify, pack_records
 from protocols.msp import mission as ext
 from protocols.wp_record import WpCommand, WpRecord
-
-sys.path.insert(0, str(Path(__file__).parent / "simulator"))
-from naze_bench import Bench
+from tests.support.naze_bench import Bench
 
 PAGE = Path(__file__).parent.parent / "docs" / "msp-mission.md"
 HOME = WpRecord(473977420, 85455940, 2, 0, 0, 2, 0, WpCommand.WAYPOINT)

@@ -6,7 +6,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from benches import Starter
+
+from tests.support.benches import Starter
 
 
 @pytest.fixture

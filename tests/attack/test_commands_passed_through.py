@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from attack_pilot import HELLO, m, sign
-from benches import Starter
-from plain_station import udp_station
-from programs import PATIENCE, Daemon, comes, free_port, until
+
+from tests.support.attack_pilot import HELLO, m, sign
+from tests.support.benches import Starter
+from tests.support.plain_station import udp_station
+from tests.support.programs import PATIENCE, Daemon, comes, free_port, until
 
 COMMANDS = {
     "forced disarm": m.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0),

@@ -6,14 +6,13 @@ import socket
 from contextlib import ExitStack
 from pathlib import Path
 
-from attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m
-from benches import Starter
-from plain_station import udp_station
-from plan import plain_plan
-from programs import comes, free_port, until
-
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
+from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m
+from tests.support.benches import Starter
+from tests.support.plain_station import udp_station
+from tests.support.plan import plain_plan
+from tests.support.programs import comes, free_port, until
 
 
 def logs(state_dir: Path) -> list[Path]:

@@ -6,13 +6,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m
-from benches import Bench, Starter
-from plain_station import udp_station
-from plan import plain_plan
-from programs import comes, until
 
 from protocols.mavlink.dialect import Message
+from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m
+from tests.support.benches import Bench, Starter
+from tests.support.plain_station import udp_station
+from tests.support.plan import plain_plan
+from tests.support.programs import comes, until
 
 #: Requests that write to flash: MSP_EEPROM_WRITE, and the mission extension's RADIUS with the id that follows its size.
 _WRITES = (b"$M<\x00\xfa", b"$M<\x04\xc4")

@@ -7,13 +7,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m, sign
-from benches import Bench, Starter
-from plain_station import PlainStation, tcp_station, udp_station
-from plan import plain_plan
-from programs import comes, free_port, until
 
 from protocols.mission_item import MissionResult
+from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m, sign
+from tests.support.benches import Bench, Starter
+from tests.support.plain_station import PlainStation, tcp_station, udp_station
+from tests.support.plan import plain_plan
+from tests.support.programs import comes, free_port, until
 
 PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
 #: More than there are places on a link.

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 import zenoh
-from benches import Starter
-from secured_fleet import Fleet, password_fleet, tls_fleet
-from zenoh_bench import Reader, ask_surely, key, zenoh_bench
+
+from tests.support.benches import Starter
+from tests.support.secured_fleet import Fleet, password_fleet, tls_fleet
+from tests.support.zenoh_bench import Reader, ask_surely, key, zenoh_bench
 
 
 @pytest.fixture(params=[tls_fleet, password_fleet], ids=["tls", "passwords"])

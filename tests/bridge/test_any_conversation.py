@@ -3,7 +3,16 @@
 
 from collections.abc import Sequence
 
-from conversations import (
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from bridge.fc.states.msp import Msp
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionResult
+from protocols.wp_record import WpRecord
+from simulator.options import SimOptions
+from tests.support.conversations import (
     Upload,
     ack_message,
     clear_message,
@@ -14,16 +23,7 @@ from conversations import (
     request_message,
     waypoints,
 )
-from hypothesis import HealthCheck, settings
-from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
-from world import GroundStation, World, flash_holding
-
-from bridge.fc.states.msp import Msp
-from protocols.mavlink.dialect import messages
-from protocols.mission_item import MissionResult
-from protocols.wp_record import WpRecord
-from simulator.options import SimOptions
+from tests.support.world import GroundStation, World, flash_holding
 
 OLD_RECORDS = records_of(waypoints(20, seed=77))
 OLD_FLASH = flash_holding(OLD_RECORDS)

@@ -5,16 +5,6 @@ import random
 from collections.abc import Callable
 
 import pytest
-from fake_controllers import (
-    HARAKIRI_CAPABILITY,
-    CommandLine,
-    Loopback,
-    MavlinkOnly,
-    MspFake,
-    QuietLine,
-    ident,
-)
-from world import World
 
 from bridge.controllers import other
 from bridge.controllers.harakiri import profile as harakiri
@@ -24,6 +14,16 @@ from bridge.fc.states.searching import Searching
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.fake_controllers import (
+    HARAKIRI_CAPABILITY,
+    CommandLine,
+    Loopback,
+    MavlinkOnly,
+    MspFake,
+    QuietLine,
+    ident,
+)
+from tests.support.world import World
 
 ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
 BOXES = b"ANGLE;HORIZON;BARO;MAG;CAMSTAB;ARM;GPS HOME;GPS HOLD;"

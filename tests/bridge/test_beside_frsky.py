@@ -2,12 +2,12 @@
 """A Harakiri that is armed with tele_prot 1 answers MSP beside its FrSky telemetry, out of one send ring."""
 
 import pytest
-from conversations import Upload, waypoints
-from world import GroundStation, World
 
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from simulator.options import SimOptions, TelemetryProtocol
+from tests.support.conversations import Upload, waypoints
+from tests.support.world import GroundStation, World
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.031, 0.062, 0.093])

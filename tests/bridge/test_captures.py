@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from world import GroundStation, World
 
 from bridge.fc.states.base import Closed
 from bridge.model.mission_log import Outcome
@@ -19,6 +18,7 @@ from protocols.mission_file import read_mission_file
 from protocols.mission_item import MissionResult
 from protocols.uart_capture import UartEvent, read_capture
 from simulator.playback import CapturePlayer
+from tests.support.world import GroundStation, World
 
 CAPTURES = Path(__file__).parents[1] / "captures"
 MISSION = Path(__file__).parents[2] / "examples" / "naze-field.waypoints"

@@ -5,11 +5,11 @@ import math
 from collections.abc import Callable
 
 import pytest
-from world import GroundStation, World
 
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from simulator.options import Faults
+from tests.support.world import GroundStation, World
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
-from conversations import Download, Upload, clear_message, waypoints
-from world import GroundStation, World
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
@@ -27,6 +25,8 @@ from bridge.model.verdict import Result
 from protocols.mission_item import Command, MissionItem, MissionResult
 from simulator.fc_kinds import make_board
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.conversations import Download, Upload, clear_message, waypoints
+from tests.support.world import GroundStation, World
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 #: A push on MultiWii takes 70 ms a record, on a Harakiri in MAVLink mode seconds for its flash.

@@ -4,18 +4,6 @@
 from dataclasses import replace
 
 import pytest
-from conversations import (
-    Download,
-    Upload,
-    ack_message,
-    count_message,
-    list_message,
-    records_of,
-    request_message,
-    waypoints,
-)
-from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
-from world import Air, GroundStation, World, flash_holding
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.missions.mission_service import HeldMission
@@ -25,6 +13,18 @@ from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.conversations import (
+    Download,
+    Upload,
+    ack_message,
+    count_message,
+    list_message,
+    records_of,
+    request_message,
+    waypoints,
+)
+from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
+from tests.support.world import Air, GroundStation, World, flash_holding
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)

@@ -5,14 +5,14 @@ import math
 from collections.abc import Callable
 
 import pytest
-from conversations import waypoints
-from world import GroundStation, World
 
 from bridge.fc.actions import ActionResult
 from bridge.vehicle.commands import _REFUSED
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.frame import MspParser
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.conversations import waypoints
+from tests.support.world import GroundStation, World
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS = range(6)

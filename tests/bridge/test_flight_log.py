@@ -5,11 +5,11 @@ from collections import Counter
 from collections.abc import Sequence
 
 import pytest
-from world import GroundStation, World
 
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 from simulator.options import SimOptions, TelemetryProtocol
+from tests.support.world import GroundStation, World
 
 
 class Log:

@@ -10,12 +10,12 @@ from contextlib import suppress
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.database import DirectoryBasedExampleDatabase
-from world import GroundStation, World
 
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.msp.frame import Direction, MspFrame
+from tests.support.world import GroundStation, World
 
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "150"))
 #: In one example, so that what one input leaves behind meets the next.

@@ -5,8 +5,6 @@ import struct
 from dataclasses import replace
 
 import pytest
-from conversations import Download, Upload, waypoints
-from world import GroundStation, World
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -15,6 +13,8 @@ from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.wp_record import WpRecord
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.conversations import Download, Upload, waypoints
+from tests.support.world import GroundStation, World
 
 A = MissionResult
 

@@ -5,9 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from conversations import Download, Upload, clear_message, count_message, waypoints
-from fake_inav import FakeInav, FakeMultiwii, lossy
-from world import Air, GroundStation, World
 
 from bridge.controllers import other
 from bridge.controllers.inav import profile as inav
@@ -21,6 +18,9 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
+from tests.support.conversations import Download, Upload, clear_message, count_message, waypoints
+from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy
+from tests.support.world import Air, GroundStation, World
 
 RULES = NavRules(inav_profile())
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED

@@ -4,11 +4,8 @@
 from typing import Any
 
 import pytest
-from conversations import Download, Upload, clear_message
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_inav import plan
-from world import GroundStation, World
 
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.multiwii import profile as multiwii
@@ -23,6 +20,9 @@ from simulator.inav_boxes import BOXES
 from simulator.msp_board import MspBoard
 from simulator.msp_options import MspOptions
 from simulator.options import Faults
+from tests.bridge.test_inav import plan
+from tests.support.conversations import Download, Upload, clear_message
+from tests.support.world import GroundStation, World
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))

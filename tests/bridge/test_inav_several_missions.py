@@ -4,10 +4,6 @@
 from dataclasses import replace
 
 import pytest
-from conversations import Download, Upload, clear_message
-from test_inav import RULES, packed, plan
-from test_inav_boards import ACCEPTED, without_home
-from world import GroundStation, World
 
 from bridge.controllers.nav.stored_missions import erased, flown, split_missions
 from bridge.missions.list_check import check_list
@@ -22,6 +18,10 @@ from simulator.msp_board import MspBoard
 from simulator.msp_options import MspOptions
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint
 from simulator.options import Faults
+from tests.bridge.test_inav import RULES, packed, plan
+from tests.bridge.test_inav_boards import ACCEPTED, without_home
+from tests.support.conversations import Download, Upload, clear_message
+from tests.support.world import GroundStation, World
 
 NAV_WP = 1 << BOXES["9.1.0"].index(28)
 NOTHING_MORE = NavWaypoint().pack(0)[1:]

@@ -4,10 +4,6 @@
 from typing import Any
 
 import pytest
-from conversations import Upload
-from test_inav import plan
-from test_inav_boards import board_with
-from world import GroundStation, World
 
 from bridge.model.vehicle import Health, MissionLeg, Power
 from protocols.mavlink.dialect import messages
@@ -18,6 +14,10 @@ from simulator.inav_boxes import BOXES, NAV_WP
 from simulator.msp_board import MspBoard
 from simulator.msp_options import MspOptions
 from simulator.options import Faults
+from tests.bridge.test_inav import plan
+from tests.bridge.test_inav_boards import board_with
+from tests.support.conversations import Upload
+from tests.support.world import GroundStation, World
 
 PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
 RC_LINK, NOT_LEVEL = 1 << 18, 1 << 8

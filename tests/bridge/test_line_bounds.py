@@ -5,8 +5,6 @@ import random
 from itertools import pairwise
 
 import pytest
-from conversations import Download, records_of, waypoints
-from world import GroundStation, World, flash_holding
 
 from bridge.line.conversation import Send
 from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
@@ -14,6 +12,8 @@ from bridge.model.vehicle import Orientation
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from simulator.options import Faults, SimOptions
+from tests.support.conversations import Download, records_of, waypoints
+from tests.support.world import GroundStation, World, flash_holding
 
 FULL_RECORDS = records_of(waypoints(146, 3))
 FULL_FLASH = flash_holding(FULL_RECORDS)

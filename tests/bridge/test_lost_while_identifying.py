@@ -4,11 +4,11 @@
 import random
 
 import pytest
-from world import World
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.states.msp import Identifying
 from simulator.options import SimOptions, TelemetryProtocol
+from tests.support.world import World
 
 #: From the moment at which the board can be heard again.
 FOUND_WITHIN_S = 8.0

@@ -4,7 +4,6 @@
 import math
 
 import pytest
-from world import GroundStation, World
 
 from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.gcs.stations import EXPIRY_S
@@ -12,6 +11,7 @@ from bridge.vehicle.telemetry_table import TELEMETRY, Row
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
+from tests.support.world import GroundStation, World
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3

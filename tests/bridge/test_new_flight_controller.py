@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Adding a flight controller takes one profile and one line in the table (docs/design.md)."""
 
-from conversations import Upload, waypoints
-from fake_inav import FakeInav
-from world import GroundStation, World
-
 from bridge.controllers.table import PROFILES
 from bridge.fc.interview import Interview
 from bridge.fc.profile import FlightController, Profile
 from bridge.line.conversation import Conversation
 from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
+from tests.support.conversations import Upload, waypoints
+from tests.support.fake_inav import FakeInav
+from tests.support.world import GroundStation, World
 
 
 def recognise(board: Interview) -> Conversation[FlightController | None]:

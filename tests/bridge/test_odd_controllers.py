@@ -4,11 +4,8 @@
 import random
 
 import pytest
-from conversations import Download, Upload, records_of, waypoints
-from fake_controllers import HARAKIRI_CAPABILITY, QuietLine, ident
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from world import GroundStation, World
 
 from bridge.controllers.harakiri import profile as harakiri
 from protocols.mavlink.dialect import messages
@@ -16,6 +13,9 @@ from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Records, Status, Stored
+from tests.support.conversations import Download, Upload, records_of, waypoints
+from tests.support.fake_controllers import HARAKIRI_CAPABILITY, QuietLine, ident
+from tests.support.world import GroundStation, World
 
 BOXES = b"ANGLE;ARM;GTUNE;"
 INFO = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(0, 0), 200, 50, 0, 0)

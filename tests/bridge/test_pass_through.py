@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from hashlib import sha256
 
 import pytest
-from fake_controllers import QuietLine
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from world import GroundStation, World
 
 from bridge.controllers import other
 from protocols.mavlink.frame import MavlinkSplitter
+from tests.support.fake_controllers import QuietLine
+from tests.support.world import GroundStation, World
 
 KEY = sha256(b"a passphrase").digest()
 

@@ -2,8 +2,6 @@
 """A mission of which it is not known whether it arrived: the board is asked when it is back, and the pilot hears it."""
 
 import pytest
-from conversations import Upload, records_of, waypoints
-from world import GroundStation, World, flash_holding
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.fc_mission_store import PushFailure
@@ -13,6 +11,8 @@ from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.options import SimOptions
+from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.world import GroundStation, World, flash_holding
 
 OLD, NEW = waypoints(20, seed=77), waypoints(30)
 OLD_FLASH = flash_holding(records_of(OLD))

@@ -9,7 +9,6 @@ matters is each byte sequence by itself and what any sequence can begin and end 
 import itertools
 
 import pytest
-from world import World
 
 from bridge.fc.autosense import SPEEDS
 from bridge.line.msp_link import PROBE, RESYNC
@@ -17,6 +16,7 @@ from protocols.msp.hazards import HAZARDS, RUN_LENGTH, is_clean
 from simulator.line import garble
 from simulator.options import SimOptions
 from simulator.traps import HazardWatch
+from tests.support.world import World
 
 SENT = sorted(set(SPEEDS))
 #: What a CLI takes for `serial_baudrate`, and what other boards use.

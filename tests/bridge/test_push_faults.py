@@ -9,8 +9,6 @@ from collections import Counter
 from collections.abc import Callable
 
 import pytest
-from conversations import records_of, waypoints
-from world import World, flash_holding
 
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.missions.mission_service import Delivery, HeldMission
@@ -20,6 +18,8 @@ from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.naze import Power
 from simulator.options import Faults, SimOptions
+from tests.support.conversations import records_of, waypoints
+from tests.support.world import World, flash_holding
 
 OLD = waypoints(20, seed=77)
 NEW = waypoints(146, seed=5)

@@ -9,9 +9,6 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 import pytest
-from c_core import library
-from conversations import records_of, waypoints
-from world import World
 
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.compiled_core import load_core
@@ -19,6 +16,9 @@ from simulator.flash import ERASED
 from simulator.mission_slots import flash_size
 from simulator.naze import Power, SimulatedNaze
 from simulator.options import Faults, SimOptions
+from tests.support.c_core import library
+from tests.support.conversations import records_of, waypoints
+from tests.support.world import World
 
 OLD, NEW = waypoints(20, seed=77), waypoints(146, seed=5)
 OLD_RECORDS, NEW_RECORDS = records_of(OLD), records_of(NEW)

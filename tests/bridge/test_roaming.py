@@ -4,12 +4,12 @@
 import random
 
 import pytest
-from conversations import Download, Upload, count_message, item_message, records_of, waypoints
-from world import Air, GroundStation, World
 
 from bridge.gcs.stations import EXPIRY_S, MOVED_S
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
+from tests.support.conversations import Download, Upload, count_message, item_message, records_of, waypoints
+from tests.support.world import Air, GroundStation, World
 
 m = messages
 PLAN = waypoints(40)

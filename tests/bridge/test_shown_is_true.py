@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import pytest
-from world import GroundStation, World
 
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from simulator.flight import Craft
 from simulator.options import SimOptions, TelemetryProtocol
+from tests.support.world import GroundStation, World
 
 STEP_S, STALE_S = 0.1, 1.5
 FIELD = 453838000, 84733000

@@ -4,15 +4,15 @@
 import random
 
 import pytest
-from conversations import Upload, waypoints
 from fastcrc.crc16 import mcrf4xx
-from world import GroundStation, World
 
 from bridge.gcs.ground import split_text
 from bridge.gcs.station import Peer
 from bridge.gcs.stations import EXPIRY_S, MAX_PEERS
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mission_item import MissionResult
+from tests.support.conversations import Upload, waypoints
+from tests.support.world import GroundStation, World
 
 m = messages
 

@@ -4,8 +4,6 @@
 import random
 
 import pytest
-from conversations import Upload, count_message, records_of, waypoints
-from world import Air, GroundStation, World, flash_holding
 
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.model.mission_log import Outcome
@@ -14,6 +12,8 @@ from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.options import Faults, SimOptions
+from tests.support.conversations import Upload, count_message, records_of, waypoints
+from tests.support.world import Air, GroundStation, World, flash_holding
 
 OLD, NEW = waypoints(20, seed=77), waypoints(146, seed=5)
 

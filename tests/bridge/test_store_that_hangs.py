@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A dying SD card answers after minutes or never: the craft is still shown, and still takes its mission."""
 
-from conversations import Download, Upload, records_of, waypoints
-from world import GroundStation, World, flash_holding
-
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionResult
+from tests.support.conversations import Download, Upload, records_of, waypoints
+from tests.support.world import GroundStation, World, flash_holding
 
 NEVER = 1e9
 

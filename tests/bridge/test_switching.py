@@ -4,14 +4,14 @@
 from itertools import pairwise
 
 import pytest
-from conversations import Upload, records_of, waypoints
-from world import GroundStation, World
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.profile import Profile
 from protocols.mission_item import MissionResult
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.world import GroundStation, World
 
 READABLE = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600]
 

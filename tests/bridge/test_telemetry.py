@@ -7,8 +7,6 @@ from collections import Counter
 from itertools import pairwise
 
 import pytest
-from conversations import waypoints
-from world import GroundStation, World
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.vehicle.telemetry_table import TELEMETRY
@@ -17,6 +15,8 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from simulator.flight import FlightState
 from simulator.options import Faults, SimOptions
+from tests.support.conversations import waypoints
+from tests.support.world import GroundStation, World
 
 m = messages
 ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)

@@ -6,7 +6,13 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from conversations import (
+
+from bridge.model.mission_log import Outcome
+from bridge.vehicle.upload_states import Asking, Delivering, Receiving, State
+from protocols.mavlink.dialect import Message, messages
+from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.conversations import (
     Upload,
     ack_message,
     clear_message,
@@ -16,14 +22,8 @@ from conversations import (
     rounded,
     waypoints,
 )
-from fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
-from world import Air, GroundStation, World, flash_holding
-
-from bridge.model.mission_log import Outcome
-from bridge.vehicle.upload_states import Asking, Delivering, Receiving, State
-from protocols.mavlink.dialect import Message, messages
-from protocols.mission_item import Command, Frame, MissionItem, MissionResult
-from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
+from tests.support.world import Air, GroundStation, World, flash_holding
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as m
-from test_pass_through import Autopilot, passing
-from world import GroundStation, World
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.model.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from simulator.options import SimOptions, TelemetryProtocol
+from tests.bridge.test_pass_through import Autopilot, passing
+from tests.support.world import GroundStation, World
 
 EMPTY: dict[Group, Any] = {
     Group.ATTITUDE: Attitude(),

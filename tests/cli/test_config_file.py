@@ -4,10 +4,10 @@
 from pathlib import Path
 
 import pytest
-from programs import run_naze_bridge
 
 from service.links.connection import GcsAddress, SerialFc, SimulatedFc
 from service.settings import load_settings
+from tests.support.programs import run_naze_bridge
 
 
 def test_flags_go_before_the_file(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from programs import Program, free_port, run_naze_bridge, until
+
+from tests.support.programs import Program, free_port, run_naze_bridge, until
 
 REPOSITORY = Path(__file__).parents[2]
 TEMPORARY = "naze-bridge-demo-"

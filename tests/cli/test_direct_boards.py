@@ -7,15 +7,15 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from plan import HOME, PlanRow, waypoint
-from programs import Board, run_naze_bridge
 
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import Command
 from simulator.fc_kinds import KINDS
 from simulator.inav_mission import CAPACITY
 from simulator.nav_waypoint import FLAG_LAST, NavWaypoint
+from tests.support.benches import Starter
+from tests.support.plan import HOME, PlanRow, waypoint
+from tests.support.programs import Board, run_naze_bridge
 
 STORES_MISSIONS = ("naze", "inav", "multiwii")
 STORES_NONE = ("betaflight", "baseflight")

@@ -12,13 +12,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from benches import Starter
 from click.testing import CliRunner
-from plan import judge, plain_plan, records_of
-from programs import Board, run_naze_bridge
 
 from protocols.mission_file import write_qgc_wpl
 from service.cli.main import main
+from tests.support.benches import Starter
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import Board, run_naze_bridge
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

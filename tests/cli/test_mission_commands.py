@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benches import Starter
-from plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
-from programs import Daemon, run_naze_bridge
 
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import Command
+from tests.support.benches import Starter
+from tests.support.plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
+from tests.support.programs import Daemon, run_naze_bridge
 
 
 @pytest.fixture(scope="module")

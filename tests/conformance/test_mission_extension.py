@@ -9,17 +9,17 @@ import struct
 from collections.abc import Callable
 
 import pytest
-from c_core import CCore, PowerCut
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from mission_devices import Device, model, simulated_core
 
 from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import request
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Records, Status, Stored
 from protocols.wp_record import WpRecord
+from tests.support.c_core import CCore, PowerCut
+from tests.support.mission_devices import Device, model, simulated_core
 
 CAPACITY, CHUNK, READ = 146, 15, 6
 

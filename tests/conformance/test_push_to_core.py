@@ -7,7 +7,6 @@ from itertools import count
 from typing import Any
 
 import pytest
-from c_core import CCore, PowerCut
 
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.line.conversation import Conversation, StoreEffect
@@ -17,6 +16,7 @@ from bridge.missions.fc_mission_store import PushResult
 from protocols.mission_record import pack_records
 from protocols.msp.mission import MissionCommand, decode_info
 from protocols.wp_record import WpRecord
+from tests.support.c_core import CCore, PowerCut
 
 _BAUD = 115200
 _LOOP_S = 0.003

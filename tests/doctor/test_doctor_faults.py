@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from faulty_machine import PORT, FaultyMachine
 
 from service.control_client import ControlError
 from service.doctor.checked import Checked, Grade
@@ -22,6 +21,7 @@ from service.links.connection import AutoFc, SerialFc, parse_gcs
 from service.settings import Settings
 from service.zenoh_link.settings import ZenohSettings
 from storage.mission_store import open_store
+from tests.support.faulty_machine import PORT, FaultyMachine
 
 GCS = [parse_gcs("udpin:0.0.0.0:14550")]
 STATUS = {"flight_controller": "Harakiri", "state": "MSP", "speed_baud": 115200, "armed": False}

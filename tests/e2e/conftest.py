@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from benches import Bench, Starter
-from plan import plain_plan
-from programs import until
+
+from tests.support.benches import Bench, Starter
+from tests.support.plan import plain_plan
+from tests.support.programs import until
 
 
 @pytest.fixture

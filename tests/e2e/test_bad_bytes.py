@@ -10,16 +10,15 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
-from benches import Bench, Starter
-from mission_planner import MissionPlanner
-from plain_station import PlainStation, udp_station
-from plan import judge, plain_plan, records_of
-from programs import comes, free_port, until
-
 from protocols.mavlink.dialect import messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request
 from protocols.msp.hazards import is_clean
+from tests.support.benches import Bench, Starter
+from tests.support.mission_planner import MissionPlanner
+from tests.support.plain_station import PlainStation, udp_station
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import comes, free_port, until
 
 MEGABYTE = 1 << 20
 #: All that may be sent to somebody unknown: questions, and only whole ones.

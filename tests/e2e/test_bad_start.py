@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from plain_station import udp_station
-from plan import judge, plain_plan, records_of
-from programs import PATIENCE, free_port, run_naze_bridge, until
+
+from tests.support.benches import Starter
+from tests.support.plain_station import udp_station
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until
 
 UNKNOWN = {
     "no such device name": (["--fc", "naze"], "/dev/serial0"),

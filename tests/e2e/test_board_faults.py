@@ -7,13 +7,13 @@ The pilot is told in time, the list that was there is whole, and a second try wo
 from collections.abc import Callable
 
 import pytest
-from benches import Bench, Starter
-from mission_planner import MissionPlanner, UploadFailed
-from plain_station import udp_station
-from plan import judge, plain_plan, records_of
-from programs import until
 
 from protocols.mission_item import MissionResult
+from tests.support.benches import Bench, Starter
+from tests.support.mission_planner import MissionPlanner, UploadFailed
+from tests.support.plain_station import udp_station
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import until
 
 OLD, NEW = plain_plan(40), plain_plan(146, start=40)
 

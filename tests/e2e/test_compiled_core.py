@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benches import Bench, Starter
-from c_core import library
 from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawError, MissionRawResult
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
-from plan import expected_fields, judge, mixed_plan, plain_plan, records_of
-from programs import run_naze_bridge, until
-from test_mavsdk import fields, raw_items, refusal_of, vehicle_at
+
+from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
+from tests.support.benches import Bench, Starter
+from tests.support.c_core import library
+from tests.support.plan import expected_fields, judge, mixed_plan, plain_plan, records_of
+from tests.support.programs import run_naze_bridge, until
 
 OLD, NEW = mixed_plan(60), plain_plan(146, start=40)
 OLD_RECORDS, NEW_RECORDS = records_of(judge(OLD)), records_of(judge(NEW))

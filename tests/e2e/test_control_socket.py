@@ -7,11 +7,11 @@ import socket
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from plan import plain_plan
-from programs import Daemon, run_naze_bridge, until
 
 from service.control_client import ControlError
+from tests.support.benches import Starter
+from tests.support.plan import plain_plan
+from tests.support.programs import Daemon, run_naze_bridge, until
 
 ITEM = {"seq": 0, "command": 16, "frame": 3, "p1": 0, "p2": 0, "p3": 0, "p4": 0, "lat_e7": 1, "lon_e7": 1, "alt_m": 1}
 

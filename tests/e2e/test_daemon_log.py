@@ -10,8 +10,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from programs import NAZE_BRIDGE, REPOSITORY, free_port, until
 from structlog.testing import capture_logs
 
 from service import daemon as daemon_module
@@ -19,6 +17,8 @@ from service.control_client import ControlError, ask_daemon
 from service.daemon import Daemon
 from service.links.connection import SerialFc, SimulatedFc
 from service.settings import Settings
+from tests.support.benches import Starter
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, free_port, until
 
 LOSSES = {"fc.lost", "fc.port_lost"}
 

@@ -5,8 +5,9 @@ import json
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from programs import free_port, run_naze_bridge, until
+
+from tests.support.benches import Starter
+from tests.support.programs import free_port, run_naze_bridge, until
 
 
 def test_it_listens_to_the_flight_controller(start: Starter) -> None:

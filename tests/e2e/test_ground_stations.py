@@ -4,14 +4,14 @@
 import socket
 from concurrent.futures import ThreadPoolExecutor
 
-from benches import Bench, Starter
-from mission_planner import MissionPlanner
-from plain_station import tcp_station, udp_station
-from plan import expected_fields, judge, mixed_plan, plain_plan, records_of
-from programs import free_port, until
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
 from protocols.mission_item import MissionResult
+from tests.support.benches import Bench, Starter
+from tests.support.mission_planner import MissionPlanner
+from tests.support.plain_station import tcp_station, udp_station
+from tests.support.plan import expected_fields, judge, mixed_plan, plain_plan, records_of
+from tests.support.programs import free_port, until
 
 # -- kinds of links ------------------------------------------------------------------------------------------
 

@@ -6,12 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from benches import Bench, Starter
-from mavproxy import MavProxy
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
-from plan import HOME, PlanRow, stored_fields, waypoint
-from programs import until
-from test_mavsdk import fields, raw_items, refusal_of, vehicle_at
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile
@@ -19,6 +14,11 @@ from bridge.missions.list_check import check_list
 from bridge.model.verdict import Verdict
 from protocols.mission_item import Command, Frame
 from protocols.msp.nav import NavRecord
+from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
+from tests.support.benches import Bench, Starter
+from tests.support.mavproxy import MavProxy
+from tests.support.plan import HOME, PlanRow, stored_fields, waypoint
+from tests.support.programs import until
 
 RULES = NavRules(inav_profile())
 

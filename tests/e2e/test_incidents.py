@@ -4,10 +4,10 @@
 from collections import defaultdict
 from typing import Any
 
-from benches import Starter
-from plain_station import udp_station
-from plan import plain_plan
-from programs import Daemon, until
+from tests.support.benches import Starter
+from tests.support.plain_station import udp_station
+from tests.support.plan import plain_plan
+from tests.support.programs import Daemon, until
 
 
 def _by_incident(daemon: Daemon) -> dict[str, list[str]]:

@@ -6,13 +6,12 @@ import socket
 from functools import partial
 from pathlib import Path
 
-from benches import Bench, Starter
-from mission_planner import MissionPlanner
-from plain_station import PlainStation, tcp_station, udp_station
-from plan import PlanRow, judge, plain_plan, records_of
-from programs import PATIENCE, Daemon, free_port, until
-
 from protocols.mission_item import MissionResult
+from tests.support.benches import Bench, Starter
+from tests.support.mission_planner import MissionPlanner
+from tests.support.plain_station import PlainStation, tcp_station, udp_station
+from tests.support.plan import PlanRow, judge, plain_plan, records_of
+from tests.support.programs import PATIENCE, Daemon, free_port, until
 
 PLAN = plain_plan(40)
 

@@ -10,13 +10,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from plain_station import PlainStation
-from programs import PATIENCE, free_port
 
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from tests.support.benches import Starter
+from tests.support.plain_station import PlainStation
+from tests.support.programs import PATIENCE, free_port
 
 m = messages
 DEAF = 251

@@ -4,12 +4,12 @@
 from pathlib import Path
 
 import pytest
-from benches import Bench
-from mavproxy import MavProxy
-from plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
-from programs import comes
 
 from protocols.mission_item import Command
+from tests.support.benches import Bench
+from tests.support.mavproxy import MavProxy
+from tests.support.plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
+from tests.support.programs import comes
 
 
 @pytest.mark.parametrize("version", ["--mav10", "--mav20"])

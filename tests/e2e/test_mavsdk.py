@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 import pytest
-from benches import Bench
 from mavsdk import ComponentType
 from mavsdk.asyncio import Configuration, Mavsdk
 from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
@@ -21,10 +20,11 @@ from mavsdk.asyncio.plugins.mission_raw import (
 )
 from mavsdk.asyncio.plugins.param.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
-from plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
-from programs import until
 
 from protocols.mission_item import Command
+from tests.support.benches import Bench
+from tests.support.plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
+from tests.support.programs import until
 
 _PATIENCE_S = 20.0
 T = TypeVar("T")

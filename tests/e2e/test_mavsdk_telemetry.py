@@ -7,9 +7,10 @@ import re
 from pathlib import Path
 from typing import Any
 
-from benches import Bench
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
-from test_mavsdk import vehicle_at
+
+from tests.e2e.test_mavsdk import vehicle_at
+from tests.support.benches import Bench
 
 PAGE = (Path(__file__).parents[2] / "docs" / "ground-stations.md").read_text()
 _PREFIX = "subscribe_"

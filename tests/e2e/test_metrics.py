@@ -4,9 +4,6 @@
 import asyncio
 from pathlib import Path
 
-from plain_station import udp_station
-from plan import plain_plan
-from programs import free_port, until
 from prometheus_client.parser import text_string_to_metric_families
 
 from protocols.mission_item import MissionResult
@@ -14,6 +11,9 @@ from service.daemon import Daemon
 from service.links.connection import parse_fc, parse_gcs
 from service.metrics import Metrics
 from service.settings import Settings
+from tests.support.plain_station import udp_station
+from tests.support.plan import plain_plan
+from tests.support.programs import free_port, until
 
 Samples = dict[tuple[str, tuple[str, ...]], float]
 

@@ -4,16 +4,26 @@
 from collections.abc import Sequence
 
 import pytest
-from benches import Bench
-from lossy_udp import Way
-from mission_planner import MissionPlanner, UploadFailed
-from plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, single, waypoint
-from programs import until
 
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.verdict import Result
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, MissionResult
+from tests.support.benches import Bench
+from tests.support.lossy_udp import Way
+from tests.support.mission_planner import MissionPlanner, UploadFailed
+from tests.support.plan import (
+    HOME,
+    PlanRow,
+    expected_fields,
+    judge,
+    mixed_plan,
+    plain_plan,
+    records_of,
+    single,
+    waypoint,
+)
+from tests.support.programs import until
 
 #: What a long-range radio does to a link.
 BAD_RADIO = {"loss": 0.1, "repeats": 0.05, "delay_s": 0.2}

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benches import Starter
-from programs import Daemon, run_naze_bridge, until
 from pymavlink import mavutil
 
 from protocols.mavlink.dialect import messages
 from protocols.tlog import TlogRecord, read_tlog
 from protocols.uart_capture import UartDeed, read_capture
+from tests.support.benches import Starter
+from tests.support.programs import Daemon, run_naze_bridge, until
 
 STATION = 250
 HEARTBEAT = 0

@@ -6,11 +6,11 @@ import signal
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from plain_station import tcp_station, udp_station
-from programs import Program, free_port, until
 
 from service.control_client import ask_daemon
+from tests.support.benches import Starter
+from tests.support.plain_station import tcp_station, udp_station
+from tests.support.programs import Program, free_port, until
 
 
 class ConfiguredDaemon:

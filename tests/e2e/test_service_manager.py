@@ -12,11 +12,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from plain_station import udp_station
-from plan import judge, plain_plan, records_of
-from programs import PATIENCE, free_port, run_naze_bridge, until
-from programs import Daemon as DaemonProgram
 
 from protocols.mission_item import MissionResult
 from service.daemon import Daemon
@@ -24,6 +19,11 @@ from service.lifecycle import run_until_signal
 from service.links.connection import parse_fc, parse_gcs
 from service.notify import Notifier
 from service.settings import Settings
+from tests.support.benches import Starter
+from tests.support.plain_station import udp_station
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until
+from tests.support.programs import Daemon as DaemonProgram
 
 _LONG = plain_plan(146)
 

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benches import Bench
-from mavproxy import MavProxy
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
-from programs import PATIENCE, comes
-from test_mavsdk import vehicle_at
+
+from tests.e2e.test_mavsdk import vehicle_at
+from tests.support.benches import Bench
+from tests.support.mavproxy import MavProxy
+from tests.support.programs import PATIENCE, comes
 
 POSITION_M = 1.5
 HEIGHT_M = 1.0

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benches import Starter
-from plain_station import PlainStation
-from plan import plain_plan
-from programs import Daemon, free_port, run_naze_bridge, until
 
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.signing import key_from_passphrase, ticks
 from protocols.mission_item import MissionResult
+from tests.support.benches import Starter
+from tests.support.plain_station import PlainStation
+from tests.support.plan import plain_plan
+from tests.support.programs import Daemon, free_port, run_naze_bridge, until
 
 PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
 KEY = key_from_passphrase(PASSPHRASE)

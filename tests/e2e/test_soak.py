@@ -11,9 +11,10 @@ from socket import SOCK_STREAM
 from typing import Any
 
 import pytest
-from benches import Starter
-from programs import free_port, until
-from soak import Crowd, Meter, Stalls, Weather, Witness
+
+from tests.support.benches import Starter
+from tests.support.programs import free_port, until
+from tests.support.soak import Crowd, Meter, Stalls, Weather, Witness
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "0.5"))
 SEED = int(os.environ.get("SOAK_SEED", "1"))

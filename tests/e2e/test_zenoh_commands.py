@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 import zenoh
-from benches import Bench, Starter
-from plan import judge, plain_plan, records_of
-from programs import until
-from zenoh_bench import I_KNOW, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
 
 from protocols.mission_file import write_qgc_wpl
 from service.zenoh_link.keys import COMMANDS
+from tests.support.benches import Bench, Starter
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import until
+from tests.support.zenoh_bench import I_KNOW, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
 
 UPLOAD, CHECK, CLEAR, RESTORE, STATUS = (
     f"{COMMANDS}/{each}" for each in ("mission/upload", "mission/check", "mission/clear", "mission/restore", "status")

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import zenoh
-from benches import Starter
-from plan import plain_plan
-from programs import until
 from zenoh import ext
-from zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
-from zenoh_router import running_router
+
+from tests.support.benches import Starter
+from tests.support.plan import plain_plan
+from tests.support.programs import until
+from tests.support.zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
+from tests.support.zenoh_router import running_router
 
 
 def recovering(opened: zenoh.Session, suffix: str, heard: list[Any]) -> ext.AdvancedSubscriber[None]:

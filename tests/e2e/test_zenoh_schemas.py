@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 import zenoh
-from benches import Starter
 from jsonschema import Draft202012Validator
-from plan import plain_plan
-from programs import until
-from zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
 
 from service.zenoh_link.compact import SCHEMAS as FOLDER
 from service.zenoh_link.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION
 from service.zenoh_link.schema_files import schemas, text
+from tests.support.benches import Starter
+from tests.support.plan import plain_plan
+from tests.support.programs import until
+from tests.support.zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
 
 MISSION = (Path(__file__).parents[2] / "examples" / "naze-field.waypoints").read_bytes()
 SCHEMAS = {key.suffix: key.schema for key in KEYS}

@@ -10,15 +10,26 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from benches import Bench, Starter
-from plan import judge, plain_plan, records_of
-from programs import until
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from zenoh_bench import I_KNOW, VEHICLE, Reader, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
-from zenoh_router import Router, running_router
 
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.frame import MavlinkSplitter
+from tests.support.benches import Bench, Starter
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import until
+from tests.support.zenoh_bench import (
+    I_KNOW,
+    VEHICLE,
+    Reader,
+    ask,
+    ask_surely,
+    endpoint,
+    key,
+    session,
+    write_config,
+    zenoh_bench,
+)
+from tests.support.zenoh_router import Router, running_router
 
 _SUBSCRIBER = """
 import sys, zenoh

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 import zenoh
-from fleet_bench import Fleet
-from plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
-from programs import run_naze_bridge, until
-from zenoh_router import EXAMPLES
 
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import Command
+from tests.support.fleet_bench import Fleet
+from tests.support.plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
+from tests.support.programs import run_naze_bridge, until
+from tests.support.zenoh_router import EXAMPLES
 
 NAMES = ("kite", "owl", "swift")
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 import zenoh
-from programs import free_port, run_naze_bridge, until
-from zenoh_router import running_router
+
+from tests.support.programs import free_port, run_naze_bridge, until
+from tests.support.zenoh_router import running_router
 
 
 class Enrolled:

@@ -16,13 +16,13 @@ from typing import Any
 
 import pytest
 import zenoh
-from fleet_bench import Fleet
-from plan import judge, plain_plan, records_of
-from programs import PATIENCE, until
 
 from protocols.mission_file import write_qgc_wpl
 from service.fleet.roll_call import roll_call
 from service.fleet.session import FleetError
+from tests.support.fleet_bench import Fleet
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import PATIENCE, until
 
 #: 146 records at this speed take some seconds: time enough for something to go wrong.
 _SLOW_BAUD = 9600

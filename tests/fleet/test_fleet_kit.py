@@ -6,15 +6,15 @@ import json
 import re
 from pathlib import Path
 
-from programs import until
 from prometheus_client.parser import text_string_to_metric_families
-from zenoh_router import EXAMPLES
 
 from service.daemon import Daemon
 from service.links.connection import parse_fc
 from service.metrics import Metrics
 from service.settings import Settings
 from service.zenoh_link.settings import ZenohSettings
+from tests.support.programs import until
+from tests.support.zenoh_router import EXAMPLES
 
 _NAME = re.compile(r"\b(?:naze_bridge|process)_[a-z_]+")
 #: Counted only once something has happened, or only with a session.

@@ -6,10 +6,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from fleet_bench import I_KNOW, Fleet
-from mission_planner import MissionPlanner
-from plan import judge, plain_plan, records_of
-from programs import Program, free_port, until
+
+from tests.support.fleet_bench import I_KNOW, Fleet
+from tests.support.mission_planner import MissionPlanner
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import Program, free_port, until
 
 
 class Relay(Program):

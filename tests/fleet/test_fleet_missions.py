@@ -7,12 +7,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from fleet_bench import Fleet
-from plan import HOME, PlanRow, plain_plan, waypoint
-from programs import run_naze_bridge, until
 
 from protocols.mission_file import write_qgc_wpl
 from protocols.mission_item import Command
+from tests.support.fleet_bench import Fleet
+from tests.support.plan import HOME, PlanRow, plain_plan, waypoint
+from tests.support.programs import run_naze_bridge, until
 
 NAMES = ("kite", "owl", "swift")
 

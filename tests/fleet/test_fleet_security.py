@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 import trustme
 import zenoh
-from programs import free_port, run_naze_bridge, until
-from secured_fleet import Fleet, password_fleet, tls_fleet
-from zenoh_router import EXAMPLES, running_router
+
+from tests.support.programs import free_port, run_naze_bridge, until
+from tests.support.secured_fleet import Fleet, password_fleet, tls_fleet
+from tests.support.zenoh_router import EXAMPLES, running_router
 
 
 @pytest.fixture(scope="module")

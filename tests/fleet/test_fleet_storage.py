@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 import zenoh
-from fleet_bench import Fleet
-from plan import plain_plan
-from programs import until
-from zenoh_storage import client, storage
 
 from protocols.mission_file import write_qgc_wpl
 from service.fleet.watch import watching
+from tests.support.fleet_bench import Fleet
+from tests.support.plan import plain_plan
+from tests.support.programs import until
+from tests.support.zenoh_storage import client, storage
 
 
 @pytest.fixture(scope="module")

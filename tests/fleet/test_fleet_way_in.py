@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from programs import free_port, run_naze_bridge
-from zenoh_router import EXAMPLES, Router, running_router
+
+from tests.support.programs import free_port, run_naze_bridge
+from tests.support.zenoh_router import EXAMPLES, Router, running_router
 
 
 @pytest.fixture(scope="module")

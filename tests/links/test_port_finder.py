@@ -11,7 +11,6 @@ from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 import pytest
-from faulty_machine import FaultyMachine
 
 from service.api import MissionJobs
 from service.daemon import Daemon
@@ -20,6 +19,7 @@ from service.links.serial_ports import USB_CHIPS, serial_ports
 from service.settings import Settings
 from simulator.naze import SimulatedNaze
 from simulator.pty_link import PtyLink
+from tests.support.faulty_machine import FaultyMachine
 
 PATIENCE_S = 40.0
 NMEA = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from programs import PATIENCE, REPOSITORY
+from tests.support.programs import PATIENCE, REPOSITORY
 
 BEGIN = """
 import sys, time

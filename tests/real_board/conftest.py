@@ -5,9 +5,9 @@ import os
 from pathlib import Path
 
 import pytest
-from real_bench import Figure, RealBench, calibrated_flash
 
 from simulator.emulated_naze.image import Image, load_image
+from tests.support.real_bench import Figure, RealBench, calibrated_flash
 
 _ROWS = pytest.StashKey[list[tuple[str, str]]]()
 

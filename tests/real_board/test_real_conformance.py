@@ -2,9 +2,10 @@
 """docs/msp-mission.md, held against the image: the conformance tests, on the emulated board's UART."""
 
 import pytest
-from c_core import PowerCut
-from real_bench import RealBench
-from test_mission_extension import (  # noqa: F401  (collected here)
+
+from protocols.msp.frame import Direction, request
+from simulator.emulated_naze.image import Image
+from tests.conformance.test_mission_extension import (  # noqa: F401  (collected here)
     OLD,
     OLDER,
     Companion,
@@ -30,9 +31,8 @@ from test_mission_extension import (  # noqa: F401  (collected here)
     test_requests_may_be_repeated,
     test_without_a_transfer_nothing_is_taken,
 )
-
-from protocols.msp.frame import Direction, request
-from simulator.emulated_naze.image import Image
+from tests.support.c_core import PowerCut
+from tests.support.real_bench import RealBench
 
 
 class RealDevice:

@@ -3,9 +3,6 @@
 
 import random
 
-from naze_bench import Bench, WireBench, mission
-from real_bench import Figure, RealBench
-
 from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, request
 from protocols.msp.mission import (
@@ -20,6 +17,8 @@ from protocols.msp.mission import (
 from protocols.wp_record import WpRecord
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand as Msp
+from tests.support.naze_bench import Bench, WireBench, mission
+from tests.support.real_bench import Figure, RealBench
 
 _EXCHANGES = 100
 #: Longer than any answer and any write of the configuration.

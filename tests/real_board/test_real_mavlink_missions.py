@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's own MAVLink upload, on the image with the patch."""
 
-import mavlink_missions as page
-from real_bench import Figure, RealBench
+from tests.support import mavlink_missions as page
+from tests.support.real_bench import Figure, RealBench
 
 
 def test_an_upload_becomes_the_stored_list(bench: RealBench, figure: Figure) -> None:

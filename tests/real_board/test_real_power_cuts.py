@@ -3,10 +3,9 @@
 
 import os
 
-from naze_bench import mission
-from real_bench import Figure, RealBench
-
 from simulator.emulated_naze.image import Image
+from tests.support.naze_bench import mission
+from tests.support.real_bench import Figure, RealBench
 
 #: An upload of 12 records: three erases, 96 half-words, the header.
 _CUTS = int(os.environ.get("NAZE_CUTS", "200"))

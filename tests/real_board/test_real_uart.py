@@ -2,14 +2,14 @@
 """What the image does with its serial port: booting, arming, the CLI, Harakiri's own MAVLink upload."""
 
 import pytest
-from naze_bench import mission
-from real_bench import IDENT, Figure, RealBench
 
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_record import identify
 from protocols.msp.mission import INFO_REQUEST, decode_info
 from simulator.emulated_naze.image import Image
 from simulator.options import TelemetryProtocol
+from tests.support.naze_bench import mission
+from tests.support.real_bench import IDENT, Figure, RealBench
 
 #: Begins every value of the FrSky hub protocol, and ends every frame.
 _FRSKY_FRAME = b"^"

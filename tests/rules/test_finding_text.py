@@ -5,7 +5,12 @@ import math
 from dataclasses import replace
 
 import pytest
-from rule_items import (
+
+from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.missions.list_check import check_list
+from bridge.missions.mission_texts import finding_lines, summary
+from bridge.model.finding import DROPPED, REJECTED, Finding, News
+from tests.support.rule_items import (
     HOME,
     LAND,
     ROI,
@@ -20,11 +25,6 @@ from rule_items import (
     item,
     mission,
 )
-
-from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.missions.list_check import check_list
-from bridge.missions.mission_texts import finding_lines, summary
-from bridge.model.finding import DROPPED, REJECTED, Finding, News
 
 
 @pytest.mark.parametrize(

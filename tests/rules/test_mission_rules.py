@@ -6,7 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from rule_items import (
+
+from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
+from bridge.missions.list_check import check_count, check_list
+from bridge.model.finding import CLEARED, DROPPED, REJECTED, News
+from bridge.model.verdict import Result, Verdict
+from protocols.mission_item import MissionItem, MissionResult
+from protocols.wp_record import WpCommand, WpRecord
+from tests.support.rule_items import (
     HERE,
     HOME,
     LAND,
@@ -26,13 +33,6 @@ from rule_items import (
     item,
     mission,
 )
-
-from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
-from bridge.missions.list_check import check_count, check_list
-from bridge.model.finding import CLEARED, DROPPED, REJECTED, News
-from bridge.model.verdict import Result, Verdict
-from protocols.mission_item import MissionItem, MissionResult
-from protocols.wp_record import WpCommand, WpRecord
 
 PROFILE = HarakiriRules()
 NAN, INF = math.nan, math.inf

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
-from test_rule_properties import degrees, numbers
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, items_from_records
@@ -20,6 +19,7 @@ from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_from_float_message
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord, UnsafeRecord, decode_wp, encode_set_wp
+from tests.rules.test_rule_properties import degrees, numbers
 
 INAV, MULTIWII = NavRules(inav_profile()), NavRules(multiwii_profile())
 LAT, LON = 453838000, 84733000

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
-from rule_oracle import expected
 
 from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
 from bridge.controllers.harakiri.records import items_from_records
@@ -15,6 +14,7 @@ from bridge.model.finding import DROPPED, REJECTED
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
 from protocols.wp_record import WpRecord, unpack_record
+from tests.support.rule_oracle import expected
 
 KNOWN = [16, 17, 18, 19, 20, 21, 22, 80, 195, 197, 201]
 ENDS = [(22, 17), (22, 20), (22, 21), (16, 21), (16, 16), (201, 16), (178, 178)]

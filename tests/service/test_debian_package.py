@@ -12,9 +12,9 @@ from io import BytesIO
 from pathlib import Path
 
 import pytest
-from bare_root import BareRoot
 
 from deb.build import build
+from tests.support.bare_root import BareRoot
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _MISSION = _REPOSITORY / "examples" / "naze-field.waypoints"

@@ -6,11 +6,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from programs import run_naze_bridge
 
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.sample import page, sample
 from service.settings.table import KEYS
+from tests.support.programs import run_naze_bridge
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -5,11 +5,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from faulty_machine import FaultyMachine
-from programs import run_naze_bridge
 
 from service.setup.change import Machine, Run, Step, WriteFile
 from service.setup.steps import SETTINGS_FILE, Answers, missing_steps
+from tests.support.faulty_machine import FaultyMachine
+from tests.support.programs import run_naze_bridge
 
 #: Model, what /dev/serial0 is, the console's word as Raspberry Pi OS writes it, and the line that config.txt needs.
 MODELS = {

@@ -5,9 +5,9 @@ import logging
 from itertools import pairwise
 
 import pytest
-from table_program import RAM, Rig, Steps
 
 from simulator.emulated_naze.board import EmulatedPower
+from tests.support.table_program import RAM, Rig, Steps
 
 RCC_CR, RCC_CFGR, RCC_CSR = 0x4002_1000, 0x4002_1004, 0x4002_1024
 SYST_CSR, SYST_RVR, SYST_CVR, ICSR = 0xE000_E010, 0xE000_E014, 0xE000_E018, 0xE000_ED04

@@ -2,9 +2,9 @@
 """The emulated flash: keys, the rules of NOR, a core that stands still, and power that goes in the middle."""
 
 import pytest
-from table_program import FLASH, RAM, Rig, Steps
 
 from simulator.emulated_naze.board import EmulatedPower
+from tests.support.table_program import FLASH, RAM, Rig, Steps
 
 KEYR, SR, CR, AR = 0x4002_2004, 0x4002_200C, 0x4002_2010, 0x4002_2014
 PG, PER, STRT, LOCK = 1, 2, 1 << 6, 1 << 7

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The emulated I2C bus and the three sensors on it, asked as a driver asks them."""
 
-from table_program import Rig, Steps
+from tests.support.table_program import Rig, Steps
 
 CR1, CR2, DR, SR1, SR2, CCR = (0x4000_5800 + offset for offset in (0x00, 0x04, 0x10, 0x14, 0x18, 0x1C))
 PE, START, STOP, ACK, POS = 1, 1 << 8, 1 << 9, 1 << 10, 1 << 11

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The emulated USART and its DMA: bytes at line rate, both ways."""
 
-from table_program import RAM, Rig, Steps
+from tests.support.table_program import RAM, Rig, Steps
 
 SR, DR, BRR, CR1, CR3 = (0x4001_3800 + offset for offset in (0x00, 0x04, 0x08, 0x0C, 0x14))
 RXNE, TC, TXE = 1 << 5, 1 << 6, 1 << 7

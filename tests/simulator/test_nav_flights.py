@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from msp_bench import MspBench, waypoint
-from nav_rows import ROWS, Row, table
 
 from bridge.model.verdict import Result
 from protocols.mission_item import Command
@@ -15,6 +13,8 @@ from protocols.msp.nav import NavRecord
 from simulator.inav_boxes import BOXES, NAV_WP
 from simulator.nav_waypoint import Action, unpack_waypoint
 from simulator.options import Faults
+from tests.support.msp_bench import MspBench, waypoint
+from tests.support.nav_rows import ROWS, Row, table
 
 PAGE = Path(__file__).parents[2] / "docs" / "inav.md"
 SWITCH = {"inav": 1 << BOXES["9.1.0"].index(NAV_WP), "multiwii": 1 << 10}

@@ -7,10 +7,10 @@ from itertools import groupby
 from math import hypot
 
 import pytest
-from msp_bench import MspBench, waypoint
 
 from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
 from simulator.options import Faults
+from tests.support.msp_bench import MspBench, waypoint
 
 NAV_WP = 1 << 13
 NAV, RTH, NONE = 3, 2, 0

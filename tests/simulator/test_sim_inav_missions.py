@@ -6,13 +6,13 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msp_bench import GETINFO, LOAD, SAVE, SET_WP, WP, MspBench, waypoint
 
 from protocols.msp.frame import request
 from simulator.msp_board import MspPower
 from simulator.msp_options import MspOptions
 from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
 from simulator.options import Faults
+from tests.support.msp_bench import GETINFO, LOAD, SAVE, SET_WP, WP, MspBench, waypoint
 
 VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")
 FAKE = NavWaypoint(Action.RTH, 0, 0, 0, 0, 0, 0, FLAG_LAST)

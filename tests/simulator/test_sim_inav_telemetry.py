@@ -4,11 +4,11 @@
 import struct
 
 import pytest
-from msp_bench import MspBench, waypoint
 
 from protocols.msp.frame import request
 from simulator.msp_options import MspOptions
 from simulator.options import Faults
+from tests.support.msp_bench import MspBench, waypoint
 
 VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")
 LENGTHS = {

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 import serial
-from naze_bench import mission
 
 from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
 from simulator.naze import SimulatedNaze
 from simulator.pipe_link import SimLink
+from tests.support.naze_bench import mission
 
 IDENT = request(100)
 PATIENCE = 10.0

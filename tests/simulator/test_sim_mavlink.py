@@ -4,7 +4,6 @@
 from collections import Counter
 
 import pytest
-from naze_bench import Bench
 from pymavlink.dialects.v10 import common as mavlink1
 from pymavlink.dialects.v20 import common as mavlink2
 
@@ -12,6 +11,7 @@ from protocols.msp.frame import request
 from protocols.msp.mission import encode_radius
 from simulator.firmware import Protocol
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.naze_bench import Bench
 
 IDENT = request(100)
 

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The patched firmware's own MAVLink upload, in the model; tests/real_board says the same of the image."""
 
-import mavlink_missions as page
-from naze_bench import Bench
-
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support import mavlink_missions as page
+from tests.support.naze_bench import Bench
 
 
 def test_an_upload_becomes_the_stored_list() -> None:

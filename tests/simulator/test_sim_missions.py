@@ -7,7 +7,6 @@ from itertools import count
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from naze_bench import BOOT_SECONDS, Bench, mission
 
 from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
@@ -33,6 +32,7 @@ from protocols.msp.mission import (
 from protocols.wp_record import WpRecord
 from simulator.naze import Power
 from simulator.options import Faults, SimOptions
+from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 NOTHING = ListIdentity(0, 0)
 LINE_RATE = 115200 / 10

@@ -6,12 +6,12 @@ import struct
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from naze_bench import BOOT_SECONDS, Bench
 
 from protocols.msp.frame import Direction, request
 from protocols.msp.mission import INFO_REQUEST
 from simulator.naze import Power
 from simulator.options import Faults, SimOptions
+from tests.support.naze_bench import BOOT_SECONDS, Bench
 
 IDENT = request(100)
 LENGTHS = {

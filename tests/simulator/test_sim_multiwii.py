@@ -4,11 +4,11 @@
 import struct
 
 import pytest
-from msp_bench import SET_WP, MspBench, waypoint
 
 from simulator.msp_options import MspOptions
 from simulator.nav_waypoint import FLAG_LAST, Action
 from simulator.options import Faults
+from tests.support.msp_bench import SET_WP, MspBench, waypoint
 
 LENGTHS = {
     100: 7,

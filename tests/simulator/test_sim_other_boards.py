@@ -13,10 +13,10 @@ from typing import TypeVar
 
 import pytest
 import serial
-from msp_bench import Frame, take_apart, waypoint
 
 from protocols.msp.frame import request
 from simulator.nav_waypoint import FLAG_LAST, Action
+from tests.support.msp_bench import Frame, take_apart, waypoint
 
 PATIENCE = 20.0
 REPOSITORY = Path(__file__).resolve().parents[2]

@@ -4,9 +4,9 @@
 import struct
 
 import pytest
-from msp_bench import MspBench, waypoint
 
 from simulator.options import Faults
+from tests.support.msp_bench import MspBench, waypoint
 
 LENGTHS = {
     "betaflight": {1: 3, 2: 4, 3: 3, 101: 24, 102: 18, 105: 32, 108: 6, 109: 6, 110: 9, 116: 200, 119: 18},

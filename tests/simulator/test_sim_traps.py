@@ -2,7 +2,6 @@
 """The byte runs on which Harakiri acts outside of any protocol (serialCom), with its counters' exact habits."""
 
 import pytest
-from naze_bench import BOOT_SECONDS, Bench, mission
 
 from protocols.mission_record import identify
 from protocols.msp.frame import request
@@ -10,6 +9,7 @@ from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encod
 from simulator.firmware import Protocol
 from simulator.naze import Power
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 IDENT = request(100)
 # A frame that ends in one 0D: size 1 ^ command 108 ^ payload 60.

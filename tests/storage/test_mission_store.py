@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sample_missions import mission
 
 from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
+from tests.support.sample_missions import mission
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),

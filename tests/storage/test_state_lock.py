@@ -7,16 +7,16 @@ import sys
 from pathlib import Path
 
 import pytest
-from sample_missions import mission
 
 from storage.mission_store import open_store
 from storage.state_lock import StateLock
 from storage.store_error import StoreError
+from tests.support.sample_missions import mission
 
 DAEMON = """
 import sys
 from pathlib import Path
-from sample_missions import mission
+from tests.support.sample_missions import mission
 from storage.mission_store import StoreError, open_store
 from storage.state_lock import StateLock
 

@@ -4,9 +4,8 @@
 import random
 from pathlib import Path
 
-from sample_missions import mission
-
 from storage.mission_store import VERIFIED, open_store
+from tests.support.sample_missions import mission
 
 
 def test_a_full_store_loses_rejected_lists_first(tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sample_missions import mission
 
 from storage.mission_store import MissionStore, StoreError, open_store
+from tests.support.sample_missions import mission
 
 NOW = 1_767_323_045.9  # 2026-01-02 03:04:05 UTC
 ASIDE = "missions.db.corrupt-20260102-030405"

@@ -9,15 +9,15 @@ import time
 from pathlib import Path
 
 import pytest
-from sample_missions import mission
 
 from storage.mission_store import open_store
+from tests.support.sample_missions import mission
 
 # Adds and concludes as fast as it can, and says so only when the store has returned.
 WRITER = """
 import sys
 from pathlib import Path
-from sample_missions import mission
+from tests.support.sample_missions import mission
 from storage.mission_store import open_store
 
 store = open_store(Path(sys.argv[1]), now=0.0).store

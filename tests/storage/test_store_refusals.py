@@ -8,9 +8,9 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from sample_missions import mission
 
 from storage.mission_store import StoreError, open_store
+from tests.support.sample_missions import mission
 
 
 def run(script: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -28,7 +28,7 @@ def run(script: str, *arguments: str, cwd: Path | None = None) -> subprocess.Com
 FULL_DISK = """
 import resource, signal, sys
 from pathlib import Path
-from sample_missions import mission
+from tests.support.sample_missions import mission
 from storage.mission_store import StoreError, open_store
 
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

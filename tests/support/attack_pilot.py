@@ -8,14 +8,13 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from plain_station import PlainStation
-from plan import PlanRow, judge, records_of
-from programs import Board
-from soak import Stalls, Witness
-
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.signing import key_from_passphrase, ticks
 from protocols.mission_item import MissionResult
+from tests.support.plain_station import PlainStation
+from tests.support.plan import PlanRow, judge, records_of
+from tests.support.programs import Board
+from tests.support.soak import Stalls, Witness
 
 m = messages
 #: The heartbeat of a ground station.

@@ -5,12 +5,13 @@ import importlib.util
 from pathlib import Path
 
 import pytest
-from chromium import LAPTOP, PHONE, Browser, browser
-from plan import plain_plan
-from programs import until
-from web_bench import EXAMPLE, WebBench
 
-pytest_plugins = ("web_fixtures",)
+from tests.support.chromium import LAPTOP, PHONE, Browser, browser
+from tests.support.plan import plain_plan
+from tests.support.programs import until
+from tests.support.web_bench import EXAMPLE, WebBench
+
+pytest_plugins = ("tests.support.web_fixtures",)
 
 
 def axe_core() -> str:

@@ -3,15 +3,14 @@
 
 import socket
 
-from chromium import PHONE, browser
-from plain_station import PlainStation
-from plan import plain_plan
-from programs import until
-from web_bench import WebBench
-
 from protocols.mavlink.dialect import messages
+from tests.support.chromium import PHONE, browser
+from tests.support.plain_station import PlainStation
+from tests.support.plan import plain_plan
+from tests.support.programs import until
+from tests.support.web_bench import WebBench
 
-pytest_plugins = ("web_fixtures",)
+pytest_plugins = ("tests.support.web_fixtures",)
 
 
 def test_the_state_stays_in_sight(web: WebBench) -> None:

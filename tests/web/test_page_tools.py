@@ -3,16 +3,16 @@
 
 from pathlib import Path
 
-from chromium import PHONE, Browser, browser
-from plan import plain_plan
-from programs import until
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
-from web_bench import WebBench
 
 from service.web.telemetry_logs import PIECE
+from tests.support.chromium import PHONE, Browser, browser
+from tests.support.plan import plain_plan
+from tests.support.programs import until
+from tests.support.web_bench import WebBench
 
-pytest_plugins = ("web_fixtures",)
+pytest_plugins = ("tests.support.web_fixtures",)
 
 
 def place(page: Browser) -> list[float]:

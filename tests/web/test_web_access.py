@@ -5,11 +5,12 @@ import socket
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from programs import PATIENCE, until
-from web_bench import WebBench, web_daemon
 
-pytest_plugins = ("web_fixtures",)
+from tests.support.benches import Starter
+from tests.support.programs import PATIENCE, until
+from tests.support.web_bench import WebBench, web_daemon
+
+pytest_plugins = ("tests.support.web_fixtures",)
 
 RESTORE = "/api/missions/1/restore"
 

@@ -4,14 +4,14 @@
 from http.client import HTTPConnection
 
 import pytest
-from plan import plain_plan
-from programs import PATIENCE
-from web_bench import EXAMPLE, Answer, WebBench
 
 from service.web.access import MAX_FILE
 from service.web.telemetry_logs import PIECE, TelemetryLogs
+from tests.support.plan import plain_plan
+from tests.support.programs import PATIENCE
+from tests.support.web_bench import EXAMPLE, Answer, WebBench
 
-pytest_plugins = ("web_fixtures",)
+pytest_plugins = ("tests.support.web_fixtures",)
 
 BINARY = "application/octet-stream"
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The status page and missions: looked at, compared, restored by the rules of every other way."""
 
-from benches import Starter
-from plan import plain_plan
-from programs import until
-from web_bench import WebBench, web_daemon
+from tests.support.benches import Starter
+from tests.support.plan import plain_plan
+from tests.support.programs import until
+from tests.support.web_bench import WebBench, web_daemon
 
-pytest_plugins = ("web_fixtures",)
+pytest_plugins = ("tests.support.web_fixtures",)
 
 
 def test_the_list_on_the_flight_controller(lasting_web: WebBench) -> None:

@@ -5,13 +5,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium import LAPTOP, PHONE, Browser, browser
-from plan import plain_plan
-from programs import run_naze_bridge, until
-from take_pictures import PICTURES, take_pictures
-from web_bench import WebBench, web_bench
 
-pytest_plugins = ("web_fixtures",)
+from tests.support.chromium import LAPTOP, PHONE, Browser, browser
+from tests.support.plan import plain_plan
+from tests.support.programs import run_naze_bridge, until
+from tests.support.take_pictures import PICTURES, take_pictures
+from tests.support.web_bench import WebBench, web_bench
+
+pytest_plugins = ("tests.support.web_fixtures",)
 
 FIRST_PAINT_BYTES = 200_000
 PICTURE_BYTES = 250_000

@@ -8,10 +8,9 @@ import random
 import struct
 from collections.abc import Callable
 
-from fake_controllers import MspFake, ident
-
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
+from tests.support.fake_controllers import MspFake, ident
 
 KNOWN = frozenset(NavAction) - {NavAction.POSHOLD_UNLIM}
 FAKE = bytes((NavAction.RTH, *bytes(18), LAST))

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import zenoh
-from programs import free_port, run_naze_bridge
-from zenoh_router import EXAMPLES, running_router
+
+from tests.support.programs import free_port, run_naze_bridge
+from tests.support.zenoh_router import EXAMPLES, running_router
 
 _ELSEWHERE = "/etc/naze-bridge"
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from programs import PATIENCE, Program, free_port, until
+from tests.support.programs import PATIENCE, Program, free_port, until
 
 ZENOHD = os.environ.get("ZENOHD")
 _UP = "is up" if ZENOHD is None else "can be reached at"

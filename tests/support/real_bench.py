@@ -3,12 +3,11 @@
 
 from collections.abc import Callable
 
-from naze_bench import WireBench
-
 from protocols.msp.frame import request
 from simulator.emulated_naze.board import EmulatedNaze, EmulatedPower
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand
+from tests.support.naze_bench import WireBench
 
 #: Puts a name and a value into the table at the end.
 Figure = Callable[[str, object], None]

@@ -11,8 +11,8 @@ from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
-from benches import Starter
-from programs import PATIENCE, Board, Daemon, free_port, run_naze_bridge, until
+from tests.support.benches import Starter
+from tests.support.programs import PATIENCE, Board, Daemon, free_port, run_naze_bridge, until
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "naze-field.waypoints"
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from plan import PlanRow
-from programs import PATIENCE, comes
+from tests.support.plan import PlanRow
+from tests.support.programs import PATIENCE, comes
 
 _LISTED = re.compile(
     r"^(?P<command>\d+) (?P<frame>\d+) (?P<lat>\S+) (?P<lon>\S+) (?P<alt>\S+) "

@@ -12,14 +12,13 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from plain_station import tcp_station, udp_station
-from plan import judge, plain_plan, records_of
-from programs import Board, Daemon
-
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
+from tests.support.plain_station import tcp_station, udp_station
+from tests.support.plan import judge, plain_plan, records_of
+from tests.support.programs import Board, Daemon
 
 m = messages
 VEHICLE = 1

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import zenoh
-from benches import Bench, Starter
-from programs import PATIENCE, free_port, until
 
 from service.zenoh_link.keys import VERSION
 from service.zenoh_link.payload import decoded
+from tests.support.benches import Bench, Starter
+from tests.support.programs import PATIENCE, free_port, until
 
 VEHICLE = "naze-1"
 I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'

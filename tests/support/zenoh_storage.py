@@ -9,8 +9,9 @@ from pathlib import Path
 from threading import Lock
 
 import zenoh
-from programs import until
-from zenoh_router import ZENOHD
+
+from tests.support.programs import until
+from tests.support.zenoh_router import ZENOHD
 
 _PLUGIN = "libzenoh_plugin_storage_manager.so"
 

@@ -12,9 +12,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
-from plan import PlanRow
-
 from service.control_client import ControlError, ask_daemon
+from tests.support.plan import PlanRow
 
 #: Seconds after which something that must come at all counts as not coming.
 PATIENCE = 20.0

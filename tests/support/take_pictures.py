@@ -5,9 +5,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from chromium import PHONE, browser
-from plan import plain_plan
-from web_bench import EXAMPLE, web_bench
+from tests.support.chromium import PHONE, browser
+from tests.support.plan import plain_plan
+from tests.support.web_bench import EXAMPLE, web_bench
 
 #: High enough for the whole map.
 _LAPTOP = (1100, 1060)

@@ -5,14 +5,13 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from world import GroundStation
-
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.mission_messages import item_from_float_message, item_from_int_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult, degrees_to_e7
 from protocols.wp_record import WpRecord
+from tests.support.world import GroundStation
 
 MISSION = 0
 _LAT_E7, _LON_E7 = 453838000, 84733000

@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from plan import PlanRow
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
+from tests.support.plan import PlanRow
 
 SYSID, COMPID = 255, 190
 _PATIENCE_S = 20.0

@@ -6,8 +6,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from benches import Starter
-from web_bench import WebBench, web_bench
+
+from tests.support.benches import Starter
+from tests.support.web_bench import WebBench, web_bench
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lossy_udp import LossyUdp
-from mission_planner import MissionPlanner
-from programs import Board, Daemon, Program
+from tests.support.lossy_udp import LossyUdp
+from tests.support.mission_planner import MissionPlanner
+from tests.support.programs import Board, Daemon, Program
 
 P = TypeVar("P", bound=Program)
 

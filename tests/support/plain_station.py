@@ -8,11 +8,10 @@ from collections.abc import Iterator, Sequence
 from types import ModuleType, TracebackType
 from typing import Any, Self
 
-from plan import PlanRow
-from programs import PATIENCE
-
 from protocols.mavlink.dialect import messages as v20
 from protocols.mission_item import MissionResult
+from tests.support.plan import PlanRow
+from tests.support.programs import PATIENCE
 
 SYSID, COMPID = 250, 191
 _RETRY_S = 0.5

@@ -3,14 +3,13 @@
 
 from typing import Protocol
 
-from c_core import PowerCut, library
-
 from simulator.compiled_core import load_core
 from simulator.flash import ERASED, NorFlash, PowerCutError
 from simulator.mission_commands import MissionCommands
 from simulator.mission_slots import StoredConfig, flash_size
 from simulator.missions import Board, BootMissions
 from simulator.options import Faults, SimOptions
+from tests.support.c_core import PowerCut, library
 
 
 class Device(Protocol):

@@ -8,8 +8,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from programs import Board, Daemon, run_naze_bridge, until
-from zenoh_router import Router, running_router
+from tests.support.programs import Board, Daemon, run_naze_bridge, until
+from tests.support.zenoh_router import Router, running_router
 
 I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
 Vehicle = dict[str, Any]

@@ -3,10 +3,9 @@
 
 from collections.abc import Callable
 
-from mavlink_ground import MavlinkGround
-from naze_bench import WireBench, mission
-
 from protocols.msp.mission import INFO_REQUEST, decode_info
+from tests.support.mavlink_ground import MavlinkGround
+from tests.support.naze_bench import WireBench, mission
 
 ACCEPTED, ERROR = 0, 1
 _WRITTEN_S = 3.0

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station at a board's UART: Harakiri's own MAVLink upload."""
 
-from naze_bench import WireBench
-
 from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
+from tests.support.naze_bench import WireBench
 
 _BOARD = (1, 200)
 
