@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The status page and missions: looked at, compared, restored by the rules of every other way."""
 
+from service.zenoh_link.settings import host_name
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until
@@ -30,7 +31,8 @@ def test_metrics(lasting_web: WebBench) -> None:
     answer = lasting_web.ask("/metrics")
     assert answer.status == 200
     assert answer.headers["Content-Type"].startswith("text/plain; version=0.0.4")
-    assert b'naze_bridge_missions_total{ack="ACCEPTED"} 1.0' in answer.body
+    sample = f'naze_bridge_missions_total{{ack="ACCEPTED",vehicle="{host_name()}"}} 1.0'
+    assert sample in answer.body.decode()
 
 
 def test_every_change_is_explained(lasting_web: WebBench) -> None:
