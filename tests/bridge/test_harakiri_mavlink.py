@@ -85,7 +85,9 @@ def test_clearing() -> None:
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
     assert Upload(station, []).run() is A.ACCEPTED
     assert world.stored == ()
-    assert Download(station).run() == []
+    (home,) = Download(station).run()
+    assert (home.seq, home.command) == (0, 16)
+    assert (home.lat_e7, home.lon_e7) == world.bridge._vehicle.home()
 
 
 def test_armed_is_denied() -> None:
