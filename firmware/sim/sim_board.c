@@ -135,7 +135,6 @@ static void set_radius(void *self, uint16_t radius_cm)
 {
     sim_t *s = self;
     s->radius_cm = radius_cm;
-    s->changed_ms = s->now_ms;
 }
 
 static void list_changed(void *self, const uint8_t *records, uint16_t count)
@@ -222,7 +221,7 @@ void sim_advance(sim_t *s, uint32_t milliseconds)
         s->now_ms += step;
         milliseconds -= step;
         nm_poll(&s->core);
-        if (!s->armed && s->now_ms - s->changed_ms >= SIM_SAVE_DELAY_MS)
+        if (!s->armed)
             s->saved_radius_cm = s->radius_cm;
     }
 }

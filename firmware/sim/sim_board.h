@@ -21,7 +21,6 @@
 
 #define SIM_CONFIG_OFFSET NM_FLASH_SIZE
 #define SIM_FLASH_SIZE (NM_FLASH_SIZE + NM_PAGE_SIZE)
-#define SIM_SAVE_DELAY_MS 1000u
 #define SIM_FRAME_SIZE (6u + NM_BUFFER_SIZE)
 
 /* How far the operation got at which the power was cut. */
@@ -36,8 +35,7 @@ typedef struct {
 
     uint32_t now_ms;
     uint16_t radius_cm;       /* gps_wp_radius in RAM */
-    uint16_t saved_radius_cm; /* ... and in the configuration, where it gets SIM_SAVE_DELAY_MS after a change */
-    uint32_t changed_ms;
+    uint16_t saved_radius_cm; /* ... and in the configuration, written in the next main loop while disarmed */
     bool armed;
     bool write_pending; /* some other write of the configuration is scheduled */
 
