@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
+from bridge.model.battery import remaining_percent
 from tests.e2e.test_mavsdk import vehicle_at
 from tests.support.benches import Bench
 from tests.support.mavproxy import MavProxy
@@ -29,6 +30,9 @@ DIRECTION_DEG = 6.0
 TILT_DEG = 1.0
 SPEED_MS = 0.1
 VOLTAGE_V = 0.1
+#: An estimate from the voltage of the craft's three cells; as far apart as VOLTAGE_V is on the curve at its steepest.
+CELLS = 3
+REMAINING_PERCENT = 9
 #: By the box that is active.
 MAVSDK_MODES = {
     1 << 0: "STABILIZED",
@@ -101,8 +105,9 @@ async def test_mavsdk_shows_the_flight_as_it_is(bench: Bench) -> None:
             assert shown.down_m_s == pytest.approx(-now["climb_ms"], abs=0.3)
 
         def battery(shown: Any) -> None:
-            assert shown.voltage_v == pytest.approx(truth(bench)["volts"], abs=VOLTAGE_V)
-            assert not shown.remaining_percent >= 0  # not known
+            volts = truth(bench)["volts"]
+            assert shown.voltage_v == pytest.approx(volts, abs=VOLTAGE_V)
+            assert shown.remaining_percent == pytest.approx(remaining_percent(volts, CELLS), abs=REMAINING_PERCENT)
 
         def gps(shown: Any) -> None:
             assert (shown.num_satellites, shown.fix_type) == (9, 3)
