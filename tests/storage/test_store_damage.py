@@ -3,18 +3,21 @@
 
 import random
 import sqlite3
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from storage.mission_store import MissionStore, StoreError, open_store
+from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
 from tests.support.sample_missions import mission
 
 NOW = 1_767_323_045.9  # 2026-01-02 03:04:05 UTC
 ASIDE = "missions.db.corrupt-20260102-030405"
 MISSIONS = 12
+ALL = {number: mission(number, items=40) for number in range(1, MISSIONS + 1)}
+NOTHING: Mapping[int, ReceivedMission] = {}
 
 
 @pytest.fixture(scope="module")
@@ -51,12 +54,18 @@ def assert_nothing_false(store: MissionStore) -> None:
                 assert stored.received.records == mission(number, items=40).records
 
 
-def assert_kept_aside(path: Path, damaged: bytes) -> None:
+def assert_kept_aside(path: Path, damaged: bytes, *, salvaged: Mapping[int, ReceivedMission] = NOTHING) -> None:
+    """The damaged file is kept byte for byte; the new store holds exactly the missions `salvaged`, by number."""
     opened = open_store(path, NOW)
     with opened.store as store:
         assert opened.set_aside == path.with_name(ASIDE)
         assert opened.set_aside.read_bytes() == damaged
-        assert store.list(9) == []
+        assert opened.salvaged == len(salvaged)
+        assert sorted(summary.number for summary in store.list(99)) == sorted(salvaged)
+        for number, received in salvaged.items():
+            stored = store.get(number)
+            assert stored is not None
+            assert stored.received == received
         assert_works(store)
 
 
@@ -173,14 +182,14 @@ def test_a_log_with_a_damaged_head_is_not_thrown_away(path: Path, killed: bytes,
     log = bytearray(killed)
     log[bit // 8] ^= 1 << bit % 8
     path.with_name("missions.db-wal").write_bytes(log)
-    assert_kept_aside(path, path.read_bytes())
+    assert_kept_aside(path, path.read_bytes(), salvaged=ALL)
     assert path.with_name(f"{ASIDE}-wal").read_bytes() == log
 
 
 def test_random_bytes_for_a_log(path: Path, killed: bytes) -> None:
     log = random.Random(1).randbytes(30_000)
     path.with_name("missions.db-wal").write_bytes(log)
-    assert_kept_aside(path, path.read_bytes())
+    assert_kept_aside(path, path.read_bytes(), salvaged=ALL)
     assert path.with_name(f"{ASIDE}-wal").read_bytes() == log
 
 
@@ -197,7 +206,8 @@ def test_a_damaged_main_file_keeps_its_log(path: Path, killed: bytes) -> None:
     # Not at its start: the log holds newer copies of the pages there.
     damaged = path.read_bytes()[:30_000]
     path.write_bytes(damaged)
-    assert_kept_aside(path, damaged)
+    # Only the pages in the log can be read: those of the two missions that were added last.
+    assert_kept_aside(path, damaged, salvaged={MISSIONS + 1: mission(50), MISSIONS + 2: mission(51)})
     assert path.with_name(f"{ASIDE}-wal").read_bytes() == killed
 
 
