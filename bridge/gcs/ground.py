@@ -221,7 +221,9 @@ class Ground:
 
     def greet(self, peer: Peer, heartbeat: Message) -> None:
         """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it continues."""
-        self._write(peer, heartbeat, self._version(peer))
+        frame = self._write(peer, heartbeat, self._version(peer))
+        if not self._stations.is_listener(peer):
+            self.tap([frame])
         self._introduce(peer, heartbeat)
 
     def broadcast(self, message: Message) -> None:
@@ -273,6 +275,8 @@ class Ground:
         self._log_event("debug", "gcs.text", text=text)
         if severity is Severity.ERROR:
             peers = self._texts.new_to(peers, text, self._now)
+        if peers and self.is_recording and RECORDER not in peers:
+            peers = [*peers, RECORDER]  # a text for one station is part of the flight's log, too
         for piece in split_text(text):
             message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"))
             self.multicast(pack(message), peers)
