@@ -333,7 +333,7 @@ class MissionUploads:
         )
         self._post.to(station, request)
         if state.request.is_repeated:
-            for elsewhere in self._moved_to(station, now):
+            for elsewhere in self._elsewhere(upload, now):
                 self._post.to(elsewhere, request)
 
     def _deliver(self, upload: _Upload, items: tuple[MissionItem, ...], verdict: Verdict[Any], now: float) -> None:
@@ -427,8 +427,17 @@ class MissionUploads:
             self._answers.note(station, _UNKNOWN_UPLOAD.ack, 0, now)
             self._ack(station, _UNKNOWN_UPLOAD.ack)
 
+    def _elsewhere(self, upload: _Upload, now: float) -> list[Station]:
+        """Other addresses of the upload's station, except those that have announced a list of their own."""
+        announced = {other.station for other in self._uploads if other is not upload}
+        return [
+            where
+            for where in self._moved_to(upload.station, now)
+            if where not in announced and not self._answers.was_said_to(where, now)
+        ]
+
     def _answer(self, upload: _Upload, ack: MissionResult, now: float) -> None:
-        for where in (upload.station, *self._moved_to(upload.station, now)):
+        for where in (upload.station, *self._elsewhere(upload, now)):
             self._answers.note(where, ack, upload.count, now)
             self._ack(where, ack)
 
