@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 
+from storage.checksums import row_crc32
 from storage.store_error import FAILURES, StoreError, explained, primary_code
 
 # SQLite's auxiliary files of a database. The log holds commits that are not in the main file yet.
@@ -23,6 +24,8 @@ _LOG_HEADER = struct.Struct(">8I")
 _LOG_MAGIC = {0x377F0682: "<6I", 0x377F0683: ">6I"}
 
 # SQLITE_ERROR is "table already exists" and such: the file does not have its claimed schema.
+#: Damaged files kept, the newest: each may be as large as the store.
+_MOST_KEPT = 3
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
 
@@ -79,6 +82,7 @@ def _configured(connection: sqlite3.Connection) -> sqlite3.Connection:
     connection.row_factory = sqlite3.Row
     # A corrupt byte in one text must not hide all the other missions.
     connection.text_factory = lambda raw: raw.decode(errors="replace")
+    connection.create_function("row_crc32", -1, row_crc32, deterministic=True)
     return connection
 
 
@@ -132,7 +136,7 @@ def _log_checksum(words: tuple[int, ...]) -> tuple[int, int]:
 
 
 def _keep_aside(path: Path, now: float) -> Path:
-    """Rename the file and its auxiliary files; returns the new name.
+    """Rename the file and its auxiliary files, and delete the oldest such files; returns the new name.
 
     The main file goes last: if it went first, a power cut here would leave a log that SQLite deletes.
     """
@@ -148,11 +152,21 @@ def _keep_aside(path: Path, now: float) -> Path:
             if companion.exists():
                 companion.rename(aside.with_name(aside.name + suffix))
         path.rename(aside)
+        _forget_oldest(path, aside)
     except OSError as error:
         raise StoreError(
             f"the mission store {path} is damaged and cannot be kept aside ({error.strerror}); move it away"
         ) from error
     return aside
+
+
+def _forget_oldest(path: Path, newest: Path) -> None:
+    """Delete the oldest damaged files. Their missions that could be read are in the store."""
+    kept = [file for file in path.parent.glob(f"{path.name}.corrupt-*[0-9]") if file != newest]
+    kept.sort(key=lambda file: (file.stat().st_ctime_ns, file.name))
+    for file in kept[: -(_MOST_KEPT - 1)]:
+        for suffix in ("", *_COMPANIONS):
+            file.with_name(file.name + suffix).unlink(missing_ok=True)
 
 
 def _prepare(connection: sqlite3.Connection, path: Path) -> None:
@@ -192,8 +206,7 @@ def _apply_schema(connection: sqlite3.Connection, version: int) -> None:
 
 def _has_our_schema(connection: sqlite3.Connection) -> bool:
     """Compare the schema with that of the schema files: quick_check misses a corrupt column name."""
-    with closing(sqlite3.connect(":memory:", isolation_level=None)) as sample:
-        _apply_schema(sample, version=0)
+    with closing(memory_database()) as sample:
         expected, found = (
             {(str(name), str(sql)) for name, sql in database.execute("SELECT name, sql FROM sqlite_schema")}
             for database in (sample, connection)

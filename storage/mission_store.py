@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from storage.checksums import CONTENTS, SUMMARY, contents_crc32, row_crc32
 from storage.database import memory_database, open_database, read_database
-from storage.salvage import CONTENTS, contents_crc32, salvage
+from storage.salvage import salvage
 from storage.store_error import StoreError, explained
 
 __all__ = [
+    "DAMAGED",
     "PENDING",
     "VERIFIED",
     "MissionStore",
@@ -29,6 +31,7 @@ __all__ = [
 
 PENDING = "PENDING"  # the outcome until conclude(); for ever, if the daemon died in between
 VERIFIED = "VERIFIED"  # the outcome that latest_verified() looks for
+DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match its checksum
 
 #: The size limit of the store, bytes.
 BUDGET = 200 << 20
@@ -64,7 +67,10 @@ class ReceivedMission:
 
 @dataclass(frozen=True, slots=True)
 class MissionSummary:
-    """One line of a list of missions. Times are unix seconds; concluded_at is None while PENDING."""
+    """One line of a list of missions. Times are unix seconds; concluded_at is None while PENDING.
+
+    A line that was damaged on the disk has the outcome DAMAGED, and no other values than its number.
+    """
 
     number: int
     received_at: float
@@ -148,43 +154,43 @@ class MissionStore:
                 " crc32) VALUES (?, ?, ?, ?, ?, ?, ?)",
                 (number, *contents, contents_crc32(contents)),
             )
+            self._seal(number)
         return number
 
     def conclude(self, number: int, outcome: str, detail: str, at: float) -> None:
         """Store the outcome. outcome: VERIFIED, REFUSED, FAILED...; at: unix seconds."""
         with self._transaction(f"cannot store the outcome of mission {number}"):
-            changed = self._connection.execute(
+            if self._line(number) is None:
+                raise StoreError(f"there is no mission {number} in {self._path}")
+            self._connection.execute(
                 "UPDATE missions SET outcome = ?, detail = ?, concluded_at = ? WHERE number = ?",
                 (_text(outcome), _text(detail), at, number),
-            ).rowcount
-        if not changed:
-            raise StoreError(f"there is no mission {number} in {self._path}")
+            )
+            self._seal(number)
 
     def get(self, number: int) -> StoredMission | None:
         """The mission with this number, None if there is none; StoreError also if it is corrupt."""
-        with explained(f"cannot read mission {number} from {self._path}"):
-            row = self._connection.execute(
-                "SELECT * FROM missions JOIN mission_contents USING (number) WHERE number = ?",
-                (number,),
-            ).fetchone()
-        if row is None:
+        summary = self._line(number)
+        if summary is None:
             return None
-        if contents_crc32(row[column] for column in CONTENTS) != row["crc32"]:
-            raise StoreError(f"mission {number} in {self._path} was damaged on the disk; the others can still be read")
+        with explained(f"cannot read mission {number} from {self._path}"):
+            row = self._connection.execute("SELECT * FROM mission_contents WHERE number = ?", (number,)).fetchone()
+        if row is None or contents_crc32(row[column] for column in CONTENTS) != row["crc32"]:
+            raise self._damaged(number)
         received = ReceivedMission(
-            received_at=row["received_at"],
-            source=row["source"],
+            received_at=summary.received_at,
+            source=summary.source,
             items=json.loads(row["items"]),
-            verdict=row["verdict"],
-            ack=row["ack"],
+            verdict=summary.verdict,
+            ack=summary.ack,
             findings=json.loads(row["findings"]),
             stored_items=json.loads(row["stored_items"]),
             records=row["records"],
-            record_count=row["record_count"],
-            checksum=row["checksum"],
+            record_count=summary.record_count,
+            checksum=summary.checksum,
             roi_commands={int(seq): command for seq, command in json.loads(row["roi_commands"]).items()},
         )
-        return StoredMission(number, received, row["outcome"], row["detail"], row["concluded_at"])
+        return StoredMission(number, received, summary.outcome, summary.detail, summary.concluded_at)
 
     def latest_verified(self, count: int, checksum: int) -> StoredMission | None:
         """The newest mission with these records that was verified."""
@@ -198,7 +204,8 @@ class MissionStore:
 
     def pending(self) -> builtins.list[MissionSummary]:
         """The missions without a conclusion, oldest first."""
-        return self._summaries(f"WHERE outcome = '{PENDING}' ORDER BY number")
+        found = self._summaries(f"WHERE outcome = '{PENDING}' ORDER BY number")
+        return [summary for summary in found if summary.outcome == PENDING]
 
     def list(self, limit: int) -> builtins.list[MissionSummary]:
         """The `limit` newest missions, newest first."""
@@ -206,12 +213,26 @@ class MissionStore:
 
     def _summaries(self, which: str, *values: int) -> builtins.list[MissionSummary]:
         with explained(f"cannot list {self._path}"):
-            rows = self._connection.execute(
-                "SELECT number, received_at, source, verdict, ack, item_count, finding_count, record_count,"  # noqa: S608 - constants
-                f" checksum, outcome, detail, concluded_at FROM missions {which}",
-                values,
-            ).fetchall()
-        return [MissionSummary(*row) for row in rows]
+            rows = self._connection.execute(f"SELECT {SUMMARY}, crc32 FROM missions {which}", values).fetchall()  # noqa: S608 - constants
+        return [MissionSummary(*row) if row_crc32(*row) == crc32 else _damaged_line(row[0]) for *row, crc32 in rows]
+
+    def _seal(self, number: int) -> None:
+        """Store the checksum of a mission's line."""
+        self._connection.execute(
+            f"UPDATE missions SET crc32 = row_crc32({SUMMARY}) WHERE number = ?",  # noqa: S608 - a constant
+            (number,),
+        )
+
+    def _line(self, number: int) -> MissionSummary | None:
+        """The line of a mission; None if there is none, StoreError if it is corrupt."""
+        for line in self._summaries("WHERE number = ?", number):
+            if line.outcome == DAMAGED:
+                raise self._damaged(number)
+            return line
+        return None
+
+    def _damaged(self, number: int) -> StoreError:
+        return StoreError(f"mission {number} in {self._path} was damaged on the disk; the others can still be read")
 
     def _make_room(self) -> None:
         if self._size() <= self._budget:
@@ -279,6 +300,10 @@ def store_in_memory() -> MissionStore:
 def read_store(path: Path) -> MissionStore:
     """Open the store in file `path` read-only, without the StateLock; StoreError if that fails."""
     return MissionStore(read_database(path), path)
+
+
+def _damaged_line(number: int) -> MissionSummary:
+    return MissionSummary(number, 0.0, "", "", "", 0, 0, 0, 0, DAMAGED, "this line was damaged on the disk", None)
 
 
 def _text(text: str) -> str:

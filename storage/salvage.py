@@ -1,36 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Copies intact missions from a damaged store into a new one.
 
-A mission is intact if its contents match their checksum. Missions are looked up by number, so a damaged page loses
+A mission is intact if both its rows match their checksums. Missions are looked up by number, so a damaged page loses
 only the missions on it.
 """
 
 import shutil
 import sqlite3
-import zlib
-from collections.abc import Iterable
 from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from storage.checksums import CONTENTS, SUMMARY, contents_crc32, row_crc32
 from storage.store_error import FAILURES
 
-_MISSION = (
-    "number, received_at, source, verdict, ack, item_count, finding_count, record_count, checksum, outcome, detail,"
-    " concluded_at"
-)
-CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records")  # the columns that crc32 covers
 #: A damaged table may claim any number; a store within its budget holds fewer.
 _MOST = 200_000
 _WAL = "-wal"
-
-
-def contents_crc32(contents: Iterable[str | bytes]) -> int:
-    """Detects a changed byte in a mission; SQLite only detects damaged page structures."""
-    crc = 0
-    for part in contents:
-        crc = zlib.crc32(part if isinstance(part, bytes) else part.encode(errors="surrogateescape"), crc)
-    return crc
 
 
 def salvage(damaged: Path, store: sqlite3.Connection) -> int:
@@ -56,7 +42,7 @@ def _copy_missions(path: Path, store: sqlite3.Connection) -> int:
         store.execute("BEGIN IMMEDIATE")
         try:
             for number in range(1, _last_number(source) + 1):
-                with suppress(*FAILURES):
+                with suppress(*FAILURES, TypeError):  # TypeError: there is no such row
                     copied += _copy_mission(number, source, store)
             store.execute("COMMIT")
         except BaseException:
@@ -79,24 +65,25 @@ def _last_number(source: sqlite3.Connection) -> int:
 
 
 def _copy_mission(number: int, source: sqlite3.Connection, store: sqlite3.Connection) -> int:
-    mission = source.execute(f"SELECT {_MISSION} FROM missions WHERE number = ?", (number,)).fetchone()  # noqa: S608
+    *summary, row_crc = source.execute(f"SELECT {SUMMARY}, crc32 FROM missions WHERE number = ?", (number,)).fetchone()  # noqa: S608
     *contents, crc32 = source.execute(
         f"SELECT {', '.join(CONTENTS)}, crc32 FROM mission_contents WHERE number = ?",  # noqa: S608
         (number,),
-    ).fetchone() or (None,)
-    if mission is None or not contents or contents_crc32(contents) != crc32:
+    ).fetchone()
+    if row_crc32(*summary) != row_crc or contents_crc32(contents) != crc32:
         return 0
     store.execute("SAVEPOINT mission")
     try:
         # STRICT tables reject values of the wrong type.
-        store.execute(f"INSERT INTO missions ({_MISSION}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", mission)  # noqa: S608
-        store.execute(
-            f"INSERT INTO mission_contents (number, {', '.join(CONTENTS)}, crc32) VALUES (?, ?, ?, ?, ?, ?, ?)",  # noqa: S608
-            (number, *contents, crc32),
-        )
-    except (*FAILURES, UnicodeEncodeError):
+        _insert(store, "missions", (*summary, row_crc))
+        _insert(store, "mission_contents", (number, *contents, crc32))
+    except FAILURES:
         store.execute("ROLLBACK TO mission")
         return 0
     finally:
         store.execute("RELEASE mission")
     return 1
+
+
+def _insert(store: sqlite3.Connection, table: str, values: tuple[object, ...]) -> None:
+    store.execute(f"INSERT INTO {table} VALUES ({', '.join('?' * len(values))})", values)  # noqa: S608

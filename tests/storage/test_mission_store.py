@@ -2,10 +2,13 @@
 """What goes into the store comes out again, and finding it does not get slower as missions gather."""
 
 import math
+import sqlite3
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -167,3 +170,18 @@ def test_finding_missions_takes_the_same_steps_however_many_there_are(store: Mis
     few = [steps(search) for search in searches]
     gather(range(30, 330))
     assert [steps(search) for search in searches] == few
+
+
+def test_a_store_of_the_first_release_is_taken_over(tmp_path: Path) -> None:
+    """Its lines had no checksum."""
+    with sqlite3.connect(tmp_path / "missions.db") as first:
+        first.executescript(files("storage").joinpath("schema", "0001_missions.sql").read_text())
+        first.execute("PRAGMA user_version = 1")
+        first.execute("INSERT INTO missions VALUES (1, 2.5, 'udp', 'ACCEPTED', 'ok', 0, 0, 0, 0, 'VERIFIED', '', 3.5)")
+        first.execute("INSERT INTO mission_contents VALUES (1, '[]', '[]', '[]', '{}', x'', ?)", (crc32(b"[][][]{}"),))
+    first.close()
+    opened = open_store(tmp_path / "missions.db", 0.0)
+    with opened.store as store:
+        assert opened.set_aside is None
+        assert [(line.source, line.outcome) for line in store.list(9)] == [("udp", "VERIFIED")]
+        assert store.get(1) is not None

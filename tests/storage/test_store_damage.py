@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
+from storage.mission_store import DAMAGED, MissionStore, ReceivedMission, StoreError, open_store
 from tests.support.sample_missions import mission
 
 NOW = 1_767_323_045.9  # 2026-01-02 03:04:05 UTC
@@ -50,8 +50,8 @@ def assert_nothing_false(store: MissionStore) -> None:
             assert f"mission {number} " in str(error)  # noqa: PT017 - no error is as good
         else:
             if stored is not None:
-                assert stored.received.items == mission(number, items=40).items
-                assert stored.received.records == mission(number, items=40).records
+                assert stored.received == mission(number, items=40)
+                assert (stored.outcome, stored.concluded_at) == ("VERIFIED", 1.0)
 
 
 def assert_kept_aside(path: Path, damaged: bytes, *, salvaged: Mapping[int, ReceivedMission] = NOTHING) -> None:
@@ -148,11 +148,20 @@ def test_a_rotten_mission_does_not_hide_the_others(path: Path, sound: Path) -> N
         assert other.received == mission(4, items=40)
 
 
-def test_a_rotten_text_does_not_hide_the_list(path: Path, sound: Path) -> None:
+@pytest.mark.parametrize("rotten", [b"\xff", b"U"])
+def test_a_rotten_line_does_not_hide_the_list(path: Path, sound: Path, rotten: bytes) -> None:
     source = mission(3).source.encode()
-    path.write_bytes(sound.read_bytes().replace(source, b"\xff" + source[1:]))
+    path.write_bytes(sound.read_bytes().replace(source, rotten + source[1:]))
     with open_store(path, NOW).store as store:
-        assert [summary.source[0] for summary in store.list(99) if summary.number == 3] == ["\ufffd"]
+        assert [summary.number for summary in store.list(99) if summary.outcome == DAMAGED] == [3]
+        assert {summary.source for summary in store.list(99)} == {
+            "",
+            *(ALL[number].source for number in ALL if number != 3),
+        }
+        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
+            store.get(3)
+        with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
+            store.conclude(3, "VERIFIED", "", 2.0)
 
 
 @pytest.fixture
@@ -211,15 +220,19 @@ def test_a_damaged_main_file_keeps_its_log(path: Path, killed: bytes) -> None:
     assert path.with_name(f"{ASIDE}-wal").read_bytes() == killed
 
 
-def test_nothing_kept_aside_is_ever_overwritten(path: Path) -> None:
+def test_the_newest_damaged_files_are_kept(path: Path) -> None:
+    """Each may be as large as the store. None is overwritten, though the clock of a Pi may jump back."""
     kept = []
-    for size in (10, 20, 30):
+    for size in (10, 20, 30, 40):
         path.write_bytes(b"x" * size)
         opened = open_store(path, NOW)
         opened.store.close()
         kept.append(opened.set_aside)
-    assert kept == [path.with_name(name) for name in (ASIDE, f"{ASIDE}-2", f"{ASIDE}-3")]
-    assert [file.stat().st_size for file in kept if file] == [10, 20, 30]
+    assert kept[1:3] == [path.with_name(name) for name in (f"{ASIDE}-2", f"{ASIDE}-3")]
+    path.write_bytes(b"x" * 50)
+    open_store(path, NOW - 86400).store.close()
+    sizes = [file.stat().st_size for file in path.parent.glob("*.corrupt-*")]
+    assert sorted(sizes) == [30, 40, 50]
 
 
 def test_what_was_kept_aside_can_be_opened_for_rescue(path: Path, killed: bytes) -> None:
