@@ -18,9 +18,11 @@ from simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
 _STEP_S = 0.05
 _STATUS_FLAGS = 32
 _SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
+_PITOT = 1 << 6
 _CYCLE_TIME_US = 500
 _ARMED_FLAGS = 0b1100  # armed, and armed once
 _LOAD_PERCENT = 7
+_WIND_CMS = 250  # from ahead
 _CELLS, _BATTERY_PERCENT, _DRAWN_MAH = 3, 88, 120
 _API_VERSION = bytes((0, 2, 5))
 _FIX_3D = 2
@@ -73,6 +75,7 @@ class InavFirmware:
         self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
         self._version = tuple(int(part) for part in boot.options.version.split("."))
         self._boxes = BOXES[boot.options.version]
+        self._sensors = _SENSORS | (_PITOT if boot.options.pitot else 0)
         channels = 34 if self._version >= (8, 0, 0) else 18
         self._channels = channels if boot.options.receiver else 0
         self.habits = PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=self._version <= (8, 0, 1), speaks_v2=True)
@@ -224,7 +227,7 @@ class InavFirmware:
             case InavCommand.BOARD_INFO:
                 return b"SIMU\x00\x00\x02\x00\x04SIMU"
             case InavCommand.STATUS | InavCommand.STATUS_EX:
-                status = struct.pack("<HHHIB", _CYCLE_TIME_US, 0, _SENSORS, craft.boxes, 0)
+                status = struct.pack("<HHHIB", _CYCLE_TIME_US, 0, self._sensors, craft.boxes, 0)
                 return status + (bytes(5) if command == InavCommand.STATUS_EX else b"")
             case InavCommand.RAW_IMU:
                 return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
@@ -258,7 +261,7 @@ class InavFirmware:
                 return bytes(self._boxes)
             case InavCommand.INAV_STATUS:
                 flags = self._faults.arming_blockers | (_ARMED_FLAGS if self._armed else 0)
-                status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, _SENSORS, _LOAD_PERCENT, 0, flags)
+                status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, self._sensors, _LOAD_PERCENT, 0, flags)
                 return status + craft.boxes.to_bytes(8, "little") + b"\0"
             case InavCommand.INAV_ANALOG:
                 current = 1250 if self._armed else 30
@@ -266,7 +269,7 @@ class InavFirmware:
                 drawn = (volts_e2 * current // 100, _DRAWN_MAH, 1300)
                 return struct.pack("<BHHIIIIBH", _CELLS << 4, volts_e2, current, *drawn, 0, _BATTERY_PERCENT, _RSSI)
             case InavCommand.INAV_AIR_SPEED:
-                return struct.pack("<I", round(flight.speed_ms * 100)) if self._options.platform else None
+                return struct.pack("<I", round(flight.speed_ms * 100) + _WIND_CMS if self._options.pitot else 0)
             case InavCommand.INAV_MIXER:
                 return struct.pack("<BBBBBhBB", 0, 0, 0, self._options.platform, 0, -1, 12, 18)
             case InavCommand.NAV_STATUS:

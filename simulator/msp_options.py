@@ -8,7 +8,8 @@ from dataclasses import dataclass
 class MspOptions:
     """`baud` None: a socket. `version` is INAV's. `receiver`: True if MSP_RC has channels.
 
-    `platform`: INAV's platform_type (mixer_profile.h), 0 a multirotor, 1 an aeroplane.
+    `platform`: INAV's platform_type (mixer_profile.h), 0 a multirotor, 1 an aeroplane, 4 a rover.
+    `pitot`: True if INAV measures airspeed.
     `serial_task_ms`: the interval of the MSP task, which serves one request: INAV's simulator 0.5, its boards 10.
     `ring_size`: of the receive ring, bytes: a UART's 256, INAV's simulator 2048.
     `capacity`: of MultiWii's EEPROM, waypoints. `seed`: of the random faults.
@@ -18,6 +19,7 @@ class MspOptions:
     baud: int | None = 115200
     receiver: bool = True
     platform: int = 0
+    pitot: bool = False
     serial_task_ms: float = 0.5
     ring_size: int = 256
     boot_ms: float = 1500.0

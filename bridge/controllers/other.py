@@ -5,12 +5,16 @@ from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
 from bridge.fc.profile import FlightController, Profile
 from bridge.line.conversation import Conversation
+from bridge.model.airframe import airframe
+from bridge.model.flight_mode import FAILSAFE_BOX
 from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionResult
 
 _BETAFLIGHT = "BTFL"
 #: Betaflight's permanent box ids (msp_box.c) of the modes that make a flight mode.
-_BETAFLIGHT_BOXES = {0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "ALT HOLD", 11: "POS HOLD", 46: "GPS RESCUE"}
+_BETAFLIGHT_BOXES = {
+    0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "ALT HOLD", 11: "POS HOLD", 27: FAILSAFE_BOX, 46: "GPS RESCUE",
+}  # fmt: skip
 
 
 def _recognise(board: Interview) -> Conversation[FlightController | None]:
@@ -19,7 +23,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     if ident is not None:
         boxes = yield from board.box_names()
         name = (yield from board.variant()) or f"MultiWii {ident.version}"
-        return FlightController(OTHER_MSP, name, ident.mixer, boxes, version=ident.release)
+        return FlightController(OTHER_MSP, name, airframe(ident.mixer), boxes, version=ident.release)
     name = (yield from board.variant()) or "unknown"
     version = None
     if name == _BETAFLIGHT:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from bridge.fc.msp_telemetry import velocity
-from bridge.model.flight_mode import FlightMode, active_boxes, flight_mode
+from bridge.model.flight_mode import FlightMode, active_boxes, flight_mode, names_of_active
 from bridge.model.vehicle import (
     Fix,
     FlightState,
@@ -126,7 +126,8 @@ class MavlinkTelemetry:
         """Its heartbeat says only whether it levels itself; the rest follows from the pilot's switches."""
         switches, sticks = self._vehicle.last(Switches), self._vehicle.last(Sticks)
         if switches is not None and sticks is not None:
-            mode = flight_mode(active_boxes(switches.activation, sticks.channels_us[_STICKS:]), switches.boxes)
+            flags = active_boxes(switches.activation, sticks.channels_us[_STICKS:])
+            mode = flight_mode(names_of_active(flags, switches.boxes))
             if mode not in (FlightMode.STABILIZE, FlightMode.ACRO):
                 return mode
         return FlightMode.STABILIZE if self._is_level else FlightMode.ACRO

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 
 from bridge.fc.profile import Decoder, FlightController
-from bridge.model.flight_mode import flight_mode
+from bridge.model.flight_mode import FAILSAFE_BOX, flight_mode, names_of_active
 from bridge.model.vehicle import (
     Fix,
     FlightState,
@@ -61,6 +61,8 @@ POLL_FOR: Mapping[type[Reading], Msp] = {
     Readiness: Msp.INAV_STATUS,
 }
 _MAX_RSSI = 1020
+#: A craft may turn the other way by then.
+_RATES_STALE_S = 0.3
 
 
 def hear_msp(vehicle: Vehicle, frame: MspFrame, controller: FlightController, now: float) -> None:
@@ -70,14 +72,23 @@ def hear_msp(vehicle: Vehicle, frame: MspFrame, controller: FlightController, no
         decode(vehicle, frame.payload, controller, now)
 
 
-def _attitude(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+def _attitude(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     """MSP's pitch is nose-down positive on all firmware."""
     told = decode_attitude(payload)
     if told is not None:
         health = vehicle.last(Health)
         has_compass = health is not None and Sensor.COMPASS in health.sensors
         heading_deg = float(told.heading_deg % 360)
-        vehicle.hear(Orientation(now, Source.MSP, told.roll_ddeg / 10, -told.pitch_ddeg / 10, heading_deg, has_compass))
+        roll_deg, pitch_deg, rates = told.roll_ddeg / 10, -told.pitch_ddeg / 10, _rates_deg_s(vehicle, controller, now)
+        vehicle.hear(Orientation(now, Source.MSP, roll_deg, pitch_deg, heading_deg, has_compass, rates))
+
+
+def _rates_deg_s(vehicle: Vehicle, controller: FlightController, now: float) -> tuple[float, float, float] | None:
+    imu = vehicle.fresh(ImuSample, now, _RATES_STALE_S) if controller.profile.has_gyro_deg_s else None
+    if imu is None:
+        return None
+    forward, left, up = imu.gyro
+    return float(forward), -float(left), -float(up)
 
 
 def _raw_gps(vehicle: Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
@@ -126,8 +137,10 @@ def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
     load = None if before is None else before.cpu_load
     vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors, load))
     armed = None if controller.arm_bit is None else bool(status.box_flags >> controller.arm_bit & 1)
-    mode = flight_mode(status.box_flags, controller.boxes) if controller.boxes else None
-    vehicle.hear(FlightState(now, Source.MSP, armed, mode))
+    active = names_of_active(status.box_flags, controller.boxes)
+    mode = flight_mode(active) if controller.boxes else None
+    # Disarmed, the box only says that there is no RC link.
+    vehicle.hear(FlightState(now, Source.MSP, armed, mode, bool(armed) and FAILSAFE_BOX in active))
 
 
 def _analog(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:

@@ -14,6 +14,7 @@ from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.list_check import MissionRules
+from bridge.model.airframe import Airframe
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
@@ -56,6 +57,7 @@ class Profile:
     recognise: MSP only; returns the flight controller if the interview shows that it is this kind.
     polls: the telemetry questions it answers. decoders: by command, for replies in a layout of its own; the common ones
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
+    has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.
     accepts_any_byte: its parser acts on no byte runs inside a frame.
     open_store: how missions are written to it, or None with `no_missions` as the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
@@ -72,6 +74,7 @@ class Profile:
     polls: tuple[Poll, ...] = POLLS
     decoders: Mapping[int, Decoder] = field(default_factory=dict)
     has_2d_fix: bool = False
+    has_gyro_deg_s: bool = False
     accepts_any_byte: bool = False
     open_store: Callable[["FlightController", VehicleView, RuleSettings], AnyFcMissionStore] | None = None
     no_missions: Refusal = NO_MISSIONS
@@ -87,13 +90,13 @@ class Profile:
 class FlightController:
     """The board on the line. `boxes` are in the order of the status flags; "" is a flag without a meaning here.
 
-    mixer: IDENT's frame type. info: Harakiri's mission extension. capacity: mission records, if the board reported it.
+    airframe: None if unknown. info: Harakiri's mission extension. capacity: mission records, if the board reported it.
     version: the firmware's major, minor and patch level.
     """
 
     profile: Profile
     name: str
-    mixer: int | None = None
+    airframe: Airframe | None = None
     boxes: tuple[str, ...] = ()
     info: Info | None = None
     capacity: int = 0

@@ -46,6 +46,7 @@ class Station:
 class Severity(IntEnum):
     """MAV_SEVERITY."""
 
+    CRITICAL = 2
     ERROR = 3
     WARNING = 4
     NOTICE = 5

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight mode that follows from the active boxes, as an ArduCopter mode, which ground stations can name."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from enum import Enum, auto
 
 
@@ -15,6 +15,9 @@ class FlightMode(Enum):
     RTL = auto()
     AUTO = auto()
 
+
+#: A flag of INAV and Betaflight: the receiver is silent, or the pilot's switch is on, and the failsafe procedure runs.
+FAILSAFE_BOX = "FAILSAFE"
 
 #: The thresholds of an aux channel's positions (MultiWii and its descendants).
 _LOW_BELOW_US, _HIGH_ABOVE_US = 1300, 1700
@@ -30,9 +33,13 @@ _BOXES: tuple[tuple[FlightMode, frozenset[str]], ...] = (
 )
 
 
-def flight_mode(box_flags: int, boxes: Sequence[str]) -> FlightMode:
-    """The mode; `box_flags` has one bit for each of `boxes`, in their order."""
-    active = {name for bit, name in enumerate(boxes) if box_flags >> bit & 1}
+def names_of_active(box_flags: int, boxes: Sequence[str]) -> set[str]:
+    """The active boxes; `box_flags` has one bit for each of `boxes`, in their order."""
+    return {name for bit, name in enumerate(boxes) if box_flags >> bit & 1}
+
+
+def flight_mode(active: Set[str]) -> FlightMode:
+    """The mode that follows from the active boxes."""
     return next((mode for mode, names in _BOXES if active & names), FlightMode.ACRO)
 
 

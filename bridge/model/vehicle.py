@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import TypeVar
 
+from bridge.model.airframe import Airframe
 from bridge.model.battery import least_cells, remaining_percent
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import GroundTrack, distance_m
@@ -129,10 +130,14 @@ class Signal(Reading):
 
 @dataclass(frozen=True, slots=True)
 class FlightState(Reading):
-    """armed: None if the flight controller cannot tell. mode: a FlightMode, or another autopilot's mode number."""
+    """armed: None if the flight controller cannot tell. mode: a FlightMode, or another autopilot's mode number.
+
+    is_failsafe: True if it is armed and has taken over from the pilot, as far as it reports that.
+    """
 
     armed: bool | None
     mode: FlightMode | str | None = None
+    is_failsafe: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +158,13 @@ class Readiness(Reading):
     """The reasons that prevent arming, as text; () if there are none. Unknown on firmware that does not report them."""
 
     blockers: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Airspeed(Reading):
+    """From flight controllers with a pitot tube."""
+
+    airspeed_m_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,10 +211,10 @@ ReadingT = TypeVar("ReadingT", bound=Reading)
 
 
 class Vehicle:
-    """The latest reading of each kind, and home. mixer: MultiWii's MULTITYPE number."""
+    """The latest reading of each kind, and home."""
 
-    def __init__(self, mixer: int | None = None) -> None:
-        self.mixer = mixer
+    def __init__(self, airframe: Airframe = Airframe.QUADROTOR) -> None:
+        self.airframe = airframe
         #: The firmware version: major, minor, patch level.
         self.version: tuple[int, int, int] | None = None
         self.home: Home | None = None

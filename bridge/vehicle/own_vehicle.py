@@ -42,6 +42,9 @@ _READINGS = {row.msgid: row.reading for row in TELEMETRY}
 (_SYS_STATUS,) = (row for row in TELEMETRY if row.msgid == messages.MAVLINK_MSG_ID_SYS_STATUS)
 _DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | dict.fromkeys(_TICKED_STREAMS, _TICK_S)
 
+#: What a heartbeat shows: armed, mode, failsafe.
+_ShownState = tuple[bool | None, FlightMode | str | None, bool]
+
 
 class OwnVehicle:
     """Sends the vehicle's messages to each ground station at the rates that it requests."""
@@ -74,11 +77,12 @@ class OwnVehicle:
         }
         self._announced_home: Home | None = None
         self._told_blockers: tuple[str, ...] = ()
+        self._has_told_failsafe = False
         self._also_wanted: Mapping[type[Reading], float] = {}
         #: New ground stations, and the end of their faster heartbeats.
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
-        self._announced: tuple[bool | None, FlightMode | str | None] | None = None
+        self._announced: _ShownState | None = None
 
     def newcomer(self, peer: Peer) -> None:
         """Greet a new ground station with faster heartbeats, so that it connects sooner, and with home."""
@@ -138,6 +142,7 @@ class OwnVehicle:
         if Readiness in news:
             self._tell_readiness()
         if FlightState in news and self._announced != self._shown_state():
+            self._tell_failsafe()
             self._heartbeat()
 
     def _send(self, row: Row, at: Moment, peers: Sequence[Peer]) -> None:
@@ -219,9 +224,20 @@ class OwnVehicle:
         boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
         return Moment(self._session.vehicle, self._now, boot_ms)
 
-    def _shown_state(self) -> tuple[bool | None, FlightMode | str | None]:
+    def _shown_state(self) -> _ShownState:
         state = self._session.vehicle.last(FlightState)
-        return (None, None) if state is None else (state.armed, state.mode)
+        return (None, None, False) if state is None else (state.armed, state.mode, state.is_failsafe)
+
+    def _tell_failsafe(self) -> None:
+        """Report when the failsafe takes over, and when the pilot has control again."""
+        state = self._session.vehicle.last(FlightState)
+        if state is None or state.is_failsafe == self._has_told_failsafe:
+            return
+        self._has_told_failsafe = state.is_failsafe
+        if state.is_failsafe:
+            self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
+        elif state.armed:
+            self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
 
     def _heartbeat(self) -> Message:
         self._announced = self._shown_state()

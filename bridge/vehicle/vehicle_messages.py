@@ -7,11 +7,13 @@ An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields
 import math
 from dataclasses import dataclass
 
+from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import Place, bearing_deg, distance_m, north_east_m
 from bridge.model.mission_progress import Progress
 from bridge.model.vehicle import (
     STALE_S,
+    Airspeed,
     Fix,
     FlightState,
     GlobalPosition,
@@ -32,22 +34,7 @@ from bridge.model.vehicle import (
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 
-#: MultiWii's MULTITYPE (Harakiri: mw.h) -> MAV_TYPE, by which ground stations choose their screens. Others are copters.
-_TYPES = {
-    1: messages.MAV_TYPE_TRICOPTER,
-    6: messages.MAV_TYPE_HEXAROTOR,
-    7: messages.MAV_TYPE_HEXAROTOR,
-    8: messages.MAV_TYPE_FIXED_WING,
-    10: messages.MAV_TYPE_HEXAROTOR,
-    11: messages.MAV_TYPE_OCTOROTOR,
-    12: messages.MAV_TYPE_OCTOROTOR,
-    13: messages.MAV_TYPE_OCTOROTOR,
-    14: messages.MAV_TYPE_FIXED_WING,
-    15: messages.MAV_TYPE_HELICOPTER,
-    16: messages.MAV_TYPE_HELICOPTER,
-    18: messages.MAV_TYPE_HEXAROTOR,
-}
-#: custom_mode of ArduCopter, and of ArduPlane for planes, which has no mode that holds only the altitude.
+#: custom_mode of ArduCopter; of ArduPlane, which has no mode that only holds the altitude; and of ArduRover.
 _COPTER_MODES = {
     FlightMode.STABILIZE: 0,
     FlightMode.ACRO: 1,
@@ -64,6 +51,16 @@ _PLANE_MODES = {
     FlightMode.LOITER: 12,
     FlightMode.RTL: 11,
 }
+#: Unless it navigates, a rover is steered by hand: MANUAL.
+_ROVER_MODES = {
+    FlightMode.STABILIZE: 0,
+    FlightMode.ACRO: 0,
+    FlightMode.ALT_HOLD: 0,
+    FlightMode.AUTO: 10,
+    FlightMode.LOITER: 5,
+    FlightMode.RTL: 11,
+}
+_MODES = {Airframe.FIXED_WING: _PLANE_MODES, Airframe.ROVER: _ROVER_MODES, Airframe.BOAT: _ROVER_MODES}
 _SENSORS = {
     Sensor.ACCELEROMETER: messages.MAV_SYS_STATUS_SENSOR_3D_ACCEL,
     Sensor.BAROMETER: messages.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE,
@@ -119,16 +116,9 @@ class Moment:
         return home.altitude_m + height.height_m
 
 
-def vehicle_type(vehicle: Vehicle) -> int:
-    """MAV_TYPE; an unknown mixer is a quadrocopter's."""
-    kind: int = _TYPES.get(vehicle.mixer or 0, messages.MAV_TYPE_QUADROTOR)
-    return kind
-
-
 def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
-    """HEARTBEAT: an ArduPilot copter (or plane). A lost craft stays armed and in its mode, as last heard."""
-    kind = vehicle_type(vehicle)
-    modes = _PLANE_MODES if kind == messages.MAV_TYPE_FIXED_WING else _COPTER_MODES
+    """HEARTBEAT: an ArduPilot copter, plane or rover. A lost craft stays armed and in its mode, as last heard."""
+    modes = _MODES.get(vehicle.airframe, _COPTER_MODES)
     state = vehicle.last(FlightState)
     mode = state.mode if state is not None and isinstance(state.mode, FlightMode) else FlightMode.STABILIZE
     base_mode = messages.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | messages.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -138,14 +128,14 @@ def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
         base_mode |= messages.MAV_MODE_FLAG_GUIDED_ENABLED
     if vehicle.armed:
         base_mode |= messages.MAV_MODE_FLAG_SAFETY_ARMED
-    if is_lost:
+    if is_lost or (state is not None and state.is_failsafe):
         status = messages.MAV_STATE_CRITICAL
     elif state is None:
         status = messages.MAV_STATE_UNINIT
     else:
         status = messages.MAV_STATE_ACTIVE if vehicle.armed else messages.MAV_STATE_STANDBY
     return messages.MAVLink_heartbeat_message(
-        kind, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, modes[mode], status, 3
+        vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, modes[mode], status, 3
     )
 
 
@@ -230,18 +220,19 @@ def global_position_int(at: Moment) -> Message | None:
 def vfr_hud(at: Moment) -> Message | None:
     """VFR_HUD: m/s, degrees, percent of the throttle stick, metres above mean sea level.
 
-    A copter's airspeed is the ground speed, as with ArduCopter; a plane's is unknown. Heading and throttle have no
-    "unknown", so both must be there.
+    Without a sensor a copter's airspeed is the ground speed, as with ArduCopter; a plane's is unknown. Heading and
+    throttle have no "unknown", so both must be there.
     """
     orientation, sticks = at.fresh(Orientation), at.fresh(Sticks)
     if orientation is None or sticks is None or len(sticks.channels_us) <= _THROTTLE:
         return None
     position, height, gps = at.fresh(GlobalPosition), at.fresh(Height), at.fresh(GpsFix)
     speed = math.nan if gps is None or gps.ground_speed_m_s is None else gps.ground_speed_m_s
-    has_wings = vehicle_type(at.vehicle) == messages.MAV_TYPE_FIXED_WING
+    air = at.fresh(Airspeed)
+    airspeed = math.nan if at.vehicle.airframe is Airframe.FIXED_WING else speed
     throttle = (sticks.channels_us[_THROTTLE] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
     return messages.MAVLink_vfr_hud_message(
-        math.nan if has_wings else speed,
+        airspeed if air is None else air.airspeed_m_s,
         speed,
         round(orientation.heading_deg) % 360,
         min(max(throttle, 0), 100),

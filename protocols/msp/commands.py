@@ -26,6 +26,7 @@ class Msp(IntEnum):
     NAV_STATUS = 121
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
+    INAV_AIR_SPEED = 0x2009
 
 
 class MspAction(IntEnum):

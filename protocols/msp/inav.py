@@ -8,9 +8,11 @@ from protocols.msp.telemetry import Sensor
 
 _STATUS = struct.Struct("<HHHHBI")
 _ANALOG = struct.Struct("<BHHIIIIBH")
+_AIRSPEED = struct.Struct("<I")
 _PLATFORM_AT = 3
 STATUS_SIZE = 22
 ANALOG_SIZE = _ANALOG.size
+AIRSPEED_SIZE = _AIRSPEED.size
 MIXER = 0x2010
 MIXER_SIZE = 9
 _ALL_SENSORS = sum(Sensor)
@@ -82,6 +84,11 @@ def decode_inav_analog(payload: bytes) -> InavAnalog | None:
         return None
     battery, volts, current, _, drawn, _, _, percent, rssi = _ANALOG.unpack_from(payload)
     return InavAnalog(battery >> 4, volts, current, drawn, min(percent, 100), rssi)
+
+
+def decode_airspeed(payload: bytes) -> int | None:
+    """Decode MSP2_INAV_AIR_SPEED: cm/s; None if it is too short."""
+    return int(_AIRSPEED.unpack_from(payload)[0]) if len(payload) >= _AIRSPEED.size else None
 
 
 def decode_platform(payload: bytes) -> int | None:

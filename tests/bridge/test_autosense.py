@@ -11,6 +11,7 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.autosense import SPEEDS
 from bridge.fc.states.base import Closed
 from bridge.fc.states.searching import Searching
+from bridge.model.airframe import Airframe
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import request
 from simulator.options import Faults, SimOptions, TelemetryProtocol
@@ -244,7 +245,7 @@ def test_bit_errors_delay_the_finding_and_never_change_the_finding(rate: float, 
         found += 1
         assert controller.profile is kind
         assert controller.arm_bit == 5
-        assert controller.mixer == 3
+        assert controller.airframe is Airframe.QUADROTOR
         if controller.info is not None:
             assert (controller.info.capacity, controller.info.wp_radius_cm) == (146, 200)
     assert found >= 110

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What only INAV tells: version, platform, load, battery, and what keeps it from arming."""
+"""What only INAV tells: version, platform, load, battery, airspeed, failsafe, and what keeps it from arming."""
 
+import math
 from typing import Any
 
 import pytest
@@ -21,6 +22,7 @@ from tests.support.world import GroundStation, World
 
 PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
 RC_LINK, NOT_LEVEL = 1 << 18, 1 << 8
+FAILSAFE = 1 << BOXES["9.1.0"].index(27)
 
 
 def introduced(**options: Any) -> tuple[MspBoard, World, GroundStation]:
@@ -37,10 +39,54 @@ def test_its_version_is_known(version: str) -> None:
     assert world.bridge.session.controller.version == tuple(map(int, version.split(".")))
 
 
-@pytest.mark.parametrize(("platform", "kind"), [(0, messages.MAV_TYPE_QUADROTOR), (1, messages.MAV_TYPE_FIXED_WING)])
-def test_an_aeroplane_is_shown_as_one(platform: int, kind: int) -> None:
-    _, _, station = introduced(platform=platform)
-    assert {heartbeat.type for heartbeat in station.said("HEARTBEAT")} == {kind}
+@pytest.mark.parametrize(
+    ("platform", "kind", "by_hand"),
+    [
+        (0, messages.MAV_TYPE_QUADROTOR, messages.COPTER_MODE_ACRO),
+        (1, messages.MAV_TYPE_FIXED_WING, messages.PLANE_MODE_ACRO),
+        (2, messages.MAV_TYPE_HELICOPTER, messages.COPTER_MODE_ACRO),
+        (3, messages.MAV_TYPE_TRICOPTER, messages.COPTER_MODE_ACRO),
+        (4, messages.MAV_TYPE_GROUND_ROVER, messages.ROVER_MODE_MANUAL),
+        (5, messages.MAV_TYPE_SURFACE_BOAT, messages.ROVER_MODE_MANUAL),
+    ],
+)
+def test_its_platform_is_shown(platform: int, kind: int, by_hand: int) -> None:
+    _, _, station = introduced(platform=platform, faults=Faults(boxes=0))
+    last = station.said("HEARTBEAT")[-1]
+    assert (last.type, last.custom_mode) == (kind, by_hand)
+
+
+@pytest.mark.parametrize(("platform", "pitot"), [(1, True), (1, False), (0, True), (0, False)])
+def test_airspeed_is_measured_or_not_told(platform: int, pitot: bool) -> None:
+    """Ground speed is no airspeed for a wing; for a copter ArduCopter shows it as one."""
+    _, world, station = introduced(platform=platform, pitot=pitot, faults=Faults(boxes=0))
+    world.run(2)
+    hud = station.said("VFR_HUD")[-1]
+    if pitot:
+        assert hud.airspeed == pytest.approx(hud.groundspeed + 2.5)
+    elif platform == 1:
+        assert math.isnan(hud.airspeed)
+    else:
+        assert hud.airspeed == hud.groundspeed
+
+
+def test_a_failsafe_is_critical_at_once_and_only_in_flight() -> None:
+    board, world, station = introduced(faults=Faults(boxes=FAILSAFE))
+    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_STANDBY
+    board.faults.armed, board.faults.boxes = True, 0
+    world.run(2)
+    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
+    board.faults.boxes = FAILSAFE
+    world.run(0.5)
+    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_CRITICAL
+    board.faults.boxes = 0
+    world.run(0.5)
+    assert station.said("HEARTBEAT")[-1].system_status == messages.MAV_STATE_ACTIVE
+    texts = [(text.severity, text.text) for text in station.said("STATUSTEXT") if "ailsafe" in text.text]
+    assert texts == [
+        (messages.MAV_SEVERITY_CRITICAL, "Failsafe: the flight controller has taken over"),
+        (messages.MAV_SEVERITY_NOTICE, "Failsafe ended: the pilot has control"),
+    ]
 
 
 def test_load_battery_percentage_and_cells_are_the_boards_own() -> None:

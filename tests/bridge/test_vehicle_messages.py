@@ -12,6 +12,7 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.inav import profile as inav
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController
+from bridge.model.airframe import Airframe, airframe
 from bridge.model.vehicle import Vehicle
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.telemetry_table import TELEMETRY
@@ -20,7 +21,7 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame
 
 HARAKIRI_BOXES = ("ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO")
-HARAKIRI = FlightController(harakiri.UNPATCHED, "Harakiri", 3, HARAKIRI_BOXES)
+HARAKIRI = FlightController(harakiri.UNPATCHED, "Harakiri", Airframe.QUADROTOR, HARAKIRI_BOXES)
 INAV = FlightController(
     inav.PROFILE, "INAV", None, ("ARM", "ANGLE", "HORIZON", "NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
 )
@@ -211,7 +212,6 @@ def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
 @pytest.mark.parametrize(
     ("mixer", "mav_type"),
     [
-        (None, 2),
         (1, 15),
         (2, 2),
         (3, 2),
@@ -227,33 +227,50 @@ def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
         (99, 2),
     ],
 )
-def test_the_mixer_makes_the_type(mixer: int | None, mav_type: int) -> None:
-    assert make.heartbeat(Vehicle(mixer=mixer), is_lost=False).type == mav_type
+def test_the_mixer_makes_the_type(mixer: int, mav_type: int) -> None:
+    assert make.heartbeat(Vehicle(airframe(mixer)), is_lost=False).type == mav_type
 
 
 @pytest.mark.parametrize(
-    ("who", "active", "copter_mode", "plane_mode"),
+    ("who", "active", "copter_mode", "plane_mode", "rover_mode"),
     [
-        (INAV, ("ANGLE",), 0, 2),
-        (INAV, ("ANGLE", "NAV ALTHOLD"), 2, 6),
-        (INAV, ("NAV ALTHOLD", "NAV POSHOLD"), 5, 12),
-        (INAV, ("NAV RTH", "NAV POSHOLD"), 6, 11),
-        (INAV, ("NAV WP", "ANGLE"), 3, 10),
-        (INAV, (), 1, 4),
-        (BETAFLIGHT, ("GPS RESCUE", "ANGLE"), 6, 11),
-        (BETAFLIGHT, ("ALT HOLD",), 2, 6),
-        (HARAKIRI, ("BARO", "ANGLE"), 2, 6),
+        (INAV, ("ANGLE",), 0, 2, 0),
+        (INAV, ("ANGLE", "NAV ALTHOLD"), 2, 6, 0),
+        (INAV, ("NAV ALTHOLD", "NAV POSHOLD"), 5, 12, 5),
+        (INAV, ("NAV RTH", "NAV POSHOLD"), 6, 11, 11),
+        (INAV, ("NAV WP", "ANGLE"), 3, 10, 10),
+        (INAV, (), 1, 4, 0),
+        (BETAFLIGHT, ("GPS RESCUE", "ANGLE"), 6, 11, 11),
+        (BETAFLIGHT, ("ALT HOLD",), 2, 6, 0),
+        (HARAKIRI, ("BARO", "ANGLE"), 2, 6, 0),
     ],
 )
 def test_modes_by_their_boxes(
-    who: FlightController, active: tuple[str, ...], copter_mode: int, plane_mode: int
+    who: FlightController, active: tuple[str, ...], copter_mode: int, plane_mode: int, rover_mode: int
 ) -> None:
     flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
-    for mixer, mode in ((3, copter_mode), (8, plane_mode)):
-        state = told(Vehicle(mixer=mixer), who, STATUS=status(flags=flags))
+    copter, plane, rover, boat = Airframe.QUADROTOR, Airframe.FIXED_WING, Airframe.ROVER, Airframe.BOAT
+    for kind, mode in ((copter, copter_mode), (plane, plane_mode), (rover, rover_mode), (boat, rover_mode)):
+        state = told(Vehicle(kind), who, STATUS=status(flags=flags))
         beat = make.heartbeat(state, is_lost=False)
         assert (beat.custom_mode, beat.system_status) == (mode, m.MAV_STATE_ACTIVE)
         assert state.armed
+
+
+def test_inavs_gyro_makes_the_rates() -> None:
+    """About the axes forward, left and up; MAVLink's are forward, right and down."""
+    turning = struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0)
+    for who, rates in ((INAV, (90, -45, 30)), (HARAKIRI, (math.nan, math.nan, math.nan))):
+        state = told(Vehicle(), who, RAW_IMU=turning, ATTITUDE=attitude())
+        for message in (made(make.attitude(at(state))), made(make.attitude_quaternion(at(state)))):
+            told_rates = tuple(math.degrees(getattr(message, f"{axis}speed")) for axis in ("roll", "pitch", "yaw"))
+            assert told_rates == pytest.approx(rates, nan_ok=True)
+
+
+def test_rates_are_unknown_once_the_gyro_is_silent() -> None:
+    state = told(Vehicle(), INAV, RAW_IMU=struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0))
+    hear_msp(state, MspFrame(Direction.REPLY, Msp.ATTITUDE, attitude()), INAV, 1.0)
+    assert math.isnan(made(make.attitude(make.Moment(state, 1.0, 0))).rollspeed)
 
 
 def test_home_in_flight_is_lower_than_the_craft() -> None:

@@ -67,7 +67,7 @@ def test_channels(version: str, receiver: bool, channels: int) -> None:
 
 def test_msp_v2_beside_v1() -> None:
     """Lengths as INAV 9.1.0's own simulator has them."""
-    bench = MspBench("inav", MspOptions(platform=1), Faults(arming_blockers=1 << 18))
+    bench = MspBench("inav", MspOptions(platform=1, pitot=True), Faults(arming_blockers=1 << 18))
     lengths = {command: len(bench.payload_v2(command)) for command in (0x2000, 0x2002, 0x2009, 0x2010)}
     assert lengths == {0x2000: 22, 0x2002: 24, 0x2009: 4, 0x2010: 9}
     assert struct.unpack_from("<I", bench.payload_v2(0x2000), 9)[0] == 1 << 18

@@ -16,6 +16,7 @@ from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleVi
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
+from bridge.model.airframe import airframe
 from bridge.model.refusal import ARMED, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
@@ -51,7 +52,7 @@ def _recognise_unpatched(board: Interview) -> Conversation[FlightController | No
     boxes = yield from board.box_names()
     if _OWN_BOX not in boxes:
         return None
-    return FlightController(UNPATCHED, UNPATCHED.name, ident.mixer, boxes, version=ident.release)
+    return FlightController(UNPATCHED, UNPATCHED.name, airframe(ident.mixer), boxes, version=ident.release)
 
 
 def _msp_store(controller: FlightController, _view: VehicleView, settings: RuleSettings) -> AnyFcMissionStore:

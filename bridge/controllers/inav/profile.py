@@ -11,16 +11,28 @@ from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleVi
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
+from bridge.model.airframe import Airframe
+from bridge.model.flight_mode import FAILSAFE_BOX
 from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
 from protocols.msp.nav import INFO_SIZE, Nav, decode_info
 
 _VARIANT = "INAV"
 #: The constant bytes of GETINFO.
 _LASTING_INFO = 2
-#: MultiWii's MULTITYPE for INAV's platform types: aeroplane, helicopter, tricopter. Others are shown as a quadrocopter.
-_MIXERS = {1: 14, 2: 15, 3: 1}
+#: By INAV's platform type, from 0.
+_AIRFRAMES = (
+    Airframe.QUADROTOR,
+    Airframe.FIXED_WING,
+    Airframe.HELICOPTER,
+    Airframe.TRICOPTER,
+    Airframe.ROVER,
+    Airframe.BOAT,
+)
 #: Permanent box ids (docs/inav.md) of the modes that make a flight mode.
-_BOXES = {0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "NAV ALTHOLD", 10: "NAV RTH", 11: "NAV POSHOLD", 28: "NAV WP"}
+_BOXES = {
+    0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "NAV ALTHOLD", 10: "NAV RTH", 11: "NAV POSHOLD", 27: FAILSAFE_BOX,
+    28: "NAV WP",
+}  # fmt: skip
 
 
 def _recognise(board: Interview) -> Conversation[FlightController | None]:
@@ -34,9 +46,9 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
         # Without an arm flag nothing would prevent a mission write in flight.
         return None
     platform = decode_platform((yield from board.ask(MIXER, MIXER_SIZE)).payload)
-    mixer = _MIXERS.get(platform or 0)
+    airframe = _AIRFRAMES[platform] if platform is not None and platform < len(_AIRFRAMES) else None
     version = yield from board.version()
-    return FlightController(PROFILE, PROFILE.name, mixer, boxes, capacity=info.capacity, version=version)
+    return FlightController(PROFILE, PROFILE.name, airframe, boxes, capacity=info.capacity, version=version)
 
 
 def _rules(settings: RuleSettings) -> NavRules:
@@ -56,6 +68,7 @@ PROFILE = Profile(
     polls=(*POLLS, NAV_POLL, *INAV_POLLS),
     decoders=INAV_DECODERS,
     has_2d_fix=True,
+    has_gyro_deg_s=True,
     accepts_any_byte=True,
     open_store=_open_store,
     check_kind="inav",

@@ -1,19 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's own readings: load, arming blockers, battery percentage and cells (MSP v2)."""
+"""INAV's own readings: load, arming blockers, battery percentage and cells, airspeed (MSP v2)."""
 
 from collections.abc import Mapping
 
 from bridge.fc.profile import Decoder, FlightController
 from bridge.line.poll_schedule import Poll
-from bridge.model.vehicle import Health, Power, Readiness, Signal, Source, Vehicle
+from bridge.model.vehicle import Airspeed, Health, Power, Readiness, Signal, Source, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request
-from protocols.msp.inav import ANALOG_SIZE, STATUS_SIZE, decode_inav_analog, decode_inav_status
+from protocols.msp.inav import (
+    AIRSPEED_SIZE,
+    ANALOG_SIZE,
+    STATUS_SIZE,
+    decode_airspeed,
+    decode_inav_analog,
+    decode_inav_status,
+)
 from protocols.msp.telemetry import decode_analog
 
 INAV_POLLS = (
     Poll(Msp.INAV_STATUS, request(Msp.INAV_STATUS), STATUS_SIZE, 1.0),
     Poll(Msp.INAV_ANALOG, request(Msp.INAV_ANALOG), ANALOG_SIZE, 1.0),
+    Poll(Msp.INAV_AIR_SPEED, request(Msp.INAV_AIR_SPEED), AIRSPEED_SIZE, 0.5),
+    # For ATTITUDE's rates.
+    Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, 0.1),
 )
 _MAX_RSSI = 1023
 
@@ -51,8 +61,16 @@ def _hear_signal(vehicle: Vehicle, rssi: int, now: float) -> None:
         vehicle.hear(Signal(now, Source.MSP, min(rssi / _MAX_RSSI, 1.0)))
 
 
+def _airspeed(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    """INAV_AIR_SPEED. Without a pitot tube it is always 0."""
+    speed_cms = decode_airspeed(payload)
+    if speed_cms is not None and (speed_cms or vehicle.last(Airspeed) is not None):
+        vehicle.hear(Airspeed(now, Source.MSP, speed_cms / 100))
+
+
 INAV_DECODERS: Mapping[int, Decoder] = {
     Msp.INAV_STATUS: _inav_status,
     Msp.INAV_ANALOG: _inav_analog,
+    Msp.INAV_AIR_SPEED: _airspeed,
     Msp.ANALOG: _analog,
 }

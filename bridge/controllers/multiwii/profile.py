@@ -10,6 +10,7 @@ from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleVi
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
+from bridge.model.airframe import airframe
 from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
 
 #: IDENT's capability bit of boards that fly missions.
@@ -27,7 +28,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     capacity = decode_nav_config((yield from board.ask(Nav.NAV_CONFIG, NAV_CONFIG_SIZE)).payload)
     if not capacity:
         return None
-    return FlightController(PROFILE, name, ident.mixer, boxes, capacity=capacity, version=ident.release)
+    return FlightController(PROFILE, name, airframe(ident.mixer), boxes, capacity=capacity, version=ident.release)
 
 
 def _rules(settings: RuleSettings) -> NavRules:

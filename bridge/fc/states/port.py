@@ -35,5 +35,5 @@ class Port:
         """Begin a new vehicle if this is another board than before."""
         if controller.profile.family != self.family:
             self.family, self.vehicle = controller.profile.family, Vehicle()
-        self.vehicle.mixer = controller.mixer or self.vehicle.mixer
+        self.vehicle.airframe = controller.airframe or self.vehicle.airframe
         self.vehicle.version = controller.version or self.vehicle.version
