@@ -58,6 +58,8 @@ class _Upload:
     count: int
     incident: str
     state: State
+    #: Its ground station has announced another list while this one was written.
+    is_superseded: bool = False
 
 
 class MissionUploads:
@@ -227,6 +229,8 @@ class MissionUploads:
     def _begin(self, station: Station, count: int, now: float) -> None:
         self._answers.forget(station)
         self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
+        for older in self._uploads:
+            older.is_superseded |= older.station == station
         upload = _Upload(station, count, self._incidents.begin("upload"), Waiting(now))
         self._uploads.append(upload)
         refusal = self._missions.armed_refusal() or self._limit(station)
@@ -354,7 +358,9 @@ class MissionUploads:
             delivery = Delivery(NO_LINK.ack, NO_LINK.text, None)
         self._tell(upload.station, verdict, delivery)
         if upload in self._uploads:
-            self._answer(upload, delivery.ack, now)
+            if not upload.is_superseded:
+                # Its ground station would take this ack for the new list's.
+                self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
         accepted = delivery.ack is MissionResult.ACCEPTED
         facts = {"mission": delivery.number, "ack": delivery.ack.name, "detail": delivery.text}
