@@ -3,7 +3,7 @@
 
 A conversation is a generator. It yields one effect at a time and is sent the effect's answer;
 `bridge.line.runner.Runner` carries the effects out. When the line goes down, LinkLost is raised at the `yield`;
-when the bridge is about to end, its subclass Stopped.
+when the bridge is about to end, its subclass Stopped; when a limit is over, its subclass OutOfTime.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -22,6 +22,18 @@ class LinkLost(Exception):
 
 class Stopped(LinkLost):
     """The bridge is stopping. The line is still up, to leave the flight controller in a clean state."""
+
+
+class OutOfTime(LinkLost):
+    """The conversation's limit is over. The line is still up, to leave the flight controller in a clean state."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Raise OutOfTime after `seconds`, plus the time of `size` bytes on the line. It replaces an earlier limit."""
+
+    seconds: float
+    size: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +105,7 @@ class FindPending:
     """Look up missions that were never concluded. Answer: a sequence of PendingMission."""
 
 
-Effect = Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | FindPending
+Effect = Limit | Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | FindPending
 StoreEffect = Save | Conclude | Recall | FindPending
 
 _MAX_ASKS = 5
@@ -146,6 +158,11 @@ def ask_surely(
 
 def _lasting(reply: MspFrame, size: int | None) -> MspFrame:
     return replace(reply, payload=reply.payload[:size])
+
+
+def limit(seconds: float, size: int = 0) -> Conversation[None]:
+    """From now on, take no longer than this; see Limit."""
+    yield Limit(seconds, size)
 
 
 def pause(seconds: float) -> Conversation[None]:

@@ -76,14 +76,15 @@ class MspLink:
     """
 
     def __init__(self, baud: int | None, now: float, owed: int = 0) -> None:
-        self._byte_s = 10 / baud if baud else 0.0
+        #: A byte's time on the line.
+        self.byte_s = 10 / baud if baud else 0.0
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
         self._parser = MspParser()
         self._waiting: deque[Send] = deque()
         self._sent: list[_Request] = []  # in the order in which they went out
         if owed:
             self._sent.append(
-                _Request(_NO_COMMAND, owed, now, now + owed * self._byte_s, exclusive=False, awaited=False)
+                _Request(_NO_COMMAND, owed, now, now + owed * self.byte_s, exclusive=False, awaited=False)
             )
         self._output: list[bytes] = []
         self._line_free_at = now
@@ -234,7 +235,7 @@ class MspLink:
             self._risky = message.command
             self._follow_up_at = self._line_free_at + _FOLLOW_UP_S
         timeout_s = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
-        reply_time = (self.outstanding_bytes + message.reply_size) * self._byte_s
+        reply_time = (self.outstanding_bytes + message.reply_size) * self.byte_s
         deadline = self._line_free_at + reply_time + timeout_s
         self._sent.append(
             _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)
@@ -243,7 +244,7 @@ class MspLink:
     def _resync(self, now: float) -> None:
         self._resync_due = False
         self._write(RESYNC, now)
-        reply_time = (self.outstanding_bytes + RESYNC_REPLY_SIZE) * self._byte_s
+        reply_time = (self.outstanding_bytes + RESYNC_REPLY_SIZE) * self.byte_s
         deadline = self._line_free_at + reply_time + MIN_TIMEOUT_S
         self._sent += [
             _Request(command, _REPLY_SIZES[command], self._line_free_at, deadline, exclusive=True)
@@ -251,7 +252,7 @@ class MspLink:
         ]
 
     def _write(self, data: bytes, now: float) -> None:
-        self._line_free_at = max(self._line_free_at, now) + len(data) * self._byte_s
+        self._line_free_at = max(self._line_free_at, now) + len(data) * self.byte_s
         self._follow_up_at = None
         self._output.append(data)
 

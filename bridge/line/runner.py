@@ -4,12 +4,15 @@
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Generic, TypeVar
 
 from bridge.line.conversation import (
     Await,
     Conversation,
+    Limit,
     LinkLost,
+    OutOfTime,
     Pause,
     Receive,
     Send,
@@ -53,6 +56,7 @@ class Runner:
         self._current: Task[Any] | None = None
         self._awaited: Receive | Await | Pause | StoreEffect | None = None
         self._deadline: float | None = None
+        self._limit = inf
         self._busy = False
 
     @property
@@ -111,6 +115,10 @@ class Runner:
 
     def tick(self, now: float) -> None:
         """End a wait that has timed out."""
+        if now >= self._limit and isinstance(self._awaited, Receive | Await | Pause):
+            self._limit = inf
+            self._advance(OutOfTime("the limit is over"), now)
+            return
         if self._deadline is None or now < self._deadline:
             return
         if isinstance(self._awaited, Receive) and self._link is not None:
@@ -123,6 +131,8 @@ class Runner:
 
     def next_deadline(self) -> float | None:
         """The time of the next `tick`; None while nothing is awaited."""
+        if isinstance(self._awaited, Receive | Await | Pause) and self._deadline is not None:
+            return min(self._deadline, self._limit)
         return self._deadline
 
     def _begin_next(self, now: float) -> None:
@@ -148,7 +158,10 @@ class Runner:
             while True:
                 effect = conversation.throw(answer) if isinstance(answer, LinkLost) else conversation.send(answer)
                 answer = None
-                if isinstance(effect, Send | Receive) and self._link is None:
+                if isinstance(effect, Limit):
+                    line_s = effect.size * self._link.byte_s if self._link is not None else 0.0
+                    self._limit = now + effect.seconds + line_s
+                elif isinstance(effect, Send | Receive) and self._link is None:
                     answer = LinkLost("there is no link to the flight controller")
                 elif isinstance(effect, Transmit | Await) and self._mavlink is None:
                     answer = LinkLost("the flight controller no longer speaks MAVLink")
@@ -182,8 +195,10 @@ class Runner:
             result = lost
         except Exception:
             self._current = None
+            self._limit = inf
             raise
         self._current = None
+        self._limit = inf
         # Conversations started by on_done run after it has returned, so that it sees a consistent state.
         self._busy = True
         try:

@@ -6,12 +6,23 @@ from contextlib import suppress
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.records import items_from_records
-from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, ask_surely, pause, receive, send
+from bridge.line.conversation import (
+    Conversation,
+    LinkLost,
+    OutOfTime,
+    Stopped,
+    ask,
+    ask_surely,
+    limit,
+    pause,
+    receive,
+    send,
+)
 from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
-from protocols.msp.frame import MspFrame
+from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
 from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Status, Stored
 from protocols.wp_record import RECORD_SIZE, WpRecord
 
@@ -23,10 +34,14 @@ _BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
 #: Restarts of one push (after a reset, damaged line, flash error) before it is given up.
 _MAX_BEGINS = 3
-#: Unanswered requests in a row after which the flight controller counts as gone.
-_MAX_SILENCE = 5
-#: Losses in a row without progress, silent or reported, before giving up.
+#: A push may take this long, and twice the time of its bytes on the line: Mission Planner waits 4.9 s for the ack.
+_PUSH_S = 3.5
+#: How long to ask what has become of a COMMIT without a reply.
+_LOOK_S = 0.6
+#: Losses in a row without progress before a push is given up.
 _MAX_VAIN = 20
+#: Unanswered requests in a row after which a list cannot be read.
+_MAX_SILENCE = 5
 
 #: The failure reported if this status ends the last attempt; any other becomes "the line is bad".
 _FAILURES = {
@@ -89,6 +104,7 @@ class HarakiriMissions(OneMission):
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER
         self._may_be_stored = False
+        yield from limit(_PUSH_S, 2 * len(records) * (RECORD_SIZE + FRAME_OVERHEAD))
         try:
             for _ in range(_MAX_BEGINS):
                 try:
@@ -106,8 +122,8 @@ class HarakiriMissions(OneMission):
                     yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1)
         except _GiveUp as end:
             failure = end.failure
-        except Stopped:
-            failure = PushFailure.STOPPED
+        except (Stopped, OutOfTime) as end:
+            failure = PushFailure.STOPPED if isinstance(end, Stopped) else PushFailure.OUT_OF_TIME
             with suppress(LinkLost):
                 yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1, tries=1)
         except LinkLost:
@@ -196,7 +212,7 @@ class HarakiriMissions(OneMission):
         stale = 0  # chunks sent after a lost one, which will be answered all the same
         committing = False
         most = self.info.chunk_records
-        silence = vain = 0
+        vain = 0
         while True:
             while sent < total and len(in_flight) + stale < self.info.chunk_window:
                 chunk = ext.encode_chunk(records, sent, most)
@@ -210,9 +226,6 @@ class HarakiriMissions(OneMission):
                 committing = self._may_be_stored = True
             reply = yield from receive(MissionCommand.CHUNK, MissionCommand.COMMIT)
             answer = None if reply is None else _decode_answer(reply)
-            silence = silence + 1 if answer is None else 0
-            if silence > _MAX_SILENCE:
-                raise _GiveUp(PushFailure.NO_ANSWER)
             behind = 0
             if isinstance(answer, Progress):
                 if answer.status not in (Status.OK, Status.SEQUENCE):
@@ -247,6 +260,7 @@ class HarakiriMissions(OneMission):
     def _look_what_is_stored(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
         """Ask if COMMIT succeeded after all; only silence leaves it uncertain."""
         try:
+            yield from limit(_LOOK_S)
             info = yield from self._read_info()
         except LinkLost:
             info = None
