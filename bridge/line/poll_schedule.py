@@ -153,6 +153,11 @@ class PollSchedule:
         slot = self._slots.get(command)
         return None if slot is None or slot.interval_s == inf else slot.interval_s
 
+    def line_interval_s(self, command: Msp) -> float:
+        """The interval that the line's speed allows, seconds; 0 if it is not polled."""
+        slot = self._slots.get(command)
+        return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, self._line_scale)
+
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
         """Send the requests that are due, as far as the link has room."""
         self._look_at(link, beside_missions)

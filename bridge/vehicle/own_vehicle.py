@@ -17,7 +17,7 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import MissionProgress
-from bridge.model.vehicle import FlightState, Home, MissionLeg, Readiness, Reading
+from bridge.model.vehicle import STALE_S, FlightState, Home, MissionLeg, Readiness, Reading
 from bridge.vehicle import vehicle_messages
 from bridge.vehicle.telemetry_table import EXTENDED_STATUS, EXTRA3, NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
@@ -79,6 +79,7 @@ class OwnVehicle:
         self._told_blockers: tuple[str, ...] = ()
         self._has_told_failsafe = False
         self._also_wanted: Mapping[type[Reading], float] = {}
+        self._stale_s: Mapping[type[Reading], float] = {}
         #: New ground stations, and the end of their faster heartbeats.
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
@@ -210,7 +211,9 @@ class OwnVehicle:
             if interval_s < inf:
                 self._rows.setdefault(row.reading, []).append(row)
             _want(wanted, row.reading, interval_s)
-        self._session.polls.want(wanted)
+        polls = self._session.polls
+        polls.want(wanted)
+        self._stale_s = {} if self._session.link is None else _stale_ages_s(polls.line_interval_s)
 
     def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:
         if msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
@@ -222,7 +225,7 @@ class OwnVehicle:
 
     def _moment(self) -> Moment:
         boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
-        return Moment(self._session.vehicle, self._now, boot_ms)
+        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s)
 
     def _shown_state(self) -> _ShownState:
         state = self._session.vehicle.last(FlightState)
@@ -302,6 +305,12 @@ class OwnVehicle:
         if message is not None:
             self._announced_home = home
             self._ground.broadcast(message)
+
+
+def _stale_ages_s(line_interval_s: Callable[[Msp], float]) -> dict[type[Reading], float]:
+    """The ages from which readings are stale, where the line is too slow to ask for them every second."""
+    intervals = {reading: line_interval_s(poll) for reading, poll in POLL_FOR.items()}
+    return {reading: STALE_S * interval_s for reading, interval_s in intervals.items() if interval_s > 1.0}
 
 
 def _want(wanted: dict[Msp, float], reading: type[Reading], interval_s: float) -> None:

@@ -5,7 +5,8 @@ An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FlightMode
@@ -26,6 +27,7 @@ from bridge.model.vehicle import (
     Power,
     Pressure,
     Readiness,
+    Reading,
     ReadingT,
     Signal,
     Sticks,
@@ -97,16 +99,16 @@ _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The vehicle at one moment. now: monotonic s. stale_s: the age from which a reading counts as unknown."""
+    """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S."""
 
     vehicle: Vehicle
     now: float
     boot_ms: int
-    stale_s: float = STALE_S
+    stale_s: Mapping[type[Reading], float] = field(default_factory=dict)
 
     def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
-        return self.vehicle.fresh(kind, self.now, self.stale_s)
+        return self.vehicle.fresh(kind, self.now, self.stale_s.get(kind, STALE_S))
 
     def altitude_m(self, position: GlobalPosition) -> float:
         """Above mean sea level: home's altitude plus the height above it, finer than the GPS's whole metres."""

@@ -311,3 +311,21 @@ def test_noise_on_the_line_is_no_telemetry_and_no_flight_controller() -> None:
     }
     world.power_on()
     world.wait_ready()
+
+
+@pytest.mark.parametrize("baud", [1200, 2400, 4800])
+def test_on_a_slow_line_messages_of_several_readings_come_as_often_as_their_polls(baud: int) -> None:
+    world, station = flown(10, baud=baud)
+    station.heard.clear()
+    world.run(40)
+    fixes = len(station.said("GPS_RAW_INT"))
+    assert fixes >= 40 / 5 - 2
+    for name in ("GLOBAL_POSITION_INT", "VFR_HUD"):
+        assert fixes - 2 <= len(station.said(name)) <= fixes + 2, name
+    # What it no longer hears is unknown all the same, as soon as the loss is noticed.
+    world.faults.hang = True
+    beat(station)
+    world.run(12)
+    station.heard.clear()
+    world.run(5)
+    assert {status.voltage_battery for status in station.said("SYS_STATUS")} == {65535}
