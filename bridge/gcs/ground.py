@@ -231,10 +231,12 @@ class Ground:
         self.multicast(pack(message), self.everyone())
 
     def multicast(self, packed: Packed, peers: Iterable[Peer]) -> None:
-        """Send a packed message to several peers."""
+        """Send a packed message to several peers that can read it."""
         frame = None
         is_logged = not self.is_recording
         for peer in peers:
+            if packed.is_v2_only and self._version(peer) == 1:
+                continue
             frame = self._writer(peer).frame(packed, self._version(peer))
             if peer is RECORDER:
                 is_logged = True

@@ -112,7 +112,7 @@ class CommandService:
     def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:
         match command:
             case messages.MAV_CMD_REQUEST_MESSAGE:
-                return self._send_once(station, _msgid(params[0]))
+                return self._send_once(station, _msgid(params[0]), max(_msgid(params[1]), 0))
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:
                 return self._set_interval(station, _msgid(params[0]), params[1])
             case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
@@ -127,8 +127,8 @@ class CommandService:
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
 
-    def _send_once(self, station: Station, msgid: int) -> CommandResult:
-        match self._vehicle.send_once(station, msgid):
+    def _send_once(self, station: Station, msgid: int, index: int = 0) -> CommandResult:
+        match self._vehicle.send_once(station, msgid, index):
             case None:
                 return CommandResult.UNSUPPORTED
             case False:

@@ -23,6 +23,7 @@ from bridge.vehicle.telemetry_table import EXTENDED_STATUS, EXTRA3, NO_STREAM, T
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.mode_messages import AVAILABLE_MODES, CURRENT_MODE
 from protocols.msp.commands import Msp
 
 #: The interval of HEARTBEAT, and the clock for messages without a reading.
@@ -36,6 +37,7 @@ _TICKED_STREAMS = {
     messages.MAVLINK_MSG_ID_MISSION_CURRENT: EXTENDED_STATUS,
     messages.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: EXTENDED_STATUS,
     messages.MAVLINK_MSG_ID_SYSTEM_TIME: EXTRA3,
+    CURRENT_MODE: EXTENDED_STATUS,
 }
 _STREAMS = {row.msgid: row.stream for row in TELEMETRY} | _TICKED_STREAMS
 _READINGS = {row.msgid: row.reading for row in TELEMETRY}
@@ -74,6 +76,7 @@ class OwnVehicle:
             messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
             messages.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._nav_controller_output,
             messages.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
+            CURRENT_MODE: lambda: vehicle_messages.current_mode(self._moment()),
         }
         self._announced_home: Home | None = None
         self._told_blockers: tuple[str, ...] = ()
@@ -164,16 +167,20 @@ class OwnVehicle:
 
     # Requests of ground stations.
 
-    def send_once(self, station: Station, msgid: int) -> bool | None:
-        """Send one message to a ground station; False: its values are unknown, None: no such message."""
-        makers = self._makers(msgid)
-        sent = False
-        for make in makers:
-            message = make()
-            if message is not None:
-                self._ground.to(station, message)
-                sent = True
-        return sent if makers else None
+    def send_once(self, station: Station, msgid: int, index: int = 0) -> bool | None:
+        """Send one message to a ground station; False: its values are unknown, None: no such message.
+
+        `index`: of the flight mode in AVAILABLE_MODES, from 1; 0: all.
+        """
+        if msgid == AVAILABLE_MODES:
+            modes = vehicle_messages.available_modes(self._session.vehicle)
+            made: list[Message | None] = modes[index - 1 : index] if index else modes
+        else:
+            made = [make() for make in self._makers(msgid)]
+        known = [message for message in made if message is not None]
+        for message in known:
+            self._ground.to(station, message)
+        return bool(known) if made else None
 
     def set_interval(self, peer: Peer, msgid: int, interval_s: float | None) -> bool:
         """Set the interval of a message for one ground station; None: the default. False: no such message."""

@@ -33,6 +33,7 @@ from bridge.model.vehicle import (
     Sticks,
     Vehicle,
 )
+from protocols.mavlink import mode_messages
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 
@@ -63,6 +64,15 @@ _ROVER_MODES = {
     FlightMode.RTL: 11,
 }
 _MODES = {Airframe.FIXED_WING: _PLANE_MODES, Airframe.ROVER: _ROVER_MODES, Airframe.BOAT: _ROVER_MODES}
+_ROVER_NAMES = {0: "MANUAL"}
+_OTHER_NAMES = {Airframe.ROVER: _ROVER_NAMES, Airframe.BOAT: _ROVER_NAMES}
+_NON_STANDARD: int = messages.MAV_STANDARD_MODE_NON_STANDARD
+_STANDARD_MODES: Mapping[FlightMode, int] = {
+    FlightMode.ALT_HOLD: messages.MAV_STANDARD_MODE_ALTITUDE_HOLD,
+    FlightMode.AUTO: messages.MAV_STANDARD_MODE_MISSION,
+    FlightMode.LOITER: messages.MAV_STANDARD_MODE_POSITION_HOLD,
+    FlightMode.RTL: messages.MAV_STANDARD_MODE_SAFE_RECOVERY,
+}
 _SENSORS = {
     Sensor.ACCELEROMETER: messages.MAV_SYS_STATUS_SENSOR_3D_ACCEL,
     Sensor.BAROMETER: messages.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE,
@@ -120,7 +130,6 @@ class Moment:
 
 def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
     """HEARTBEAT: an ArduPilot copter, plane or rover. A lost craft stays armed and in its mode, as last heard."""
-    modes = _MODES.get(vehicle.airframe, _COPTER_MODES)
     state = vehicle.last(FlightState)
     mode = state.mode if state is not None and isinstance(state.mode, FlightMode) else FlightMode.STABILIZE
     base_mode = messages.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | messages.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -137,8 +146,38 @@ def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
     else:
         status = messages.MAV_STATE_ACTIVE if vehicle.armed else messages.MAV_STATE_STANDBY
     return messages.MAVLink_heartbeat_message(
-        vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, modes[mode], status, 3
+        vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, _modes(vehicle)[mode], status, 3
     )
+
+
+def current_mode(at: Moment) -> Message | None:
+    """CURRENT_MODE."""
+    state = at.fresh(FlightState)
+    if state is None or not isinstance(state.mode, FlightMode):
+        return None
+    return mode_messages.current_mode(_modes(at.vehicle)[state.mode], _standard_mode(at.vehicle, state.mode))
+
+
+def available_modes(vehicle: Vehicle) -> list[Message]:
+    """AVAILABLE_MODES, one message per mode."""
+    # A rover has one custom mode for several of ours.
+    modes = {custom_mode: mode for mode, custom_mode in _modes(vehicle).items()}
+    names = {custom_mode: mode.name for custom_mode, mode in modes.items()} | _OTHER_NAMES.get(vehicle.airframe, {})
+    return [
+        mode_messages.available_mode(index, len(modes), custom_mode, _standard_mode(vehicle, mode), names[custom_mode])
+        for index, (custom_mode, mode) in enumerate(modes.items(), 1)
+    ]
+
+
+def _modes(vehicle: Vehicle) -> Mapping[FlightMode, int]:
+    return _MODES.get(vehicle.airframe, _COPTER_MODES)
+
+
+def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
+    """MAV_STANDARD_MODE; only copters hold an altitude or a position."""
+    if mode not in (FlightMode.AUTO, FlightMode.RTL) and vehicle.airframe in _MODES:
+        return _NON_STANDARD
+    return _STANDARD_MODES.get(mode, _NON_STANDARD)
 
 
 def autopilot_version(vehicle: Vehicle) -> Message:

@@ -14,6 +14,7 @@ from protocols.mavlink.message_table import MESSAGE_FORMATS
 _SIGNED = 0x01
 _HEADER_V2 = 10
 _CRC_SIZE = 2
+_LAST_V1_ID = 255
 
 
 class MavlinkDecoder:
@@ -40,6 +41,11 @@ class Packed:
     payload_v1: bytes
     payload_v2: bytes
 
+    @property
+    def is_v2_only(self) -> bool:
+        """True if its id does not fit MAVLink 1."""
+        return self.msgid > _LAST_V1_ID
+
 
 _PACKER = messages.MAVLink(None)
 
@@ -48,8 +54,10 @@ def pack(message: Message) -> Packed:
     """Pack a message's fields, once for all who get it.
 
     MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them all the
-    same.
+    same. A message that the dialect lacks is packed already.
     """
+    if isinstance(message, Packed):
+        return message
     msgid: int = message.get_msgId()
     whole_size: int = message.unpacker.size
     payload = bytes(message.pack(_PACKER)[_HEADER_V2:-_CRC_SIZE])
@@ -71,10 +79,10 @@ class FrameWriter:
         self._seq = 0
 
     def frame(self, packed: Packed, version: int) -> bytes:
-        """Return a whole frame of MAVLink 1 or 2."""
+        """Return a whole frame of MAVLink 1 or 2; of 2 if MAVLink 1 has no such message."""
         seq, self._seq = self._seq, (self._seq + 1) & 0xFF
         msgid = packed.msgid
-        if version == 1:
+        if version == 1 and not packed.is_v2_only:
             magic, payload = MAGIC_V1, packed.payload_v1
             body = bytes((len(payload), seq, self._sysid, self._compid, msgid)) + payload
         else:
@@ -85,4 +93,4 @@ class FrameWriter:
             )
         crc = mcrf4xx(body + bytes((CRC_EXTRA[msgid],)))
         frame = bytes((magic,)) + body + crc.to_bytes(_CRC_SIZE, "little")
-        return frame if self._sign is None or version == 1 else frame + self._sign(frame)
+        return frame if self._sign is None or magic == MAGIC_V1 else frame + self._sign(frame)

@@ -8,6 +8,7 @@ import pytest
 
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.mode_messages import CURRENT_MODE
 from simulator.options import SimOptions, TelemetryProtocol
 from tests.support.world import GroundStation, World
 
@@ -23,7 +24,7 @@ class Log:
         """How many of each message were logged since the last call."""
         found = MavlinkSplitter().feed(b"".join(self.frames))
         self.frames.clear()
-        return Counter(m.mavlink_map[frame.msgid].msgname for frame in found)
+        return Counter(m.mavlink_map[frame.msgid].msgname for frame in found if frame.msgid != CURRENT_MODE)
 
 
 def logged(protocol: TelemetryProtocol) -> tuple[World, Log]:
