@@ -22,8 +22,8 @@ from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import ENVIRONMENT, NAZE_BRIDGE, ROOT, daemon, free_udp_port, wait_for
 from benchmarks.zenoh_programs import ALL_TELEMETRY, client, configuration, cpu_s, router_program
 from protocols.mission_file import write_qgc_wpl
+from service.settings.zenoh import DEFAULT_PREFIX
 from service.zenoh_link.keys import STATE, full
-from service.zenoh_link.settings import DEFAULT_PREFIX
 
 _FEW, _MANY = 5, 50
 _STATES = full(DEFAULT_PREFIX, "*", STATE.suffix)

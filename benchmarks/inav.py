@@ -26,9 +26,9 @@ from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.msp.frame import FRAME_OVERHEAD
 from protocols.msp.nav import WP_SIZE, NavRecord, encode_read_wp, encode_set_wp
-from service.daemon import Daemon
-from service.links.connection import FcAddress, GcsAddress, SerialFc, TcpFc
+from service.daemon.daemon import Daemon
 from service.settings import Settings
+from service.settings.addresses import FcAddress, GcsAddress, SerialFc, TcpFc
 
 _COUNT = 120
 _ROUNDS, _RUNS = 3, 5

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A push of 146 records at 115200 baud, compared with the time of its bare bytes at line rate.
 
-The daemon (service.daemon.Daemon with its own port, links and timers) runs on this process's event loop; the simulated
+The daemon (`Daemon`, with its own port, links and timers) runs on this process's event loop; the simulated
 Naze runs in another process behind a pseudo-terminal and keeps the pace of the UART both ways. The clock is read within
 the conversation: it starts when the push hands over its first CHUNK, just before that frame's first byte is written,
 and stops when the push has checked the reply to COMMIT, whose checksum the flight controller computed over its flash.
@@ -27,9 +27,9 @@ from bridge.missions.fc_mission_store import PushResult
 from bridge.missions.list_check import check_list
 from protocols.msp.mission import MissionCommand
 from protocols.wp_record import RECORD_SIZE, WpRecord
-from service.daemon import Daemon
-from service.links.connection import GcsAddress, SerialFc
+from service.daemon.daemon import Daemon
 from service.settings import Settings
+from service.settings.addresses import GcsAddress, SerialFc
 
 _BAUD = 115200
 _RUNS = 20

@@ -26,13 +26,13 @@ from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant
 from benchmarks.zenoh_programs import ALL_TELEMETRY, client, configuration, router_program
 from bridge.model.vehicle import Orientation
 from bridge.model.vehicle_groups import Group
-from service.daemon import Daemon
-from service.links.connection import parse_fc
+from service.daemon.daemon import Daemon
 from service.settings import Settings
-from service.zenoh_link.configuration import make_config
+from service.settings.addresses import parse_fc
+from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettings
+from service.settings.zenoh_config import make_config
 from service.zenoh_link.keys import TELEMETRY, full
 from service.zenoh_link.node import Node
-from service.zenoh_link.settings import DEFAULT_PREFIX, ZenohSettings
 
 _VEHICLE = "naze"
 _SETTLING_S = 2.0

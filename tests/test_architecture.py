@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Imports run one way: service -> bridge -> protocols, storage below service, and downwards inside bridge/."""
+"""Imports run one way: service -> bridge -> protocols, storage below service, and down inside bridge/ and service/."""
 
 import ast
 from collections.abc import Iterator
@@ -25,6 +25,21 @@ PACKAGES = {
     "bridge": {"protocols"},
     "service": {"bridge", "protocols", "simulator", "storage"},
 }
+#: Each package of service/ imports only from itself and from those before it.
+SERVICE = (
+    "machine",
+    "settings",
+    "links",
+    "recording",
+    "control",
+    "daemon",
+    "zenoh_link",
+    "web",
+    "cli",
+    "fleet",
+    "doctor",
+    "setup",
+)
 #: Owning a clock, a port or a loop is for service/ and simulator/.
 IMPURE = {"asyncio", "selectors", "serial", "socket", "subprocess", "threading", "time"}
 
@@ -55,6 +70,21 @@ def test_inside_the_bridge(package: str) -> None:
         if name.startswith("bridge.") and ".".join(name.split(".")[:2]) not in allowed
     ]
     assert found == []
+
+
+@pytest.mark.parametrize("package", SERVICE)
+def test_inside_the_service(package: str) -> None:
+    allowed = SERVICE[: SERVICE.index(package) + 1]
+    found = [
+        (file, name)
+        for file, name in imports(REPOSITORY / "service" / package)
+        if name.startswith("service.") and name.split(".")[1] not in allowed
+    ]
+    assert found == []
+
+
+def test_no_package_of_the_service_is_left_out() -> None:
+    assert {path.name for path in (REPOSITORY / "service").glob("[!_.]*")} == {*SERVICE}
 
 
 @pytest.mark.parametrize("package", ["protocols", "bridge"])

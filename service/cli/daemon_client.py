@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 import click
 
 from service.cli.printing import fail
-from service.control_client import ControlError, NoDaemonError, ask_daemon
-from service.links.connection import AddressError, parse_fc
-from service.mission_data import Json
+from service.control.client import ControlError, NoDaemonError, ask_daemon
+from service.control.mission_data import Json
 from service.settings import SettingsError, default_state_dir
+from service.settings.addresses import AddressError, parse_fc
 from storage.store_error import StoreError
 
 _INTERRUPTED = 130  # as shells have it: 128 + SIGINT
@@ -86,8 +86,8 @@ def ask_store(state_dir: Path | None, request: Json) -> Json:
 
 
 def _read_store(state_dir: Path | None, request: Json) -> Json:
-    from service.api import listed, shown
-    from service.store_worker import DATABASE_NAME
+    from service.daemon.api import listed, shown
+    from service.recording.store_worker import DATABASE_NAME
     from storage.mission_store import read_store
 
     folders = [state_dir] if state_dir is not None else [default_state_dir(), SERVICE_STATE]

@@ -18,12 +18,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from bridge.model.finding import Finding
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult
+from service.cli.mission_client import ClientError, connect
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import fail, print_table
-from service.control_client import ControlError, ask_daemon
-from service.mission_client import ClientError, connect
-from service.mission_data import Json, mission_items
+from service.control.client import ControlError, ask_daemon
+from service.control.mission_data import Json, mission_items
 
 #: A link to examples/ in the repository, a file in what is installed.
 _EXAMPLE = Path(__file__).parent / "naze-field.waypoints"

@@ -5,13 +5,13 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
-from service.api import MissionJobs
-from service.control_client import STATUS, ControlError
-from service.daemon import Daemon
-from service.links.connection import AutoFc, FcAddress
-from service.log_setup import set_up_logging
-from service.mission_data import Json
+from service.control.client import STATUS, ControlError
+from service.control.mission_data import Json
+from service.daemon.api import MissionJobs
+from service.daemon.daemon import Daemon
+from service.machine.log_setup import set_up_logging
 from service.settings import Settings, takeoff_limit_m
+from service.settings.addresses import AutoFc, FcAddress
 
 #: An unknown speed is found within 8 s.
 _SEARCH_PATIENCE_S = 12.0

@@ -13,7 +13,7 @@ from service.cli.daemon_client import ask, ask_with_progress, bridge_options
 from service.cli.mission_source import load_mission, save_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import fail, print_json, print_table
-from service.mission_data import Json, mission_items
+from service.control.mission_data import Json, mission_items
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _NO_SPACE = "MAV_MISSION_NO_SPACE"

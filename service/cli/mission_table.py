@@ -11,7 +11,7 @@ from rich.text import Text
 from bridge.model.finding import DROPPED, Finding
 from protocols.mavlink.command_name import command_name
 from protocols.mission_item import MissionItem
-from service.mission_data import Json, mission_items
+from service.control.mission_data import Json, mission_items
 
 _CHANGED = "yellow"
 _DROPPED = "red"

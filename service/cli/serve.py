@@ -7,19 +7,19 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.api import ControlServer
 from service.cli.printing import fail
-from service.control_client import ControlError
-from service.control_socket import socket_of_daemon
-from service.daemon import Daemon
-from service.lifecycle import run_until_signal
+from service.control.client import ControlError
+from service.control.socket_path import socket_of_daemon
+from service.daemon.api import ControlServer
+from service.daemon.daemon import Daemon
+from service.daemon.lifecycle import run_until_signal
 from service.links.gcs_links import LinkError
-from service.log_setup import set_up_logging
-from service.notify import Notifier
+from service.machine.log_setup import set_up_logging
+from service.machine.notify import Notifier
 from service.recording.uart_recorder import UartFileError
 from service.settings import Settings
-from service.web.settings import WebSettings
-from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
+from service.settings.web import WebSettings
+from service.settings.zenoh import ZenohSettings, ZenohSettingsError
 from storage.state_lock import StateLock, StateUnusableError
 from storage.store_error import StoreError
 

@@ -8,9 +8,9 @@ import click
 
 from service.cli.daemon_client import ask, bridge_options
 from service.cli.printing import print_json
-from service.control_client import STATUS
-from service.host import Host
-from service.mission_data import Json
+from service.control.client import STATUS
+from service.control.mission_data import Json
+from service.machine.host import Host
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 

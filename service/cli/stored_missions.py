@@ -14,7 +14,7 @@ from service.cli.daemon_client import ask_store, ask_with_progress, bridge_optio
 from service.cli.mission_commands import show_delivery
 from service.cli.mission_table import difference_table, mission_table
 from service.cli.printing import print_json, print_table
-from service.mission_data import MOST, Json, mission_items
+from service.control.mission_data import MOST, Json, mission_items
 from service.web.comparison import difference
 
 _NUMBER = click.IntRange(1, MOST)

@@ -11,10 +11,10 @@ import click
 
 from service.cli.daemon_client import SERVICE_STATE
 from service.cli.printing import print_json
-from service.control_client import STATUS, ControlError, ask_daemon
+from service.control.client import STATUS, ControlError, ask_daemon
+from service.control.mission_data import Json
 from service.doctor.checked import Checked, Grade
-from service.host import Host
-from service.mission_data import Json
+from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG
 from storage.store_error import StoreError

@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from service.control.mission_data import Json
 from service.doctor.checked import Checked, Grade
 from service.doctor.flight_controller import check_flight_controller
 from service.doctor.machine import check_clock, check_database, check_disk, check_versions
@@ -22,10 +23,9 @@ from service.doctor.port import (
     holder_of_port,
 )
 from service.doctor.zenoh import check_zenoh
-from service.host import Host
-from service.links.connection import AutoFc, FcAddress
-from service.mission_data import Json
+from service.machine.host import Host
 from service.settings import Settings
+from service.settings.addresses import AutoFc, FcAddress
 
 _ON_PORT = (check_port, check_permission, check_console, check_holder)
 

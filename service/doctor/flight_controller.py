@@ -4,10 +4,10 @@
 from collections.abc import Callable
 
 from bridge.fc.states.base import Closed
-from service.control_client import ControlError
+from service.control.client import ControlError
+from service.control.mission_data import Json
 from service.doctor.checked import Checked, note, ok, problem
-from service.links.connection import FcAddress
-from service.mission_data import Json
+from service.settings.addresses import FcAddress
 
 _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"
 

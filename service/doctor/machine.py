@@ -12,9 +12,9 @@ from importlib import metadata
 from pathlib import Path
 
 from service.doctor.checked import Checked, note, ok, problem
-from service.host import Host
-from service.store_worker import DATABASE_NAME
-from service.version import version
+from service.machine.host import Host
+from service.machine.version import version
+from service.recording.store_worker import DATABASE_NAME
 
 _SYNCED = "/run/systemd/timesync/synchronized"
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")

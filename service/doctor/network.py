@@ -5,9 +5,9 @@ import re
 from collections.abc import Sequence
 
 from service.doctor.checked import Checked, note, ok, problem
-from service.documentation import page
-from service.host import Host
-from service.links.connection import GcsAddress
+from service.machine.documentation import page
+from service.machine.host import Host
+from service.settings.addresses import GcsAddress
 
 #: In /proc/net/tcp, where only a listening socket has a port to itself.
 _LISTENS = "0A"

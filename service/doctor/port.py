@@ -7,11 +7,11 @@ import stat
 from pathlib import Path
 
 from service.doctor.checked import Checked, note, ok, problem
-from service.documentation import page
-from service.host import Host, Process
-from service.links.connection import FcAddress, SerialFc
 from service.links.serial_ports import serial_ports
-from service.raspberry_pi import pi_model
+from service.machine.documentation import page
+from service.machine.host import Host, Process
+from service.machine.raspberry_pi import pi_model
+from service.settings.addresses import FcAddress, SerialFc
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"

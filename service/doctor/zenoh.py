@@ -4,7 +4,7 @@
 from typing import Any
 
 from service.doctor.checked import Checked, note, ok, problem
-from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
+from service.settings.zenoh import ZenohSettings, ZenohSettingsError
 
 _CONNECT_TIMEOUT_MS = 2000
 
@@ -14,7 +14,7 @@ def check_zenoh(settings: ZenohSettings | None) -> Checked:
     if settings is None:
         return ok("zenoh", "off")
     # Importing zenoh takes half a second.
-    from service.zenoh_link.configuration import connect_endpoints, make_config, tls_files
+    from service.settings.zenoh_config import connect_endpoints, make_config, tls_files
     from service.zenoh_link.endpoint_trouble import endpoint_trouble
 
     try:

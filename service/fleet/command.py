@@ -132,8 +132,8 @@ def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
     """
     # Imported here, because the other commands do not need them.
     from service.fleet.gcs_relay import GcsRelay
-    from service.links.connection import parse_gcs
     from service.links.gcs_links import LinkError
+    from service.settings.addresses import parse_gcs
 
     try:
         addresses = [parse_gcs(address) for address in gcs]

@@ -8,7 +8,7 @@ import click
 from service.cli.printing import fail
 from service.fleet.enrolment import EnrolmentError, FleetFolder, Role
 from service.fleet.options import PATH
-from service.zenoh_link.settings import DEFAULT_PREFIX, ZenohSettingsError
+from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettingsError
 
 
 @click.command()

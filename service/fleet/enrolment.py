@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from service.mission_data import Json
-from service.zenoh_link.settings import check_name
+from service.control.mission_data import Json
+from service.settings.zenoh import check_name
 
 #: zenoh's own is 1,000. Each session costs the router some 100 kB.
 _MAX_SESSIONS = 12_000

@@ -12,7 +12,7 @@ import zenoh
 from service.cli.printing import fail
 from service.fleet.conditions import FIELDS, parse_condition
 from service.fleet.session import DEFAULT_ENDPOINT, FleetAddress, FleetError, open_session
-from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError, check_name
+from service.settings.zenoh import ZenohSettings, ZenohSettingsError, check_name
 
 #: The exit status of a shell after Ctrl-C.
 INTERRUPTED = 130

@@ -11,10 +11,10 @@ from rich.progress import Progress as Bars
 from rich.table import Table
 from rich.text import Text
 
+from service.control.mission_data import Json
 from service.fleet.payload import part, text, whole
 from service.fleet.push import FleetPush, PushState
 from service.fleet.trial import Trial
-from service.mission_data import Json
 
 
 @contextmanager

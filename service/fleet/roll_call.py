@@ -3,10 +3,10 @@
 
 import zenoh
 
+from service.control.mission_data import Json
 from service.fleet.payload import decode_reply
 from service.fleet.session import FleetError, ask
 from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, replier, vehicle_of
-from service.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, full
 
 #: After this a bridge without a reply is shown as not answering.

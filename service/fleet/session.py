@@ -15,7 +15,7 @@ from typing import Any
 import zenoh
 
 from service.fleet.refusal import refusal
-from service.zenoh_link.configuration import connect_endpoints, in_short, tls_files
+from service.settings.zenoh_config import connect_endpoints, in_short, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.keys import full
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import zenoh
 
+from service.control.mission_data import Json
 from service.fleet.payload import flag, number, text, whole
-from service.mission_data import Json
+from service.settings.zenoh import ZenohSettingsError, check_name
 from service.zenoh_link.keys import ALIVE, vehicle_in
-from service.zenoh_link.settings import ZenohSettingsError, check_name
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -11,8 +11,8 @@ from typing import Protocol
 
 import serial
 
-from service.links.connection import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 from service.links.port_holder import explain_port_error, find_console
+from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, family_of
 
 _TCP_TIMEOUT_S = 3.0
 

@@ -5,10 +5,10 @@ import errno
 from typing import Protocol
 
 from bridge.gcs.station import Peer
-from service.links.connection import UNKNOWN_HOST_HINT, GcsAddress
 from service.links.gcs_events import GcsEvents
 from service.links.tcp_link import TcpLink
 from service.links.udp_link import UdpLink
+from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress
 
 _HINTS = {
     errno.EADDRINUSE: "stop the program that has it, or name another port",

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Protocol
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from service.links.connection import family_of
 from service.links.gcs_links import LinkError
-from service.links.share_settings import ShareSettings
+from service.settings.addresses import family_of
+from service.settings.share import ShareSettings
 
 #: A client that does not read its replies is disconnected.
 _MAX_UNSENT = 65536

@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import serial
 import structlog
@@ -19,12 +20,11 @@ from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from service.host import Host
 from service.links.fc_device import PortError, open_serial
 from service.links.port_holder import find_user
 from service.links.port_memory import PortMemory
 from service.links.serial_ports import SerialPort, serial_ports
-from service.mission_data import Json
+from service.machine.host import Host
 
 #: Autosense visits all speeds within this time.
 _SEARCH_S = 9.0
@@ -88,7 +88,7 @@ class PortFinder:
         """Stop all timers."""
         self._leave()
 
-    # The methods of service.daemon.Follower.
+    # The methods of service.daemon.daemon.Follower.
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
         """Remember the port of a flight controller that was found; wait for a lost one to come back."""
@@ -109,7 +109,7 @@ class PortFinder:
     def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
         """Not used."""
 
-    def status(self) -> Json:
+    def status(self) -> dict[str, Any]:
         """The port in use, and the skipped ones with the reasons."""
         return {
             "port": None if self._present is None else self._present.path,

@@ -7,7 +7,7 @@ import re
 import termios
 from pathlib import Path
 
-from service.host import Host
+from service.machine.host import Host
 
 _LOGIN_PROGRAMS = ("agetty", "getty", "login")
 

@@ -3,8 +3,8 @@
 
 from dataclasses import dataclass
 
-from service.host import Host
-from service.raspberry_pi import pi_model
+from service.machine.host import Host
+from service.machine.raspberry_pi import pi_model
 
 #: USB chips of flight controllers, idVendor and idProduct. systemd/60-naze-bridge.rules has the same list (a test
 #: compares them). Other USB ports are opened only if they are named: opening one resets some 3D printers.

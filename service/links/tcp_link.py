@@ -9,9 +9,9 @@ from collections.abc import Callable
 import structlog
 
 from bridge.gcs.station import Peer
-from service.links.connection import GcsAddress, family_of
 from service.links.gcs_events import GcsEvents
 from service.links.send_queue import SendQueue
+from service.settings.addresses import GcsAddress, family_of
 
 _READ_SIZE = 2048
 #: The unread bytes of a stalled client, above which telemetry for it is dropped, oldest first.

@@ -7,8 +7,8 @@ import socket
 import structlog
 
 from bridge.gcs.station import Peer
-from service.links.connection import UNKNOWN_HOST_HINT, GcsAddress, family_of
 from service.links.gcs_events import GcsEvents
+from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, family_of
 
 _DATAGRAM_SIZE = 2048
 #: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from service.bounded_file import read_bounded
+from service.machine.bounded_file import read_bounded
 from service.settings.key import short
 from service.settings.key_lines import key_lines
 from service.settings.problem import Problem

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
-from service.links.connection import GcsAddress, SerialFc, parse_gcs, split_gcs
-from service.links.write_access import WriteAccess
+from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
 from service.settings.key import Unfit
 from service.settings.ports import port_conflicts
 from service.settings.problem import Problem, SettingsError
 from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 from service.settings.table import KEYS
-from service.web.settings import WebSettings
-from service.zenoh_link.settings import ZenohSettings, ZenohSettingsError
+from service.settings.web import WebSettings
+from service.settings.write_access import WriteAccess
+from service.settings.zenoh import ZenohSettings, ZenohSettingsError
 
 #: The environment variable for the configuration file itself.
 CONFIG_VARIABLE = "NAZE_BRIDGE_CONFIG"
@@ -159,7 +159,7 @@ def _table(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _zenoh_problems(zenoh: ZenohSettings, given: Mapping[str, Given]) -> Iterator[Problem]:
     """Problems that zenoh itself finds."""
-    from service.zenoh_link.configuration import make_config  # loads zenoh, 10 MB
+    from service.settings.zenoh_config import make_config  # loads zenoh, 10 MB
 
     try:
         make_config(zenoh)

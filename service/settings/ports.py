@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from itertools import combinations
 
-from service.links.connection import FcAddress, GcsAddress, TcpFc
-from service.web.settings import WebSettings
-from service.zenoh_link.settings import ZenohSettings
+from service.settings.addresses import FcAddress, GcsAddress, TcpFc
+from service.settings.web import WebSettings
+from service.settings.zenoh import ZenohSettings
 
 _TCP_LINKS = ("tcp", "tls", "ws")
 

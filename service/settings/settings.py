@@ -8,11 +8,11 @@ from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.model.autopilot import Autopilot
-from service.links.connection import AutoFc, FcAddress, GcsAddress
-from service.links.share_settings import ShareSettings
-from service.links.write_access import WriteAccess
-from service.web.settings import WebSettings
-from service.zenoh_link.settings import ZenohSettings
+from service.settings.addresses import AutoFc, FcAddress, GcsAddress
+from service.settings.share import ShareSettings
+from service.settings.web import WebSettings
+from service.settings.write_access import WriteAccess
+from service.settings.zenoh import ZenohSettings
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
 DEFAULT_SYSID = 1

@@ -5,9 +5,7 @@ from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.model.autopilot import Autopilot
-from service.links.connection import parse_fc
-from service.links.share_settings import parse_share
-from service.links.write_access import parse_link
+from service.settings.addresses import parse_fc
 from service.settings.key import Choice, FileName, Key, Several, Table, Text, Unfit, Whole, YesNo
 from service.settings.settings import (
     DEFAULT_GCS,
@@ -16,8 +14,10 @@ from service.settings.settings import (
     PassThroughRule,
     TlogLimits,
 )
-from service.web.settings import DEFAULT_LISTEN, parse_listen
-from service.zenoh_link.settings import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, Profile, check_name, check_rates
+from service.settings.share import parse_share
+from service.settings.web import DEFAULT_LISTEN, parse_listen
+from service.settings.write_access import parse_link
+from service.settings.zenoh import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, Profile, check_name, check_rates
 
 LOG_LEVELS = ("debug", "info", "warning", "error")
 _LIMITS = TlogLimits()

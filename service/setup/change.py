@@ -6,7 +6,7 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from service.host import Host
+from service.machine.host import Host
 from storage.atomic_file import replace_file
 
 

@@ -8,9 +8,9 @@ import click
 
 from service.cli.printing import fail
 from service.doctor.command import diagnose
-from service.host import Host
-from service.links.connection import AddressError, parse_fc
-from service.raspberry_pi import pi_model
+from service.machine.host import Host
+from service.machine.raspberry_pi import pi_model
+from service.settings.addresses import AddressError, parse_fc
 from service.setup.change import Machine, SetupError, Step, is_root
 from service.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, Answers, missing_steps
 from service.web.token import DEFAULT_NAME

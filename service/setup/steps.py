@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from service.host import Host
 from service.links.port_memory import PORTS_FILE
-from service.raspberry_pi import boot_file, pi_model
+from service.machine.host import Host
+from service.machine.raspberry_pi import boot_file, pi_model
 from service.setup.change import Change, Run, Step, WriteFile
 
 SETTINGS_FILE = "/etc/naze-bridge/conf.d/setup.toml"

@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.mission_data import to_json
+from service.control.mission_data import to_json
 from service.web.token import Token
 
 Handler = Callable[[Request], Awaitable[Response]]

@@ -30,22 +30,22 @@ from starlette.routing import Route
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionItem
-from service.api import MissionJobs
-from service.control_client import ControlError
-from service.daemon import Daemon
-from service.host import Host
-from service.metrics import CONTENT_TYPE, Metrics
-from service.mission_data import MOST, Json, mission_items, to_json
+from service.control.client import ControlError
+from service.control.mission_data import MOST, Json, mission_items, to_json
+from service.daemon.api import MissionJobs
+from service.daemon.daemon import Daemon
+from service.machine.host import Host
+from service.machine.version import version
 from service.recording.recorder import TLOG_FOLDER
-from service.version import version
+from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, Refused, check_token, guarded
 from service.web.comparison import difference, shown, stored_mission
 from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.kept_answers import KeptAnswers
 from service.web.link_history import LinkHistory
+from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles
 from service.web.mission_writer import MissionWriter
-from service.web.settings import WebSettings
 from service.web.telemetry_logs import TelemetryLogs
 from service.web.token import Token
 from storage.store_error import StoreError

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from bridge.model.finding import DROPPED, REJECTED, Finding
 from protocols.mavlink.command_name import command_name
 from protocols.mission_item import MissionItem
-from service.mission_data import Json, mission_items
+from service.control.mission_data import Json, mission_items
 
 #: No flight controller holds more; a longer list was rejected, and its end is of no interest.
 MAX_ROWS = 500

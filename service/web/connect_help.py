@@ -7,9 +7,9 @@ from io import BytesIO
 
 import segno
 
-from service.links.connection import GcsAddress
-from service.mission_data import Json
-from service.web.settings import ListenAddress
+from service.control.mission_data import Json
+from service.settings.addresses import GcsAddress
+from service.settings.web import ListenAddress
 
 #: Mission Planner's name for the connection type to choose.
 _CONNECTIONS = {"udpin": "UDPCl", "tcpin": "TCP"}

@@ -5,8 +5,8 @@ import asyncio
 from collections import deque
 from dataclasses import asdict, dataclass
 
-from service.daemon import Daemon
-from service.mission_data import Json
+from service.control.mission_data import Json
+from service.daemon.daemon import Daemon
 
 INTERVAL_S = 2.0
 _SAMPLES = 150  # five minutes

@@ -13,9 +13,9 @@ from starlette.requests import ClientDisconnect, Request
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.api import MissionJobs
-from service.control_client import ControlError
-from service.mission_data import Json
+from service.control.client import ControlError
+from service.control.mission_data import Json
+from service.daemon.api import MissionJobs
 from service.web.access import Refused
 from service.web.comparison import MAX_ROWS, checked_mission
 from service.web.mission_writer import MissionWriter

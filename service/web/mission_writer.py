@@ -6,8 +6,8 @@ import secrets
 from collections.abc import Awaitable, Callable
 from http import HTTPStatus
 
-from service.control_client import ControlError
-from service.mission_data import Json
+from service.control.client import ControlError
+from service.control.mission_data import Json
 from service.web.access import Refused
 from storage.store_error import StoreError
 

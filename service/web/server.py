@@ -13,11 +13,11 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-from service.daemon import Daemon
+from service.daemon.daemon import Daemon
+from service.settings.web import WebSettings
 from service.web.access import SafeHeaders, guarded, not_found
 from service.web.api import Api
 from service.web.connection_limit import BoundedConnection, Door
-from service.web.settings import WebSettings
 from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
 

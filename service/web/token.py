@@ -6,7 +6,7 @@ import secrets
 import stat
 from pathlib import Path
 
-from service.bounded_file import read_bounded
+from service.machine.bounded_file import read_bounded
 from storage.atomic_file import replace_file
 
 DEFAULT_NAME = "web-token"

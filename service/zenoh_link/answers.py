@@ -2,8 +2,8 @@
 """Queries about the vehicle: state, history, mission/current and mission/list."""
 
 from bridge.bridge import Bridge
-from service.api import MissionJobs
-from service.mission_data import Json
+from service.control.mission_data import Json
+from service.daemon.api import MissionJobs
 from service.zenoh_link import keys
 from service.zenoh_link.history import History
 from service.zenoh_link.payload import Payloads, strict

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.api import MissionJobs
-from service.mission_data import MOST, Json, to_json
+from service.control.mission_data import MOST, Json, to_json
+from service.daemon.api import MissionJobs
+from service.settings.zenoh import STATE_NAME
 from service.zenoh_link import keys
 from service.zenoh_link.queries import JSON_REPLY, Answerer, QueryRefused, Question
 from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates
-from service.zenoh_link.settings import STATE_NAME
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _PAYLOAD = "the query's payload"

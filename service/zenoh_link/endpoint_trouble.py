@@ -9,23 +9,14 @@ import re
 import socket
 import ssl
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+
+from service.settings.zenoh_config import TlsFiles
 
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P<port>\d+)(?:[?#].*)?")
 _CONNECT_TIMEOUT_S = 2.0
 #: How long to wait for a rejection of our own certificate: in TLS 1.3 it comes after the handshake.
 _REFUSAL_S = 0.5
 _OVER_TCP = ("tcp", "tls", "ws")
-
-
-@dataclass(frozen=True, slots=True)
-class TlsFiles:
-    """PEM files as zenoh's `transport/link/tls` names them; None: not given."""
-
-    root_ca_certificate: Path | None = None
-    connect_certificate: Path | None = None
-    connect_private_key: Path | None = None
 
 
 def endpoint_trouble(endpoints: Sequence[str], files: TlsFiles) -> str:

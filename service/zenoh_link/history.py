@@ -4,8 +4,8 @@
 import time
 from collections import deque
 
-from service.api import MissionJobs
-from service.mission_data import Json
+from service.control.mission_data import Json
+from service.daemon.api import MissionJobs
 from service.zenoh_link.time_range import parse_time_range
 
 #: About 150 bytes each; a busy day has some hundred.

@@ -6,7 +6,7 @@ import asyncio
 import zenoh
 
 from bridge.model.events import EventLog
-from service.mission_data import Json
+from service.control.mission_data import Json
 from service.zenoh_link.threads import post
 
 

@@ -20,13 +20,14 @@ from bridge.missions.mission_service import Delivery, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from service.api import MissionJobs
-from service.daemon import Daemon
-from service.mission_data import Json
+from service.control.mission_data import Json
+from service.daemon.api import MissionJobs
+from service.daemon.daemon import Daemon
+from service.settings.zenoh import ZenohSettings
+from service.settings.zenoh_config import connect_endpoints, make_config, tls_files
 from service.zenoh_link import keys, vehicle_data
 from service.zenoh_link.answers import Answers
 from service.zenoh_link.commands import CommandQueries
-from service.zenoh_link.configuration import connect_endpoints, make_config, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.history import History
 from service.zenoh_link.keys import ZenohKey
@@ -37,7 +38,6 @@ from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
 from service.zenoh_link.rates import SampleRates
 from service.zenoh_link.session import SessionThread
-from service.zenoh_link.settings import ZenohSettings
 from service.zenoh_link.vehicle_data import VehicleData
 
 _STATE_INTERVAL_S = 1.0
@@ -49,7 +49,7 @@ _log = structlog.get_logger()
 
 
 class Node:
-    """Implements service.daemon.Follower. Must be made on the daemon's event loop; ZenohSettingsError."""
+    """Implements service.daemon.daemon.Follower. Must be made on the daemon's event loop; ZenohSettingsError."""
 
     def __init__(self, settings: ZenohSettings, daemon: Daemon) -> None:
         self._settings = settings
@@ -90,7 +90,7 @@ class Node:
         await self._queries.close()
         self._thread.close()
 
-    # The methods of service.daemon.Follower.
+    # The methods of service.daemon.daemon.Follower.
 
     def telemetry(self, groups: frozenset[Group]) -> None:
         """Publish these groups."""

@@ -12,10 +12,10 @@ from typing import Any
 
 import zenoh
 
-from service.mission_data import Json
+from service.control.mission_data import Json
+from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link import compact
 from service.zenoh_link.keys import VERSION, ZenohKey
-from service.zenoh_link.settings import PayloadEncoding
 
 _write_any = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 _SCALARS = frozenset((float, int, str, bool, type(None)))

@@ -9,12 +9,12 @@ from functools import partial
 import structlog
 import zenoh
 
-from service.control_client import ControlError
-from service.mission_data import Json, to_json
+from service.control.client import ControlError
+from service.control.mission_data import Json, to_json
+from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link.keys import UPLOAD
 from service.zenoh_link.payload import encoding_of
 from service.zenoh_link.session import SessionThread
-from service.zenoh_link.settings import PayloadEncoding
 from service.zenoh_link.threads import post
 from storage.store_error import StoreError
 

@@ -9,7 +9,7 @@ from math import inf
 from typing import Any
 
 from bridge.model.vehicle_groups import Group
-from service.zenoh_link.settings import STATE_NAME, Profile
+from service.settings.zenoh import STATE_NAME, Profile
 
 #: The metered profile: each group every 5 s, the state every 15 s, and changes of the fields below at once.
 _METERED_S = 5.0

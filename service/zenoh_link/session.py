@@ -11,7 +11,7 @@ from collections.abc import Callable
 import structlog
 import zenoh
 
-from service.zenoh_link.configuration import in_short
+from service.settings.zenoh_config import in_short
 
 Job = Callable[[], None]
 

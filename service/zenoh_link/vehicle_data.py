@@ -8,7 +8,7 @@ from bridge.bridge import Bridge
 from bridge.missions.mission_service import Delivery, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
-from service.mission_data import Json
+from service.control.mission_data import Json
 from service.zenoh_link.payload import plain, strict
 from service.zenoh_link.time_source import time_source
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from service.links.connection import GcsAddress, SerialFc, SimulatedFc
 from service.settings import load_settings
+from service.settings.addresses import GcsAddress, SerialFc, SimulatedFc
 from tests.support.programs import run_naze_bridge
 
 

@@ -98,7 +98,7 @@ def test_a_full_disk_behind_the_log_stops_nothing(tmp_path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
     script = (
-        "import structlog; from service.log_setup import set_up_logging; set_up_logging('info');"
+        "import structlog; from service.machine.log_setup import set_up_logging; set_up_logging('info');"
         "[structlog.get_logger().warning('a.line') for _ in range(3)]; print('goes on')"
     )
     with (tmp_path / "log").open("w") as log:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.control_client import ControlError
+from service.control.client import ControlError
 from service.doctor.checked import Checked, Grade
 from service.doctor.examination import examine
 from service.doctor.flight_controller import check_flight_controller
@@ -17,9 +17,9 @@ from service.doctor.machine import check_clock, check_database, check_disk
 from service.doctor.network import check_ports, check_wifi
 from service.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
 from service.doctor.zenoh import check_zenoh
-from service.links.connection import AutoFc, SerialFc, parse_gcs
 from service.settings import Settings
-from service.zenoh_link.settings import ZenohSettings
+from service.settings.addresses import AutoFc, SerialFc, parse_gcs
+from service.settings.zenoh import ZenohSettings
 from storage.mission_store import open_store
 from tests.support.faulty_machine import PORT, FaultyMachine
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from structlog.testing import capture_logs
 
-from service import daemon as daemon_module
-from service.control_client import ControlError, ask_daemon
-from service.daemon import Daemon
-from service.links.connection import SerialFc, SimulatedFc
+from service.control.client import ControlError, ask_daemon
+from service.daemon import daemon as daemon_module
+from service.daemon.daemon import Daemon
 from service.settings import Settings
+from service.settings.addresses import SerialFc, SimulatedFc
 from tests.support.benches import Starter
 from tests.support.programs import NAZE_BRIDGE, REPOSITORY, free_port, until
 

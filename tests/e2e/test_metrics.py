@@ -7,10 +7,10 @@ from pathlib import Path
 from prometheus_client.parser import text_string_to_metric_families
 
 from protocols.mission_item import MissionResult
-from service.daemon import Daemon
-from service.links.connection import parse_fc, parse_gcs
-from service.metrics import Metrics
+from service.daemon.daemon import Daemon
 from service.settings import Settings
+from service.settings.addresses import parse_fc, parse_gcs
+from service.web.metrics import Metrics
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
 from tests.support.programs import free_port, until

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from protocols.mission_item import MissionResult
-from service.daemon import Daemon
-from service.lifecycle import run_until_signal
-from service.links.connection import parse_fc, parse_gcs
-from service.notify import Notifier
+from service.daemon.daemon import Daemon
+from service.daemon.lifecycle import run_until_signal
+from service.machine.notify import Notifier
 from service.settings import Settings
+from service.settings.addresses import parse_fc, parse_gcs
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import judge, plain_plan, records_of

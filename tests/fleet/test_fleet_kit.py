@@ -8,11 +8,11 @@ from pathlib import Path
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from service.daemon import Daemon
-from service.links.connection import parse_fc
-from service.metrics import Metrics
+from service.daemon.daemon import Daemon
 from service.settings import Settings
-from service.zenoh_link.settings import ZenohSettings
+from service.settings.addresses import parse_fc
+from service.settings.zenoh import ZenohSettings
+from service.web.metrics import Metrics
 from tests.support.programs import until
 from tests.support.zenoh_router import EXAMPLES
 

@@ -12,9 +12,9 @@ import pytest
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
-from service.links.connection import SerialFc
 from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
+from service.settings.addresses import SerialFc
 
 PATIENCE_S = 20.0
 _writer = FrameWriter(1, 1)

@@ -7,9 +7,9 @@ import socket
 import struct
 import termios
 
-from service.links.connection import TcpFc
 from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
+from service.settings.addresses import TcpFc
 
 PATIENCE_S = 20.0
 

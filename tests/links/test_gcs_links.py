@@ -13,9 +13,9 @@ from bridge.gcs.stations import displaced
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from service.links import tcp_link, udp_link
-from service.links.connection import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs, split_gcs
 from service.links.fc_device import device_opener
 from service.links.gcs_links import GcsLink, open_link
+from service.settings.addresses import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs, split_gcs
 
 FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
 

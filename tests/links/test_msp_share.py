@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from service.api import MissionJobs
 from service.cli.mission_source import load_mission
-from service.daemon import Daemon
-from service.links.connection import SimulatedFc, parse_gcs
-from service.links.share_settings import ShareSettings, parse_share
+from service.daemon.api import MissionJobs
+from service.daemon.daemon import Daemon
 from service.settings import Settings
+from service.settings.addresses import SimulatedFc, parse_gcs
+from service.settings.share import ShareSettings, parse_share
 
 PATIENCE_S = 20.0
 IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250

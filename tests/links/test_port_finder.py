@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from service.api import MissionJobs
-from service.daemon import Daemon
-from service.links.connection import AutoFc
+from service.daemon.api import MissionJobs
+from service.daemon.daemon import Daemon
 from service.links.serial_ports import USB_CHIPS, serial_ports
 from service.settings import Settings
+from service.settings.addresses import AutoFc
 from simulator.naze import SimulatedNaze
 from simulator.pty_link import PtyLink
 from tests.support.faulty_machine import FaultyMachine

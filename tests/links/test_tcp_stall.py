@@ -15,8 +15,8 @@ from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.links import tcp_link
-from service.links.connection import GcsAddress
 from service.links.tcp_link import TcpLink
+from service.settings.addresses import GcsAddress
 
 
 class Listener:

@@ -13,7 +13,7 @@ import sys, time
 now = [0.0]
 time.monotonic = lambda: now[0]
 import structlog
-from service.log_setup import set_up_logging
+from service.machine.log_setup import set_up_logging
 set_up_logging("info")
 log = structlog.get_logger()
 """

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.model.vehicle_groups import Attitude, Group, Status
+from service.settings.zenoh import Profile, ZenohSettingsError, check_rates
 from service.zenoh_link.rates import SampleRates
-from service.zenoh_link.settings import Profile, ZenohSettingsError, check_rates
 
 GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)
 

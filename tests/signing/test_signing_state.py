@@ -13,10 +13,10 @@ from structlog.testing import capture_logs
 
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, key_from_passphrase, ticks
-from service.links.connection import GcsAddress, SimulatedFc
 from service.links.signing_state import FILE_NAME, SigningState
-from service.links.write_access import WriteAccess
 from service.settings import Settings
+from service.settings.addresses import GcsAddress, SimulatedFc
+from service.settings.write_access import WriteAccess
 
 KEY = key_from_passphrase("a passphrase")
 NOON = 1_795_262_400.0

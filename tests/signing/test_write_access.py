@@ -8,9 +8,9 @@ import pytest
 
 from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
-from service.links.connection import AddressError
-from service.links.write_access import WriteAccess, read_key
 from service.settings import SettingsError, load_settings
+from service.settings.addresses import AddressError
+from service.settings.write_access import WriteAccess, read_key
 
 WORDS = "correct horse"
 LINK = "udpin:0.0.0.0:14550"

@@ -5,8 +5,8 @@ import grp
 import os
 from pathlib import Path
 
-from service.host import Host
-from service.links.connection import SerialFc
+from service.machine.host import Host
+from service.settings.addresses import SerialFc
 
 PORT = SerialFc("/dev/serial0", None)
 _HEADER = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n"

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
-from service.control_client import ControlError, ask_daemon
+from service.control.client import ControlError, ask_daemon
 from tests.support.plan import PlanRow
 
 #: Seconds after which something that must come at all counts as not coming.

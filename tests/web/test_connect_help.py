@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where to connect: in Mission Planner's words, and only addresses that other devices reach."""
 
-from service.links.connection import GcsAddress
+from service.settings.addresses import GcsAddress
+from service.settings.web import ListenAddress
 from service.web.connect_help import connect_help, page_urls, qr_code
-from service.web.settings import ListenAddress
 
 ANY = "0.0.0.0"  # noqa: S104
 OWN = ["10.42.0.1", "192.168.1.7"]

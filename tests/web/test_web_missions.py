@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The status page and missions: looked at, compared, restored by the rules of every other way."""
 
-from service.zenoh_link.settings import host_name
+from service.settings.zenoh import host_name
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from service.settings import SettingsError, load_settings
-from service.web.settings import ListenAddress, WebSettings
+from service.settings.web import ListenAddress, WebSettings
 from service.web.token import Token, TokenError
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Requests to a running daemon through its control socket (service.api).
+"""Requests to a running daemon through its control socket (service.daemon.api).
 
 Imports no part of the daemon, so that a command starts quickly.
 """
@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from service.control_socket import find_socket
-from service.mission_data import Json, to_json
+from service.control.mission_data import Json, to_json
+from service.control.socket_path import find_socket
 
 #: The request for how the bridge stands.
 STATUS = {"do": "status"}

@@ -2,14 +2,13 @@
 """The zenoh configuration of the daemon's session: the user's file, completed by the bridge's defaults."""
 
 import json
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
-from service.zenoh_link.endpoint_trouble import TlsFiles
-from service.zenoh_link.settings import I_KNOW, ZenohSettings, ZenohSettingsError
+from service.settings.zenoh import I_KNOW, ZenohSettings, ZenohSettingsError
 
 #: Commands up to 10 MB get a reply; larger ones are not assembled in a Pi's memory.
 _MAX_MESSAGE_BYTES = 16 << 20
@@ -30,6 +29,15 @@ _DEFAULTS: dict[str, object] = {
     "transport/shared_memory/enabled": False,
 }
 _AUTHENTICATED = ("tls/", "quic/")
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """PEM files as zenoh's `transport/link/tls` names them; None: not given."""
+
+    root_ca_certificate: Path | None = None
+    connect_certificate: Path | None = None
+    connect_private_key: Path | None = None
 
 
 def make_config(settings: ZenohSettings) -> zenoh.Config:

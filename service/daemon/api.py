@@ -23,11 +23,11 @@ from bridge.model.vehicle_groups import Group
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
-from service.control_client import ControlError
-from service.daemon import Daemon
-from service.mission_data import MOST, Json, mission_items, to_json, verdict_data, whole_number
-from service.store_worker import as_dicts
-from service.version import version
+from service.control.client import ControlError
+from service.control.mission_data import MOST, Json, mission_items, to_json, verdict_data, whole_number
+from service.daemon.daemon import Daemon
+from service.machine.version import version
+from service.recording.store_worker import as_dicts
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission, StoreError
 
 _MAX_LINE = 1 << 20

@@ -23,20 +23,20 @@ from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
 from protocols.msp.frame import MspFrame
-from service.documentation import page
-from service.host import Host
-from service.links.connection import AutoFc, FcAddress, GcsAddress, SerialFc
+from service.control.mission_data import Json
 from service.links.fc_device import device_opener
 from service.links.fc_port import MOVED_ON, STOPPED
 from service.links.gcs_links import GcsLink, LinkError, open_link
 from service.links.msp_share import Share, open_share
 from service.links.port_finder import PortFinder
 from service.links.signing_state import SigningState
-from service.mission_data import Json
+from service.machine.documentation import page
+from service.machine.host import Host
+from service.machine.version import version
 from service.recording.recorder import Recording
+from service.recording.store_worker import StoreWorker
 from service.settings import PassThroughRule, Settings
-from service.store_worker import StoreWorker
-from service.version import version
+from service.settings.addresses import AutoFc, FcAddress, GcsAddress, SerialFc
 
 #: The interval of messages about an unsuccessful search: a silent log looks like a hang.
 _SEARCH_REPORT_S = 60.0

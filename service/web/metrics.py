@@ -18,10 +18,10 @@ from bridge.missions.mission_service import Delivery
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from service.daemon import Daemon
-from service.mission_data import Json
-from service.version import version
-from service.zenoh_link.settings import host_name
+from service.control.mission_data import Json
+from service.daemon.daemon import Daemon
+from service.machine.version import version
+from service.settings.zenoh import host_name
 
 #: The content type of /metrics.
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
@@ -36,7 +36,7 @@ _ENDS = {"mission.upload_ended", "mission.refused", "mission.push_ended"}
 
 
 class Metrics:
-    """Collects from a daemon. Implements service.daemon.Follower."""
+    """Collects from a daemon. Implements service.daemon.daemon.Follower."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._registry = CollectorRegistry()

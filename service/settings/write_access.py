@@ -15,7 +15,7 @@ from pathlib import Path
 
 from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
-from service.links.connection import AddressError, GcsAddress, parse_gcs
+from service.settings.addresses import AddressError, GcsAddress, parse_gcs
 
 Network = IPv4Network | IPv6Network
 

@@ -15,7 +15,7 @@ import structlog
 from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission, PendingMission
 from protocols.mission_record import ListIdentity, identify, pack_records
-from service.disk_thread import DiskThread
+from service.machine.disk_thread import DiskThread
 from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store, store_in_memory
 
 DATABASE_NAME = "missions.db"

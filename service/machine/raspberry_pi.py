@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from service.host import Host
+from service.machine.host import Host
 
 #: Bookworm and later, and before.
 BOOT_FOLDERS = ("/boot/firmware", "/boot")

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.links.connection import parse_host_port
+from service.settings.addresses import parse_host_port
 
 DEFAULT_LISTEN = "127.0.0.1:8080"
 _FORMS = 'write "0.0.0.0:8080" for everybody on the network, "127.0.0.1:8080" for this machine alone'

@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 
 import structlog
 
-from service.daemon import Daemon
-from service.log_setup import set_log_level
-from service.notify import Notifier
+from service.daemon.daemon import Daemon
+from service.machine.log_setup import set_log_level
+from service.machine.notify import Notifier
 from service.settings import Settings, SettingsError
 
 _log = structlog.get_logger()

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.links.connection import AddressError, GcsAddress, parse_gcs
+from service.settings.addresses import AddressError, GcsAddress, parse_gcs
 
 _KEYS = ("address", "write")
 _KINDS = ("tcpin", "udpin")

@@ -8,9 +8,9 @@ from contextlib import suppress
 
 import structlog
 
-from service.daemon import Daemon
-from service.notify import Notifier
-from service.reload import reload_when_told
+from service.daemon.daemon import Daemon
+from service.daemon.reload import reload_when_told
+from service.machine.notify import Notifier
 from service.settings import Settings
 
 #: The interval of status updates, and the minimum number of watchdog messages per watchdog timeout.
