@@ -211,7 +211,11 @@ class MissionStore:
         """The `limit` newest missions, newest first."""
         return self._summaries("ORDER BY number DESC LIMIT ?", limit)
 
-    def _summaries(self, which: str, *values: int) -> builtins.list[MissionSummary]:
+    def received_between(self, start: float, end: float, limit: int) -> builtins.list[MissionSummary]:
+        """The `limit` newest missions received in a time range (unix seconds), newest first."""
+        return self._summaries("WHERE received_at BETWEEN ? AND ? ORDER BY number DESC LIMIT ?", start, end, limit)
+
+    def _summaries(self, which: str, *values: float) -> builtins.list[MissionSummary]:
         with explained(f"cannot list {self._path}"):
             rows = self._connection.execute(f"SELECT {SUMMARY}, crc32 FROM missions {which}", values).fetchall()  # noqa: S608 - constants
         return [MissionSummary(*row) if row_crc32(*row) == crc32 else _damaged_line(row[0]) for *row, crc32 in rows]

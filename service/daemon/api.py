@@ -166,6 +166,10 @@ class MissionJobs:
         """List the received missions, newest first."""
         return await self._daemon.store.ask(lambda store: listed(store, limit))
 
+    async def missions_between(self, start_s: float, end_s: float, limit: int) -> Json:
+        """List the missions received in a time range (unix seconds), newest first."""
+        return await self._daemon.store.ask(lambda store: _listed(store.received_between(start_s, end_s, limit)))
+
     async def show_mission(self, number: int) -> Json:
         """One mission with everything known about it."""
         return await self._daemon.store.ask(lambda store: shown(store, number))
@@ -178,11 +182,11 @@ class MissionJobs:
 
 def listed(store: MissionStore, limit: int) -> Json:
     """Answer the request "missions"."""
-    return {
-        "missions": [
-            _fields(mission) | {"checksum": _hex(mission.checksum)} for mission in store.list(min(limit, _MOST_LISTED))
-        ]
-    }
+    return _listed(store.list(min(limit, _MOST_LISTED)))
+
+
+def _listed(missions: list[MissionSummary]) -> Json:
+    return {"missions": [_fields(mission) | {"checksum": _hex(mission.checksum)} for mission in missions]}
 
 
 def shown(store: MissionStore, number: int) -> Json:

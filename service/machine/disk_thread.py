@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A thread for work on a disk that may hang: neither the event loop nor the end of the process waits for it."""
 
+import asyncio
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from queue import SimpleQueue
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class DiskThread:
@@ -17,6 +22,31 @@ class DiskThread:
     def submit(self, work: Callable[[], object]) -> None:
         """Queue a job, which must not raise."""
         self._work.put(work)
+
+    async def ask(self, work: Callable[[], T]) -> T:
+        """Queue a job that may raise, and return its result. Called on an event loop."""
+        loop = asyncio.get_running_loop()
+        answered: asyncio.Future[T] = loop.create_future()
+
+        def settle(answer: T | None, error: Exception | None) -> None:
+            if answered.done():
+                return
+            if error is None:
+                answered.set_result(answer)  # type: ignore[arg-type]
+            else:
+                answered.set_exception(error)
+
+        def run() -> None:
+            answer, failure = None, None
+            try:
+                answer = work()
+            except Exception as error:
+                failure = error
+            with suppress(RuntimeError):  # the loop is closed: a hanging disk answered too late
+                loop.call_soon_threadsafe(settle, answer, failure)
+
+        self.submit(run)
+        return await answered
 
     def close(self, timeout_s: float) -> bool:
         """Run the remaining jobs and end; False on timeout."""

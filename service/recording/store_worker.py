@@ -50,20 +50,13 @@ class StoreWorker:
 
     async def ask(self, question: Callable[[MissionStore], T]) -> T:
         """Run a query on the store; StoreError if there is no store or it fails."""
-        answered: asyncio.Future[T] = self._loop.create_future()
 
-        def work() -> None:
-            try:
-                if self._store is None:
-                    raise StoreError("no missions are stored here: start the daemon with --state-dir DIR")
-                answer = question(self._store)
-            except Exception as error:
-                self._tell(_fail, answered, error)
-            else:
-                self._tell(_answer, answered, answer)
+        def work() -> T:
+            if self._store is None:
+                raise StoreError("no missions are stored here: start the daemon with --state-dir DIR")
+            return question(self._store)
 
-        self._thread.submit(work)
-        return await answered
+        return await self._thread.ask(work)
 
     def close(self) -> None:
         """Finish the queued jobs, then close; gives up on a hanging disk."""
@@ -120,16 +113,6 @@ class StoreWorker:
         except StoreError as error:
             _log.error("store.failed", why=str(error))
         return nothing
-
-
-def _answer(future: asyncio.Future[T], answer: T) -> None:
-    if not future.done():
-        future.set_result(answer)
-
-
-def _fail(future: asyncio.Future[Any], error: Exception) -> None:
-    if not future.done():
-        future.set_exception(error)
 
 
 def _received(mission: ArrivedMission) -> ReceivedMission:

@@ -11,6 +11,7 @@ from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.vehicle_data import VehicleData, mission_current
 
 _USUAL_LIMIT, _MAX_LIMIT = 20, 200
+_MAX_POSITIONS = 1000
 _TIMES = ("received_at", "concluded_at")
 
 
@@ -36,21 +37,30 @@ class Answers:
         self._tell(question, keys.STATE, self._data.state())
 
     async def _past(self, question: Question) -> None:
-        found = await self._history.answer(question.parameter("_time"))
+        most = _whole_number(question, "positions", 0, _MAX_POSITIONS)
+        found = await self._history.answer(question.parameter("_time"), most)
         self._tell(question, keys.HISTORY, found | {"missions": [_with_units(each) for each in found["missions"]]})
 
     async def _mission_current(self, question: Question) -> None:
         self._tell(question, keys.MISSION_CURRENT, mission_current(self._bridge.missions.held))
 
     async def _mission_list(self, question: Question) -> None:
-        limit = question.parameter("limit") or str(_USUAL_LIMIT)
-        if not (limit.isascii() and limit.isdigit() and 0 < int(limit) <= _MAX_LIMIT):
-            raise QueryRefused(f"limit must be a whole number up to {_MAX_LIMIT}, as in mission/list?limit=5")
-        found = (await self._jobs.list_missions(int(limit)))["missions"]
+        limit = _whole_number(question, "limit", _USUAL_LIMIT, _MAX_LIMIT)
+        found = (await self._jobs.list_missions(limit))["missions"]
         self._tell(question, keys.MISSION_LIST, {"missions": [_with_units(mission) for mission in found]})
 
     def _tell(self, question: Question, key: keys.ZenohKey, body: Json) -> None:
         question.tell(self._payloads.answer(key, body), self._payloads.encoding(key))
+
+
+def _whole_number(question: Question, name: str, usual: int, most: int) -> int:
+    """A parameter's number, greater than 0; `usual` if it is not given."""
+    text = question.parameter(name)
+    if text is None:
+        return usual
+    if not (text.isascii() and text.isdigit() and 0 < int(text) <= most):
+        raise QueryRefused(f"{name} must be a whole number from 1 to {most}")
+    return int(text)
 
 
 def _with_units(mission: Json) -> Json:

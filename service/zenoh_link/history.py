@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Answers `history?_time=[..]`: events since the start of the daemon, and missions from the store."""
+"""Answers `history?_time=[..]`: events of this run, earlier ones from telemetry logs, and missions from the store."""
 
 import time
 from collections import deque
+from functools import partial
+from math import inf
+from pathlib import Path
 
 from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
+from service.machine.disk_thread import DiskThread
+from service.zenoh_link.logged_past import LoggedPast, read_logged_past
 from service.zenoh_link.time_range import parse_time_range
 
 #: About 150 bytes each; a busy day has some hundred.
@@ -15,21 +20,30 @@ _DEFAULT_RANGE = "[now(-1h)..]"
 
 
 class History:
-    """Keeps the newest events; missions are read from the store when they are asked for."""
+    """Keeps the newest events. Missions and telemetry logs (in the folder `logs`) are read on request."""
 
-    def __init__(self, jobs: MissionJobs) -> None:
+    def __init__(self, jobs: MissionJobs, logs: Path | None) -> None:
         self._jobs = jobs
+        self._logs = logs
+        self._disk = DiskThread("history")
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 
     def add(self, event: Json) -> None:
         """Keep an event's payload, including its envelope."""
         self._events.append(event)
 
-    async def answer(self, time_range: str | None) -> Json:
-        """The events and missions of a time range; StoreError, or ValueError about the range."""
+    async def answer(self, time_range: str | None, max_positions: int) -> Json:
+        """The events, missions and positions of a time range; StoreError, OSError, or ValueError about the range."""
         wanted = parse_time_range(time_range or _DEFAULT_RANGE, time.time())
-        missions = (await self._jobs.list_missions(_MAX_MISSIONS))["missions"]
-        return {
-            "events": [event for event in self._events if event["time_s"] in wanted],
-            "missions": [mission for mission in missions if mission["received_at"] in wanted],
+        found = await self._jobs.missions_between(wanted.start_s, wanted.end_s, _MAX_MISSIONS)
+        kept_from_s = self._events[0]["time_s"] if self._events else inf
+        logged = LoggedPast()
+        if self._logs is not None and (max_positions or wanted.start_s < kept_from_s):
+            logged = await self._disk.ask(partial(read_logged_past, self._logs, wanted, max_positions))
+        events = [event for event in logged.events if event["time_s"] < kept_from_s]
+        events += [event for event in self._events if event["time_s"] in wanted]
+        return found | {
+            "events": events[-_MAX_EVENTS:],
+            "positions": logged.positions,
+            "logs_from_s": logged.from_s,
         }

@@ -23,6 +23,7 @@ from bridge.model.vehicle_groups import Group
 from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
 from service.daemon.daemon import Daemon
+from service.recording.recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import connect_endpoints, make_config, tls_files
 from service.zenoh_link import keys, vehicle_data
@@ -65,8 +66,9 @@ class Node:
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others)
         self._queries = Queries(self._thread)
         jobs = MissionJobs(daemon)
+        state_dir = daemon.settings.state_dir
         self._rates = SampleRates(settings.profile, settings.rates)
-        self._history = History(jobs)
+        self._history = History(jobs, None if state_dir is None else state_dir / TLOG_FOLDER)
         self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads, self._history).answerers
         if settings.commands:
             self._answerers |= CommandQueries(jobs, self._rates).answerers

@@ -82,7 +82,7 @@ class Question:
         self._thread.submit(self._query.drop, is_reply=True)
 
 
-#: Handles a query; QueryRefused, ControlError, StoreError and ValueError become the error reply.
+#: Handles a query; QueryRefused, ControlError, StoreError, OSError and ValueError become the error reply.
 Answerer = Callable[[Question], Awaitable[None]]
 
 
@@ -128,7 +128,7 @@ class Queries:
             await answerer(question)
         except QueryRefused as error:
             self._refuse(question, error)
-        except (ControlError, StoreError, ValueError) as error:
+        except (ControlError, StoreError, OSError, ValueError) as error:
             self._refuse(question, QueryRefused(str(error)))
         except asyncio.CancelledError:
             self._refuse(question, QueryRefused(_STOPPED))

@@ -26,6 +26,7 @@ _ENVELOPE: Json = {
     "seq": {"type": "integer", "minimum": 0, "description": "number of this key's sample: a gap is a loss"},
     "time_s": {"type": "number", "description": "by the bridge's clock, seconds since 1970 (UTC)"},
 }
+_LOGGED_PLACE = ("lat_deg", "lon_deg", "altitude_m", "height_m")
 _NUMBER: Json = {"type": ["number", "null", "string"], "description": "null: not given; inf or -inf as text"}
 _PLACE: Json = {"type": ["integer", "null"], "description": "degrees * 1e7; null: not given"}
 _ITEM_FIELDS: Json = {**dict.fromkeys(("p1", "p2", "p3", "p4", "alt_m"), _NUMBER), "lat_e7": _PLACE, "lon_e7": _PLACE}
@@ -68,7 +69,14 @@ def schemas() -> dict[str, Json]:
         summary[f"{name}_s"] = summary.pop(name) | {"description": "seconds since 1970 (UTC)"}
     missions = {"missions": {"type": "array", "items": _object(summary)}}
     made["mission_list"] = missions
-    made["history"] = {"events": {"type": "array", "items": _object(_ENVELOPE | made["event"])}, **missions}
+    number = _ENVELOPE["seq"] | {"type": ["integer", "null"], "description": "null: it is from a telemetry log"}
+    place = {name: field for name, field in made["position"].items() if name in _LOGGED_PLACE}
+    made["history"] = {
+        "events": {"type": "array", "items": _object(_ENVELOPE | {"seq": number} | made["event"])},
+        **missions,
+        "positions": {"type": "array", "items": _object({"time_s": _ENVELOPE["time_s"]} | place)},
+        "logs_from_s": {"type": ["number", "null"], "description": "start of the oldest telemetry log that was read"},
+    }
     made["mission_report"] = upload | {"source": {"type": "string", "description": "who sent it"}}
     files = {name: _file(name, _ENVELOPE | body) for name, body in made.items()}
     files["command_reply"] = _reply(_object(upload, required=("ack", "text")), items, findings)

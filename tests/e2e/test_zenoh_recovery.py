@@ -8,6 +8,8 @@ from typing import Any
 import zenoh
 from zenoh import ext
 
+from service.zenoh_link.logged_past import read_logged_past
+from service.zenoh_link.time_range import TimeRange
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until
@@ -73,6 +75,38 @@ def test_the_past_can_be_asked_for(start: Starter) -> None:
         assert {"fc.found", "mission.push_ended"} <= {each["event"] for each in past["events"]}
         assert (before := ask_surely(opened, "history?_time=[..now(-10m)]"))["events"] == before["missions"] == []
         assert "not a time range" in ask_surely(opened, "history?_time=lately")["error"]
+        assert "positions" in ask_surely(opened, "history?positions=0")["error"]
+
+
+def test_the_past_before_a_restart_is_in_the_telemetry_logs(start: Starter) -> None:
+    where = endpoint()
+    bench = zenoh_bench(start, f'listen = ["{where}"]')
+    bench.daemon.push(plain_plan(7))
+    logs = bench.daemon.state_dir / "logs"
+    with session(connect=where) as opened:
+        wanted = "history?_time=[now(-10m)..];positions=50"
+        bench.board.set("armed 1")
+        until(lambda: ask_surely(opened, wanted)["positions"], "a position on the disk")
+        bench.board.set("armed 0")
+        until(lambda: "vehicle.disarmed" in str(read_logged_past(logs, TimeRange(), 0)), "the landing on the disk")
+        bench.daemon.kill_and_restart()
+        bench.daemon.wait()
+        past = until(lambda: next(iter(_answers_of_a_new_run(opened, wanted)), None), "the new run's answer")
+    logged = [each["event"] for each in past["events"] if each["seq"] is None]
+    assert [name for name in logged if name.startswith("vehicle.")] == ["vehicle.armed", "vehicle.disarmed"]
+    assert [each["time_s"] for each in past["events"]] == sorted(each["time_s"] for each in past["events"])
+    assert {"lat_deg", "height_m"} <= set(past["positions"][0])
+    assert past["logs_from_s"] <= past["events"][0]["time_s"]
+    assert [each["record_count"] for each in past["missions"]] == [7]
+
+
+def _answers_of_a_new_run(opened: zenoh.Session, wanted: str) -> list[Any]:
+    answers = ask(opened, wanted)
+    return [
+        past
+        for past in answers
+        if any(each["event"] == "fc.found" and each["seq"] is not None for each in past["events"])
+    ]
 
 
 def test_a_recorder_of_everything_is_no_ground_station(start: Starter) -> None:

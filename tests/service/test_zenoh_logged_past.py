@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Telemetry logs as the past of `history?_time=[..]`."""
+
+import os
+from datetime import UTC, datetime
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from protocols.mavlink.dialect import Message, messages
+from protocols.tlog import tlog_record
+from service.zenoh_link.logged_past import read_logged_past
+from service.zenoh_link.time_range import TimeRange
+
+NOON_S = datetime(2026, 5, 1, 12, tzinfo=UTC).timestamp()
+EVER = TimeRange()
+ARMED = messages.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def heartbeat(*, armed: bool) -> Message:
+    return messages.MAVLink_heartbeat_message(2, 3, ARMED if armed else 0, 0, 4, 3)
+
+
+def text(words: str) -> Message:
+    return messages.MAVLink_statustext_message(6, words.encode())
+
+
+def position(number: int) -> Message:
+    return messages.MAVLink_global_position_int_message(0, 453838000 + number, 84733000, 152000, 20000, 0, 0, 0, 0)
+
+
+def write(folder: Path, begun_s: float, *records: tuple[float, Message], compid: int = 1, flight: bool = False) -> Path:
+    """A log as the recorder writes it: named after its beginning, last changed at its end."""
+    folder.mkdir(exist_ok=True)
+    name = datetime.fromtimestamp(begun_s, UTC).strftime("%Y-%m-%d %H-%M-%S") + " flight" * flight + ".tlog"
+    codec = messages.MAVLink(None, srcSystem=1, srcComponent=compid)
+    path = folder / name
+    path.write_bytes(b"".join(tlog_record(bytes(each.pack(codec)), round(at_s * 1e6)) for at_s, each in records))
+    ended_s = max(at_s for at_s, _ in records)
+    os.utime(path, (ended_s, ended_s))
+    return path
+
+
+def test_texts_and_arming_in_order(tmp_path: Path) -> None:
+    """The file that is full in flight goes on in the next one: the craft is not armed twice."""
+    write(tmp_path, NOON_S, (NOON_S, heartbeat(armed=True)), (NOON_S + 5, text("Mission: 12 items")), flight=True)
+    write(tmp_path, NOON_S + 6, (NOON_S + 6, heartbeat(armed=True)), (NOON_S + 9, heartbeat(armed=False)))
+    write(tmp_path, NOON_S + 600, (NOON_S + 600, heartbeat(armed=True)))
+    past = read_logged_past(tmp_path, EVER, 0)
+    assert [(each["time_s"] - NOON_S, each["event"], each["facts"]) for each in past.events] == [
+        (0, "vehicle.armed", {}),
+        (5, "gcs.text", {"text": "Mission: 12 items"}),
+        (9, "vehicle.disarmed", {}),
+        (600, "vehicle.armed", {}),
+    ]
+    assert (past.from_s, past.positions) == (NOON_S, [])
+
+
+def test_only_the_range(tmp_path: Path) -> None:
+    for hour in range(4):
+        at_s = NOON_S + 3600 * hour
+        write(tmp_path, at_s, *((at_s + n, text(f"{hour}.{n}")) for n in range(3)))
+    past = read_logged_past(tmp_path, TimeRange(NOON_S + 3601, NOON_S + 7200), 0)
+    assert [each["facts"]["text"] for each in past.events] == ["1.1", "1.2", "2.0"]
+    assert past.from_s == NOON_S + 3600
+
+
+def test_a_part_of_a_long_log(tmp_path: Path) -> None:
+    """It is not read from its beginning; whether the craft was armed before the range is known all the same."""
+    flight = [(NOON_S + second, heartbeat(armed=1000 <= second < 2000)) for second in range(3600)]
+    path = write(tmp_path, NOON_S, *flight)
+    with path.open("ab") as file:
+        file.write(bytes(9000))  # a power cut
+    for start, end, expected in (
+        (999.5, 1500, [1000]),
+        (1000.5, 2100, [2000]),
+        (1500, 1600, []),
+        (-9, 9999, [1000, 2000]),
+    ):
+        past = read_logged_past(tmp_path, TimeRange(NOON_S + start, NOON_S + end), 0)
+        assert [each["time_s"] - NOON_S for each in past.events] == expected
+
+
+@pytest.mark.parametrize("most", [1, 7, 100, 1000])
+def test_positions_are_thinned_out_evenly(tmp_path: Path, most: int) -> None:
+    """At most one a second, however often the flight controller reports it."""
+    flown = [(NOON_S + 0.2 * number, position(number)) for number in range(900)]
+    write(tmp_path, NOON_S, *flown[:600])
+    write(tmp_path, NOON_S + 120, *flown[600:])
+    found = read_logged_past(tmp_path, EVER, most).positions
+    assert min(most, 180) / 2 < len(found) <= most
+    assert found[-1] == {
+        "time_s": NOON_S + 179,
+        "lat_deg": 45.3838895,
+        "lon_deg": 8.4733,
+        "altitude_m": 152.0,
+        "height_m": 20.0,
+    }
+    gaps = [round(later["time_s"] - each["time_s"], 3) for each, later in pairwise(found)]
+    assert max(gaps, default=0) <= 2 * max(180 / most, 1) + 0.5
+
+
+def test_other_senders_files_and_damage(tmp_path: Path) -> None:
+    assert read_logged_past(tmp_path / "none", EVER, 9).from_s is None
+    write(tmp_path, NOON_S, (NOON_S, text("of a station")), (NOON_S, heartbeat(armed=True)), compid=190)
+    path = write(tmp_path, NOON_S + 60, (NOON_S + 60, text("whole")), (NOON_S + 61, text("cut off")))
+    os.truncate(path, path.stat().st_size - 3)
+    (tmp_path / "2026-99-99 99-99-99.tlog").write_bytes(b"no date")
+    (tmp_path / "notes.txt").write_bytes(b"no log")
+    assert [each["facts"]["text"] for each in read_logged_past(tmp_path, EVER, 9).events] == ["whole"]
