@@ -2,7 +2,8 @@
 """Limits the connections to the status page, so that a hostile browser costs the flight controller nothing.
 
 A connection carries one request and is cut off after a few seconds, so that a slow peer holds nothing for long. The
-number of connections is limited, and so is their rate, per address and in total.
+number of connections is limited, per address and in total; one too many is reset. The rate is limited, too, but there
+a connection waits for its turn: a page that is loaded twice in a second must not lose one of its files.
 """
 
 import asyncio
@@ -14,9 +15,10 @@ LIFETIME_S = 15.0
 MAX_CONNECTIONS = 48
 #: One phone must not lock out the others. A page opens six at once.
 MAX_FROM_ONE = 16
-#: An open page sends a request per second, a loading one a dozen at once. A request costs about a millisecond.
+#: An open page sends a request per second, a loading one about thirty. A request costs about a millisecond.
 MAX_IN_A_SECOND = 100
 MAX_IN_A_SECOND_FROM_ONE = 50
+_TURN_S = 0.1
 
 
 class Door:
@@ -29,19 +31,20 @@ class Door:
         self._inside: Counter[str] = Counter()
         self._lately: deque[tuple[float, str]] = deque(maxlen=MAX_IN_A_SECOND)
 
-    def admit(self, address: str, now: float) -> bool:
-        """True if there is room for a connection; now: seconds. Each admitted one must `leave`."""
+    def admit(self, address: str) -> bool:
+        """True if there is room for a connection. Each admitted one must `leave`."""
+        if self._inside.total() >= MAX_CONNECTIONS or self._inside[address] >= MAX_FROM_ONE:
+            return False
+        self._inside[address] += 1
+        return True
+
+    def take_turn(self, address: str, now: float) -> bool:
+        """True if an admitted connection may send its request now (seconds); else it asks again."""
         while self._lately and self._lately[0][0] <= now - 1:
             self._lately.popleft()
         lately = sum(one == address for _, one in self._lately)
-        if (
-            self._inside.total() >= MAX_CONNECTIONS
-            or self._inside[address] >= MAX_FROM_ONE
-            or len(self._lately) >= MAX_IN_A_SECOND
-            or lately >= MAX_IN_A_SECOND_FROM_ONE
-        ):
+        if len(self._lately) >= MAX_IN_A_SECOND or lately >= MAX_IN_A_SECOND_FROM_ONE:
             return False
-        self._inside[address] += 1
         self._lately.append((now, address))
         return True
 
@@ -68,27 +71,39 @@ class BoundedConnection(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._inner: asyncio.Protocol | None = None
         self._end: asyncio.TimerHandle | None = None
+        self._turn: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Pass on the connection if there is room; else abort it."""
+        """Pass on the connection when its turn comes; abort it if there is no room."""
         assert isinstance(transport, asyncio.Transport)
         peer = transport.get_extra_info("peername")
-        if peer is None or not self._door.admit(peer[0], self._loop.time()):
+        if peer is None or not self._door.admit(peer[0]):
             transport.abort()
             return
         self._address = peer[0]
         self._transport = transport
         self._door.transports.add(transport)
         self._end = self._loop.call_later(self._door.lifetime_s, transport.abort)
+        transport.pause_reading()
+        self._await_turn(transport)
+
+    def _await_turn(self, transport: asyncio.Transport) -> None:
+        if not self._door.take_turn(self._address, self._loop.time()):
+            self._turn = self._loop.call_later(_TURN_S, self._await_turn, transport)
+            return
         self._inner = self._serve()
         self._inner.connection_made(transport)
+        transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Free its place."""
-        if self._inner is not None and self._transport is not None and self._end is not None:
-            self._end.cancel()
+        for timer in self._end, self._turn:
+            if timer is not None:
+                timer.cancel()
+        if self._transport is not None:
             self._door.transports.discard(self._transport)
             self._door.leave(self._address)
+        if self._inner is not None:
             self._inner.connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who gets in at the status page's door: bounded in number, in rate and in time."""
+"""The status page's connections: limited in number, in rate and in time."""
 
 import asyncio
 from collections import Counter
@@ -28,16 +28,17 @@ visits = st.lists(
 def test_never_more_than_the_bounds(visits: list[tuple[str, float, bool]]) -> None:
     door, now = Door(), 100.0
     inside: Counter[str] = Counter()
-    admitted: list[tuple[float, str]] = []
+    served: list[tuple[float, str]] = []
     for address, wait_s, leaves in visits:
         now += wait_s
         if leaves and inside[address]:
             door.leave(address)
             inside[address] -= 1
-        elif door.admit(address, now):
+        elif door.admit(address):
             inside[address] += 1
-            admitted.append((now, address))
-        lately = [one for at, one in admitted if at > now - 1]
+            if door.take_turn(address, now):
+                served.append((now, address))
+        lately = [one for at, one in served if at > now - 1]
         assert inside.total() <= MAX_CONNECTIONS
         assert inside[address] <= MAX_FROM_ONE
         assert len(lately) <= MAX_IN_A_SECOND
@@ -45,7 +46,40 @@ def test_never_more_than_the_bounds(visits: list[tuple[str, float, bool]]) -> No
     for address, count in inside.items():
         for _ in range(count):
             door.leave(address)
-    assert door.admit("a", now + 2)
+    assert door.admit("a")
+    assert door.take_turn("a", now + 2)
+
+
+class _Greeter(asyncio.Protocol):
+    """Sends one byte for the first data received, and closes."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+
+    def data_received(self, _data: bytes) -> None:
+        self._transport.write(b"!")
+        self._transport.close()
+
+
+async def test_connections_over_the_rate_wait_and_are_served() -> None:
+    door = Door()
+    server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, _Greeter), "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    room = asyncio.Semaphore(6)  # as many as a browser opens at once
+
+    async def ask() -> bytes:
+        async with room:
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(b"?")
+            answer = await reader.read()
+            writer.close()
+            return answer
+
+    async with asyncio.timeout(60), asyncio.TaskGroup() as group:
+        asked = [group.create_task(ask()) for _ in range(2 * MAX_IN_A_SECOND_FROM_ONE)]
+    assert {task.result() for task in asked} == {b"!"}
+    server.close()
 
 
 _VISITORS = 3

@@ -50,6 +50,13 @@ def test_the_first_paint_is_small_and_asks_nobody_else(page: Browser) -> None:
     assert 5_000 < size <= FIRST_PAINT_BYTES
 
 
+def test_a_page_that_is_reloaded_at_once_loses_no_file(page: Browser) -> None:
+    """Each load takes about thirty connections, and an address gets fifty a second."""
+    for _ in range(6):
+        page.driver.get(page.url)
+    page.open()
+
+
 def test_how_everything_is(page: Browser) -> None:
     assert page.text("#badges") == "DISARMED"
     assert page.text("#headline") == "Harakiri with the mission extension, STABILIZE, 12.6 V"
