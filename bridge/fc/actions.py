@@ -72,7 +72,7 @@ class FcActions:
         if self._session.vehicle.armed:
             on_done(ActionResult.ARMED)
             return
-        if self._runner.is_busy or self._missions.acquire(self) is not None:
+        if self._runner.needs_line or self._missions.acquire(self) is not None:
             on_done(ActionResult.OCCUPIED)
             return
         self._present = action

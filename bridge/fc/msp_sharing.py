@@ -65,7 +65,7 @@ class MspSharing:
             return f"command {frame.command} changes something: set write = true in its [[share]] to allow that"
         if not (link.any_byte or is_clean(request(frame.command, frame.payload))):
             return "its bytes could open this flight controller's command line, or reset it"
-        if self._runner.is_busy and not self._pending:
+        if self._runner.needs_line and not self._pending:
             return "a mission transfer is running"
         return ""
 

@@ -58,7 +58,7 @@ class Profile:
     polls: the telemetry questions it answers. decoders: by command, for replies in a layout of its own; the common ones
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
     has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.
-    accepts_any_byte: its parser acts on no byte runs inside a frame.
+    accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
     open_store: how missions are written to it, or None with `no_missions` as the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
@@ -76,6 +76,7 @@ class Profile:
     has_2d_fix: bool = False
     has_gyro_deg_s: bool = False
     accepts_any_byte: bool = False
+    turn_s: float = 0.0
     open_store: Callable[["FlightController", VehicleView, RuleSettings], AnyFcMissionStore] | None = None
     no_missions: Refusal = NO_MISSIONS
     check_kind: str | None = None

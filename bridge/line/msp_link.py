@@ -98,6 +98,8 @@ class MspLink:
         self.receiver_timeout_s = 0.0
         #: Set for boards that accept any byte inside a frame.
         self.any_byte = False
+        #: Set for boards that serve one request at a time: the interval, s.
+        self.turn_s = 0.0
         self._follow_up_at: float | None = None
         self._risky: int | None = None  # the command of the frame that is followed up
         self.requests_lost = 0
@@ -235,7 +237,7 @@ class MspLink:
             self._risky = message.command
             self._follow_up_at = self._line_free_at + _FOLLOW_UP_S
         timeout_s = EXCLUSIVE_TIMEOUT_S if message.exclusive else self._timeout_s()
-        reply_time = (self.outstanding_bytes + message.reply_size) * self.byte_s
+        reply_time = (self.outstanding_bytes + message.reply_size) * self.byte_s + len(self._sent) * self.turn_s
         deadline = self._line_free_at + reply_time + timeout_s
         self._sent.append(
             _Request(message.command, message.reply_size, self._line_free_at, deadline, message.exclusive)

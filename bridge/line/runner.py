@@ -39,6 +39,7 @@ class Task(Generic[T]):
 
     conversation: Conversation[T]
     on_done: Callable[[T | LinkLost, float], None]
+    in_background: bool
     began_at: float | None = None
 
 
@@ -64,11 +65,21 @@ class Runner:
         """True while a conversation is running."""
         return self._current is not None
 
+    @property
+    def needs_line(self) -> bool:
+        """True while a conversation runs or waits for which telemetry should make room."""
+        return self._current is not None and (not self._current.in_background or bool(self._queue))
+
     def start(
-        self, conversation: Conversation[T], on_done: Callable[[T | LinkLost, float], None], now: float
+        self,
+        conversation: Conversation[T],
+        on_done: Callable[[T | LinkLost, float], None],
+        now: float,
+        *,
+        in_background: bool = False,
     ) -> Task[T]:
         """Queue a conversation; `on_done` gets its result, or the LinkLost that ended it, and the time."""
-        task = Task(conversation, on_done)
+        task = Task(conversation, on_done, in_background)
         self._queue.append(task)
         self._begin_next(now)
         return task

@@ -108,6 +108,10 @@ class FcMissionStore(Protocol[RecordT]):
         """True if its list can be read while the craft is armed."""
 
     @property
+    def watch_s(self) -> float:
+        """The interval at which `is_current` should be asked."""
+
+    @property
     def others(self) -> tuple[tuple[RecordT, ...], ...]:
         """Further missions in its store, as last read. Only one mission at a time is loaded and flown."""
 
@@ -125,6 +129,7 @@ class OneMission:
     """Part of the interface for a board with one mission, which only the bridge changes."""
 
     reads_armed = False
+    watch_s = 1.0
 
     @property
     def others(self) -> tuple[tuple[Any, ...], ...]:

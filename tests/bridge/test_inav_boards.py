@@ -12,6 +12,7 @@ from bridge.controllers.multiwii import profile as multiwii
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import inav_profile, multiwii_profile
 from bridge.missions.list_check import check_list
+from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
@@ -167,6 +168,19 @@ def test_a_board_that_serves_a_request_each_10_ms_is_served() -> None:
     assert without_home(Download(station).run()) == without_home(plan(61))
     sent = [frame.command for _, _, data in world.written for frame in MspParser().feed(data)]
     assert sent.count(Nav.SET_WP) == 60
+
+
+def test_polls_wait_for_their_turn_on_such_a_board() -> None:
+    """Several requests at once are served one after the other: none of them is lost."""
+    _, world, station = board_with(serial_task_ms=10.0)
+    assert Upload(station, plan(41)).run() is ACCEPTED
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.run(3)
+    assert world.bridge.session.link is not None
+    lost, before = world.bridge.session.link.requests_lost, len(station.said("ATTITUDE"))
+    world.run(4)
+    assert world.bridge.session.link.requests_lost == lost
+    assert len(station.said("ATTITUDE")) - before > 4 * 15
 
 
 def test_a_mission_that_is_flown_is_told_item_by_item() -> None:

@@ -10,16 +10,18 @@ from bridge.missions.list_check import check_list
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from protocols.mavlink.dialect import messages
-from protocols.msp.nav import LAST
-from simulator.fc_kinds import make_board
+from protocols.msp.frame import MspParser
+from protocols.msp.nav import LAST, Nav
+from simulator.fc_kinds import make_board, new_eeprom
 from simulator.inav_boxes import BOXES
 from simulator.inav_mission import CAPACITY
 from simulator.msp_board import MspBoard
 from simulator.msp_options import MspOptions
-from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint
+from simulator.multiwii_mission import MultiWiiMission
+from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.options import Faults
 from tests.bridge.test_inav import RULES, packed, plan
-from tests.bridge.test_inav_boards import ACCEPTED, without_home
+from tests.bridge.test_inav_boards import ACCEPTED, board_with, without_home
 from tests.support.conversations import Download, Upload, clear_message
 from tests.support.world import GroundStation, World
 
@@ -206,6 +208,56 @@ def test_another_clients_list_is_noticed_and_its_flight_is_shown_right() -> None
     bench.faults.armed, bench.faults.boxes = True, NAV_WP
     bench.world.run(5)
     assert {message.total for message in bench.station.said("MISSION_CURRENT")[-3:]} == {4}
+
+
+@pytest.mark.parametrize(("size", "turn_ms"), [(3, 10.0), (16, 10.0), (30, 0.5)])
+@pytest.mark.parametrize("kind", ["inav", "multiwii"])
+def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: int, turn_ms: float) -> None:
+    """Another client has moved one waypoint."""
+    options = MspOptions(serial_task_ms=turn_ms)
+    eeprom = new_eeprom(kind, options)
+    board = make_board(kind, options, Faults(boxes=0), memoryview(eeprom))
+    world = World(speeds=(115200,), peer=board)
+    world.wait_ready(20)
+    world.run(2)
+    station = GroundStation(world)
+    assert Upload(station, plan(size + 1), tries=60).run(60) is ACCEPTED
+    world.run(3)
+    moved = plan(size + 1)
+    moved[size // 2] = replace(moved[size // 2], alt_m=33.0)
+    changed = packed(moved)[size // 2 - 1]
+    if kind == "inav":
+        eeprom[(size // 2 - 1) * WAYPOINT_SIZE + 1 : size // 2 * WAYPOINT_SIZE] = changed
+        board.faults.stick_loads += 1
+    else:
+        MultiWiiMission(memoryview(eeprom), options.capacity).store(size // 2, unpack_waypoint(b"\0" + changed)[1])
+    world.run(2.0)
+    assert f"Mission on the flight controller changed: {size} records" in " ".join(station.texts())
+    assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
+
+
+def test_a_multiwii_is_not_read_in_flight() -> None:
+    """Its reply to a read would be the record that it flies."""
+    board, world, station = board_with("multiwii")
+    assert Upload(station, plan(9), tries=60).run(60) is ACCEPTED
+    board.faults.armed, board.faults.boxes = True, 1 << 10
+    world.run(2)
+    before = len(world.written)
+    world.run(5)
+    asked = [frame for _, _, data in world.written[before:] for frame in MspParser().feed(data)]
+    assert not [frame for frame in asked if frame.command == Nav.WP and frame.payload != b"\0"]
+    board.faults.armed = False
+    world.run(5)
+    assert not [text for text in station.texts() if "changed" in text]
+
+
+def test_a_multiwii_that_holds_nothing_is_watched_without_news() -> None:
+    _, world, station = board_with("multiwii")
+    before = len(world.written)
+    world.run(5)
+    assert not [text for text in station.texts() if "changed" in text]
+    asked = [frame for _, _, data in world.written[before:] for frame in MspParser().feed(data)]
+    assert [frame.payload for frame in asked if frame.command == Nav.WP and frame.payload[0] > 1] == []
 
 
 def test_a_push_that_breaks_off_for_good_is_mended_by_the_saved_mission() -> None:

@@ -43,8 +43,6 @@ class InavMissions(NavMissions):
     _kept: tuple[Mission, ...] = ()
     #: Records in the store before the loaded mission's first.
     _before_loaded = 0
-    #: The number of the record that was compared last.
-    _compared = 0
     #: GETINFO's reply and the selected mission, as of the last read or write.
     _seen: tuple[NavInfo, int] | None = None
 
@@ -88,19 +86,8 @@ class InavMissions(NavMissions):
         seen = yield from self._look()
         if seen is None or seen != self._seen:
             return seen is None
-        return (yield from self._has_same_records())
-
-    def _has_same_records(self) -> Conversation[bool]:
-        """Compare the first record and one more, the next one each time: another list may have the same size."""
-        if not self._known:
-            return True
-        self._compared = self._compared % len(self._known) + 1
         before = 0 if self._craft.is_armed() else self._before_loaded
-        for number in {1, self._compared}:
-            held = yield from self.read(before + number)
-            if held is not None and held != self._known[number - 1]:
-                return False
-        return True
+        return (yield from self._has_same_records(self._known or (), before))
 
     def reload(self) -> Conversation[bool | None]:
         """Load the saved mission: INAV's list in RAM is empty after a restart."""

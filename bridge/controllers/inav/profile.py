@@ -70,6 +70,8 @@ PROFILE = Profile(
     has_2d_fix=True,
     has_gyro_deg_s=True,
     accepts_any_byte=True,
+    # Its serial task runs 100 times a second (fc_tasks.c).
+    turn_s=0.01,
     open_store=_open_store,
     check_kind="inav",
     rules=_rules,

@@ -15,6 +15,8 @@ class MultiwiiMissions(NavMissions):
     """The mission store of one MultiWii NAV. Its EEPROM takes 70 ms for a record."""
 
     _stores_slowly = True
+    #: The records of a list that reads as empty.
+    _empty: tuple[NavRecord, ...] = NOTHING
 
     def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
         """Read up to the last record. A list without one reads as empty, as does the single RTH of a cleared one."""
@@ -26,14 +28,20 @@ class MultiwiiMissions(NavMissions):
                 return None
             if (record.action, record.flag) == _NAVIGATING:
                 return None
+            records.append(record)
             if record.flag in _NO_RECORD:
                 break
-            records.append(record)
             if record.flag == LAST:
                 known = () if tuple(records) == NOTHING else tuple(records)
                 break
-        self._known = known
+        self._known, self._empty = known, tuple(records)
         return known
+
+    def is_current(self) -> Conversation[bool]:
+        """Read some records, while disarmed: nothing else tells that another client has changed the list."""
+        if self._known is None or self._craft.is_armed() is not False:
+            return True
+        return (yield from self._has_same_records(self._known or self._empty))
 
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
         """Write a single RTH first and the real record 1 last: a list interrupted in between only flies home."""

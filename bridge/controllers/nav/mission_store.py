@@ -35,6 +35,7 @@ from protocols.msp.telemetry import decode_status
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
 _STATUS_PAYLOAD = 11
 _TRIES = 5
+_COMPARED = 4
 #: Restarts of one push after a read-back mismatch.
 _MAX_BEGINS = 3
 
@@ -67,6 +68,10 @@ class NavMissions(OneMission, ABC):
 
     #: True if storing a record stalls it.
     _stores_slowly = False
+    #: With _COMPARED records each time, another list of up to 32 records is noticed within two seconds.
+    watch_s = 0.25
+    #: The number of the record that was compared last.
+    _compared = 0
 
     def __init__(self, profile: NavProfile, craft: NavCraft) -> None:
         self._profile = profile
@@ -228,6 +233,15 @@ class NavMissions(OneMission, ABC):
                 if answer is not None and answer[0] == number:
                     return answer[1]
         return None
+
+    def _has_same_records(self, known: Sequence[NavRecord], before: int = 0) -> Conversation[bool]:
+        """Compare some records, the next ones each time; `before`: records in the store before the first."""
+        for _ in known[:_COMPARED]:
+            self._compared = self._compared % len(known) + 1
+            held = yield from self.read(before + self._compared)
+            if held is not None and held != known[self._compared - 1]:
+                return False
+        return True
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Write the old list again, if known; True if it is there."""

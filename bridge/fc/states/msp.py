@@ -169,6 +169,7 @@ class Msp(MspLine):
         if controller.info is not None:
             self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
         self.link.any_byte = controller.profile.accepts_any_byte
+        self.link.turn_s = controller.profile.turn_s
         port.polls.begin(event.found.speed, controller.profile.polls)
         port.meet(controller)
         self._check_interval_s = _FIRST_CHECK_S
@@ -185,7 +186,7 @@ class Msp(MspLine):
         """Poll; check an identity that is in doubt."""
         event = super().tick(now)
         if event is None:
-            self.port.polls.ask(self.link, now, beside_missions=self.port.runner.is_busy)
+            self.port.polls.ask(self.link, now, beside_missions=self.port.runner.needs_line)
             if now >= self._check_at and not self.port.runner.is_busy:
                 self._check_at = inf
                 self.port.runner.start(identify_msp(self.port.profiles), self._checked, now)
