@@ -16,6 +16,7 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
 _TEXT_SIZE = 50
+_MAX_TEXT_ID = 0xFFFF
 
 #: Returns the signature of a MAVLink 2 frame.
 Signer = Callable[[bytes], bytes]
@@ -56,6 +57,7 @@ class Ground:
         self._writers: dict[Peer, FrameWriter] = {}
         self._datagrams: list[tuple[Peer, bytes]] = []
         self._texts = RecentTexts()
+        self._text_id = 0
         self._now = 0.0
         #: A text for each newcomer, about a problem that began before it connected.
         self.notice = ""
@@ -279,8 +281,12 @@ class Ground:
             peers = self._texts.new_to(peers, text, self._now)
         if peers and self.is_recording and RECORDER not in peers:
             peers = [*peers, RECORDER]  # a text for one station is part of the flight's log, too
-        for piece in split_text(text):
-            message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"))
+        pieces = split_text(text)
+        self._text_id = self._text_id % _MAX_TEXT_ID + 1
+        for chunk, piece in enumerate(pieces):
+            # With an id, MAVSDK and QGroundControl join the pieces; Mission Planner shows each by itself.
+            text_id = self._text_id if len(pieces) > 1 else 0
+            message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), text_id, chunk)
             self.multicast(pack(message), peers)
 
     def _readers_of_texts(self) -> list[Peer]:
@@ -311,11 +317,14 @@ class Ground:
 
 
 def split_text(text: str) -> list[str]:
-    """Split at spaces into pieces of at most 50 characters."""
+    """Split at spaces into pieces of 50 characters, padded with spaces; the last one is shorter.
+
+    A piece shorter than 50 ends the text for those who join them (MAVLink: STATUSTEXT.chunk_seq).
+    """
     pieces: list[str] = []
-    while len(text) > _TEXT_SIZE:
+    while len(text) > _TEXT_SIZE - bool(pieces):
         cut = text.rfind(" ", 1, _TEXT_SIZE + 1)
         cut = cut if cut > 0 else _TEXT_SIZE
-        pieces.append(text[:cut])
+        pieces.append(text[:cut].ljust(_TEXT_SIZE))
         text = text[cut:].lstrip()
     return [*pieces, text]

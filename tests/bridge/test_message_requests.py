@@ -4,14 +4,12 @@
 import math
 
 import pytest
-from pymavlink.dialects.v20 import development
 
 from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.gcs.stations import EXPIRY_S
 from bridge.vehicle.telemetry_table import TELEMETRY, Row
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mavlink.mode_messages import AVAILABLE_MODES, CURRENT_MODE
+from protocols.mavlink.mode_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, World
@@ -213,31 +211,23 @@ def test_wishes_that_are_made_before_it_is_there_count_then() -> None:
     assert rates_hz(station)["ATTITUDE"] == pytest.approx(10, rel=0.05)
 
 
-def modes_told(station: GroundStation) -> list[Message]:
-    """The AVAILABLE_MODES and CURRENT_MODE heard since the last call, as a newer dialect reads them."""
-    decoder = development.MAVLink(None)
-    frames = MavlinkSplitter().feed(b"".join(station.frames_heard))
-    station.frames_heard.clear()
-    return [decoder.decode(bytearray(frame.raw)) for frame in frames if frame.msgid in (CURRENT_MODE, AVAILABLE_MODES)]
-
-
 def test_the_modes_are_listed_and_the_present_one_is_told(world: World) -> None:
     station, old = station_of(world, "gcs"), GroundStation(world, "old", version=1)
     beat(old)
     world.run(1)
-    station.frames_heard.clear()
     assert ask(station, 512, AVAILABLE_MODES) == ACCEPTED
-    listed = [mode for mode in modes_told(station) if mode.get_msgId() == AVAILABLE_MODES]
+    listed = station.said("AVAILABLE_MODES")
     assert [(mode.mode_index, mode.number_modes) for mode in listed] == [(number, 6) for number in range(1, 7)]
     names = {mode.custom_mode: mode.mode_name for mode in listed}
     assert names == {0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 5: "LOITER", 6: "RTL"}
     assert ask(station, 512, AVAILABLE_MODES, 3) == ACCEPTED
-    assert [mode.mode_index for mode in modes_told(station) if mode.get_msgId() == AVAILABLE_MODES] == [3]
+    assert [mode.mode_index for mode in station.said("AVAILABLE_MODES")] == [3]
     assert ask(station, 512, AVAILABLE_MODES, 7) == UNSUPPORTED
     world.faults.boxes = 1 << 0 | 1 << 2
     world.run(3)
-    present = modes_told(station)
+    present = station.take("CURRENT_MODE")
     assert 2 <= len(present) <= 4
     assert (present[-1].custom_mode, present[-1].standard_mode) == (2, m.MAV_STANDARD_MODE_ALTITUDE_HOLD)
     # Its id does not fit MAVLink 1.
-    assert not modes_told(old)
+    assert "HEARTBEAT" in {message.get_type() for message in old.said()}
+    assert not old.said("CURRENT_MODE")

@@ -7,7 +7,7 @@ import pytest
 from fastcrc.crc16 import mcrf4xx
 
 from bridge.gcs.ground import split_text
-from bridge.gcs.station import Peer
+from bridge.gcs.station import Peer, Severity
 from bridge.gcs.stations import EXPIRY_S, MAX_PEERS
 from protocols.mavlink.dialect import CRC_EXTRA, Message, messages
 from protocols.mission_item import MissionResult
@@ -248,9 +248,33 @@ def test_texts_fit_their_message_and_lose_nothing() -> None:
     ]
     for text in texts:
         pieces = split_text(text)
-        assert all(len(piece) <= 50 for piece in pieces)
+        # A receiver that joins them takes a piece of 50 for "more follows".
+        assert all(len(piece) == 50 for piece in pieces[:-1])
+        assert len(pieces[-1]) <= (50 if len(pieces) == 1 else 49)
         assert "".join("".join(pieces).split()) == "".join(text.split())
-        assert all(pieces) or not text
+        assert all(pieces[:-1])
+
+
+def test_a_long_text_can_be_joined_and_its_pieces_can_be_read_alone() -> None:
+    world = start()
+    stations = [GroundStation(world, "new"), GroundStation(world, "old", version=1, sysid=254)]
+    for station in stations:
+        station.send(gcs_heartbeat())
+    world.run(4)
+    for station in stations:
+        station.take()
+    long = "Mission rejected: the first half of a sentence of more than fifty characters, and the rest of it"
+    for text in (long, "short", long):
+        world.bridge.ground.say(Severity.WARNING, text)
+    world.run(0.1)
+    chunks = [(text.id, text.chunk_seq) for text in stations[0].said("STATUSTEXT")]
+    (first, _), (second, _) = chunks[0], chunks[3]
+    assert chunks == [(first, 0), (first, 1), (0, 0), (second, 0), (second, 1)]
+    assert 0 < first != second > 0
+    for station in stations:
+        pieces = [text.text for text in station.said("STATUSTEXT")]
+        assert " ".join("".join(pieces[:2]).split()) == long
+        assert pieces[0].rstrip() == "Mission rejected: the first half of a sentence of"
 
 
 @pytest.mark.parametrize("seed", range(6))

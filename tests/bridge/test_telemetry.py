@@ -11,7 +11,6 @@ import pytest
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.mode_messages import CURRENT_MODE
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from simulator.flight import FlightState
@@ -309,7 +308,7 @@ def test_noise_on_the_line_is_no_telemetry_and_no_flight_controller() -> None:
         "MISSION_CURRENT",
         "STATUSTEXT",
         "SYS_STATUS",
-        f"UNKNOWN_{CURRENT_MODE}",
+        "CURRENT_MODE",
     }
     world.power_on()
     world.wait_ready()

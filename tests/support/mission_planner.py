@@ -145,7 +145,7 @@ class MissionPlanner:
             case "HEARTBEAT":
                 self.armed = bool(message.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED)
             case "STATUSTEXT":
-                self.texts.append(message.text)
+                self.texts.append(message.text.rstrip())
             case "AUTOPILOT_VERSION":
                 self.capabilities = message.capabilities
             case "PARAM_VALUE":

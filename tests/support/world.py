@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pymavlink.dialects.v20 import all as every_message
+
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.controllers import other
@@ -31,7 +33,6 @@ from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome, PendingMission
-from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import identify
@@ -353,7 +354,8 @@ class GroundStation:
         self.frames_heard: list[bytes] = []
         self.on_message: list[Callable[[Message], None]] = []
         self._mavlink = messages.MAVLink(None, srcSystem=sysid, srcComponent=compid)
-        self._decoder = MavlinkDecoder()
+        #: Of the dialect `all`, which has more messages than the bridge's own.
+        self._decoder = every_message.MAVLink(None)
         self.sysid, self.compid = sysid, compid
         world.stations[self.peer] = self
 
@@ -392,7 +394,8 @@ class GroundStation:
         return address == (self.sysid, self.compid)
 
     def texts(self) -> list[str]:
-        return [message.text for message in self.said("STATUSTEXT")]
+        """The pieces of long texts each for itself, without their padding."""
+        return [message.text.rstrip() for message in self.said("STATUSTEXT")]
 
     def _arrived(self, frame: bytes) -> None:
         found = MavlinkSplitter().feed(frame)
@@ -400,8 +403,7 @@ class GroundStation:
         assert len(found) == 1 or len(frame) <= MAX_DATAGRAM_SIZE
         for each in found:
             self.frames_heard.append(each.raw)
-            message = self._decoder.decode(each)
-            assert message is not None
+            message = self._decoder.decode(bytearray(each.raw))
             self.heard.append((self.world.now, message))
             for react in self.on_message:
                 react(message)
