@@ -12,13 +12,12 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
 """
 
 from collections.abc import Sequence
-from functools import partial
 from math import inf
 
 from bridge.config import BridgeConfig
 from bridge.fc.actions import FcActions
 from bridge.fc.msp_sharing import MspSharing
-from bridge.fc.profile import FlightController, RuleSettings, VehicleView
+from bridge.fc.profile import FlightController, RuleSettings
 from bridge.fc.session import FcSession
 from bridge.fc.states.mavlink import Mavlink
 from bridge.gcs.ground import Ground, Tap
@@ -27,24 +26,24 @@ from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
-from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.mission_service import NO_LINK, Delivery, MissionService
 from bridge.model.events import EventLog, Incidents
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.mission_transfer import MissionTransfer
 from bridge.model.refusal import Refusal
+from bridge.model.vehicle import FlightState
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
 from bridge.vehicle.message_router import MessageRouter
+from bridge.vehicle.mission_context import MissionContext
 from bridge.vehicle.mission_download import MissionDownloads
 from bridge.vehicle.mission_upload import MissionUploads
 from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.vehicle_report import VehicleReporter
-from protocols.mavlink.frame import MavlinkFrame
 
 
 class Bridge:
@@ -57,16 +56,12 @@ class Bridge:
         self._was_armed = False
         self._logs_flights = tap is not None
         self._announcer = LinkAnnouncer()
-        self._incidents = Incidents()
+        self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
+        incidents = Incidents()
 
-        signers = {
-            name: partial(access.signing.signature, link_id=access.link_id)
-            for name, access in config.links.items()
-            if access.signing is not None
-        }
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
         self.ground = Ground(
-            config.sysid, config.compid, log_event, self._newcomer, tap or _drop, self.guard.standing, signers
+            config.sysid, config.compid, log_event, self._newcomer, tap or _drop, self.guard.standing, config.signers
         )
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(
@@ -74,31 +69,25 @@ class Bridge:
             config.profiles,
             self.runner,
             log_event,
-            self._incidents,
+            incidents,
             self._controller_changed,
-            self._mavlink_received,
+            lambda frames: self._incoming.from_autopilot(frames),
             config.autopilot,
         )
-        self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
-        self.missions = MissionService(
-            lambda mission, delivery: self._mission_endings.append((mission, delivery)), self._is_armed
-        )
+        vehicle = self.session.vehicle
+        self.missions = MissionService(lambda *ending: self._mission_endings.append(ending), vehicle)
+        context = MissionContext(self.missions, self.runner, self.ground, vehicle, log_event, incidents)
+        self.local = LocalMissions(context)
+        self.sharing = MspSharing(self.session, self.runner)
         self._vehicle = OwnVehicle(
             self.session, self.missions, self.ground, lambda: self._announcer.is_lost, config.unix_time_s, now
         )
         self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
-        home = self._vehicle.home
-        self._uploads = MissionUploads(
-            self.missions, self.runner, self.ground, log_event, self._incidents, home, self.ground.moved_to
-        )
-        self.local = LocalMissions(self.missions, self.runner, self.ground, log_event, self._incidents, home)
-        self._watch = MissionWatch(self.missions, self.runner, self.ground, log_event)
-        self._downloads = MissionDownloads(
-            self.missions, self.runner, self.ground, self._is_armed, lambda: self.session.vehicle.home_or_position()
-        )
-        parameters = Parameters(self.missions, self.runner, self.ground, config.sysid)
+        self._uploads = MissionUploads(context, self.ground.moved_to)
+        self._downloads = MissionDownloads(context)
+        self._watch = MissionWatch(context)
+        parameters = Parameters(context, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
-        self.sharing = MspSharing(self.session, self.runner)
         commands = CommandService(self.ground, self._vehicle, actions, self._banner)
         router = MessageRouter(self.ground, self._uploads, self._downloads, parameters, commands, self._vehicle)
         self._incoming = Incoming(
@@ -108,14 +97,9 @@ class Bridge:
     # The flight controller's side.
 
     @property
-    def speed(self) -> int | None:
-        """The speed to set the port to, baud."""
-        return self.session.speed
-
-    @property
     def is_passing_through(self) -> bool:
         """True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes."""
-        return self._incoming.routes is not None and isinstance(self.session.state, Mavlink)
+        return not self._is_represented and isinstance(self.session.state, Mavlink)
 
     def fc_opened(self, now: float) -> None:
         """The port is open."""
@@ -129,18 +113,9 @@ class Bridge:
         """Handle bytes from the port."""
         self.session.received(data, now)
         self._pass_on_news(now)
-        armed = self.session.vehicle.armed
-        if armed is None or armed == self._was_armed:
-            # Unknown is not a change: a Harakiri that arms may fall silent first.
-            return
-        if armed:
-            self._uploads.armed(now)
-        self.ground.record_flight(on=armed and self._logs_flights and self._incoming.routes is None)
-        self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")
-        self._was_armed = armed
 
     def take_fc_output(self) -> list[bytes]:
-        """The bytes to be written to the port at the present `speed`."""
+        """The bytes to be written to the port at the present `session.speed`."""
         return self.session.take_output()
 
     # The ground stations' side.
@@ -153,25 +128,21 @@ class Bridge:
         """A ground station's connection is closed."""
         self._uploads.peer_gone(peer, now)
         self.ground.gone(peer)
-        self._left(peer)
+        self._incoming.forget(peer)
 
     def link_closed(self, name: str, now: float) -> None:
         """A link is closed, and all ground stations on it are gone."""
         for peer in self.ground.remove_link(name):
             self._uploads.peer_gone(peer, now)
-            self._left(peer)
+            self._incoming.forget(peer)
 
-    # The store.
+    # Missions.
 
     def take_store_effects(self) -> list[StoreEffect]:
-        """The pending store operations; the service answers each with `store_answered`."""
+        """The pending store operations; the service answers each with `runner.store_answered`."""
         effects = self._store_effects[:]
         self._store_effects.clear()
         return effects
-
-    def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
-        """Take the store's answer to an effect."""
-        self.runner.store_answered(effect, answer, now)
 
     def take_mission_endings(self) -> list[tuple[ArrivedMission, Delivery]]:
         """The missions concluded since the last call, each with its result."""
@@ -183,21 +154,10 @@ class Bridge:
         """The mission being received or written."""
         return self.missions.writing or self._uploads.receiving
 
-    # The end.
-
-    @property
-    def is_conversing(self) -> bool:
-        """True while a conversation or transfer is unfinished."""
-        return self.runner.is_busy
-
     def stop_missions(self, now: float) -> None:
         """Accept no more transfers. An upload that still receives items ends; a running push continues."""
         self.missions.close()
         self._uploads.stop(now)
-
-    def abort_missions(self, now: float) -> None:
-        """End a running push: the flight controller keeps its old list; the store and the sender get the result."""
-        self.runner.stop(now)
 
     # Time.
 
@@ -214,9 +174,9 @@ class Bridge:
         self._uploads.tick(now)
         self._watch.tick(now)
         for peer in self.ground.expire(now):
-            self._left(peer)
+            self._incoming.forget(peer)
         self._say(self._announcer.tick(now))
-        if self._incoming.routes is None:
+        if self._is_represented:
             self._vehicle.tick(now)
 
     def next_deadline(self) -> float:
@@ -228,49 +188,40 @@ class Bridge:
             self.ground.next_deadline(),
             self._announcer.next_deadline(),
             self._watch.next_deadline(),
-            self._vehicle.next_deadline() if self._incoming.routes is None else None,
+            self._vehicle.next_deadline() if self._is_represented else None,
         )
         return min((deadline for deadline in deadlines if deadline is not None), default=inf)
 
+    # Between the parts.
+
+    @property
+    def _is_represented(self) -> bool:
+        """False while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name."""
+        return self._incoming.routes is None
+
     def _say(self, news: tuple[Severity, str] | None) -> None:
-        # The bridge sends nothing in the name of an autopilot that speaks MAVLink itself.
-        if news is not None and self._incoming.routes is None:
+        if news is not None and self._is_represented:
             self.ground.say(*news)
 
     def _newcomer(self, peer: Peer) -> None:
-        # The bridge sends nothing in the name of an autopilot that speaks MAVLink itself.
-        if self._incoming.routes is None:
+        if self._is_represented:
             self._vehicle.newcomer(peer)
 
-    def _left(self, peer: Peer) -> None:
-        self.guard.forget(peer)
-        if self._incoming.routes is not None:
-            self._incoming.routes.forget(peer)
-
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
-        store = self._open_store(controller)
-        self.missions.use(store)
         self._downloads.forget_all()
+        vehicle = self.session.vehicle
         if controller is None:
+            self.missions.use(NO_LINK)
             self._uploads.link_lost(now)
-            self._announcer.lost(now if self.session.vehicle.heard_at is None else self.session.vehicle.heard_at)
+            self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return
-        is_passed_through = controller.profile.is_passed_through
-        self._incoming.routes = PassThrough(self.ground) if is_passed_through else None
+        store = controller.open_store(vehicle, RuleSettings(self._config.takeoff_max_m))
+        self.missions.use(store)
+        self._incoming.routes = PassThrough(self.ground) if controller.profile.is_passed_through else None
         self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
             self._watch.look(now)
-
-    def _open_store(self, controller: FlightController | None) -> AnyFcMissionStore | Refusal:
-        """The mission store of this flight controller, or the reason that it has none."""
-        if controller is None:
-            return NO_LINK
-        profile = controller.profile
-        if profile.open_store is None:
-            return profile.no_missions
-        view = VehicleView(self._is_armed, self._home, self._vehicle.home)
-        return profile.open_store(controller, view, RuleSettings(self._config.takeoff_max_m))
 
     def _pass_on_news(self, now: float) -> None:
         self.report.now = now
@@ -279,20 +230,21 @@ class Bridge:
         news = self.session.vehicle.take_news()
         if news:
             self.report.heard(news)
-            if self._incoming.routes is None:
+            if self._is_represented:
                 self._vehicle.heard(news, now)
+        if FlightState in news:
+            self._follow_arming(now)
 
-    def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
-        if self._incoming.routes is not None:
-            self._incoming.routes.from_autopilot(frames)
-
-    def _is_armed(self) -> bool | None:
-        return self.session.vehicle.armed
-
-    def _home(self) -> tuple[int, int] | None:
-        vehicle = self.session.vehicle
-        home = vehicle.home if vehicle.is_home_settled else None
-        return None if home is None else (home.lat_e7, home.lon_e7)
+    def _follow_arming(self, now: float) -> None:
+        armed = self.session.vehicle.armed
+        if armed is None or armed == self._was_armed:
+            # Unknown is not a change: a Harakiri that arms may fall silent first.
+            return
+        self._was_armed = armed
+        if armed:
+            self._uploads.armed(now)
+        self.ground.record_flight(on=armed and self._logs_flights and self._is_represented)
+        self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")
 
     def _banner(self) -> str:
         controller = self.session.controller

@@ -29,18 +29,6 @@ NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "This flight controller stores 
 
 
 @dataclass(frozen=True, slots=True)
-class VehicleView:
-    """What a mission store may ask about the craft while it works. Positions are degrees * 1e7.
-
-    is_armed: None while unknown. home: as the flight controller reports it. position: home, or else where it is.
-    """
-
-    is_armed: Callable[[], bool | None]
-    home: Callable[[], tuple[int, int] | None]
-    position: Callable[[], tuple[int, int] | None]
-
-
-@dataclass(frozen=True, slots=True)
 class RuleSettings:
     """The inputs of the mission rules. None stands for the firmware's default. capacity: records."""
 
@@ -77,7 +65,7 @@ class Profile:
     has_gyro_deg_s: bool = False
     accepts_any_byte: bool = False
     turn_s: float = 0.0
-    open_store: Callable[["FlightController", VehicleView, RuleSettings], AnyFcMissionStore] | None = None
+    open_store: Callable[["FlightController", Vehicle, RuleSettings], AnyFcMissionStore] | None = None
     no_missions: Refusal = NO_MISSIONS
     check_kind: str | None = None
     rules: Callable[[RuleSettings], MissionRules] | None = None
@@ -107,3 +95,8 @@ class FlightController:
     def arm_bit(self) -> int | None:
         """The place of the ARM box in the status flags."""
         return self.boxes.index(_ARM_BOX) if _ARM_BOX in self.boxes else None
+
+    def open_store(self, vehicle: Vehicle, settings: RuleSettings) -> AnyFcMissionStore | Refusal:
+        """Its mission store, or the reason that it has none."""
+        profile = self.profile
+        return profile.no_missions if profile.open_store is None else profile.open_store(self, vehicle, settings)

@@ -22,6 +22,7 @@ from bridge.missions.mission_texts import summary
 from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome, PendingMission
 from bridge.model.mission_transfer import MissionTransfer, TransferStep
 from bridge.model.refusal import ARMED, Refusal
+from bridge.model.vehicle import Vehicle
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import ListIdentity, identify
@@ -76,14 +77,12 @@ OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 class MissionService:
     """Holds the transfer lock, the dialect of the present flight controller, and its list.
 
-    `on_ending` is called with the result of each mission. `is_armed`: according to telemetry; None if unknown.
+    `on_ending` is called with the result of each mission.
     """
 
-    def __init__(
-        self, on_ending: Callable[[ArrivedMission, Delivery], None], is_armed: Callable[[], bool | None]
-    ) -> None:
+    def __init__(self, on_ending: Callable[[ArrivedMission, Delivery], None], vehicle: Vehicle) -> None:
         self._on_ending = on_ending
-        self._is_armed = is_armed
+        self._vehicle = vehicle
         self._dialect: AnyFcMissionStore | None = None
         self._refusal = NO_LINK
         self._owner: object | None = None
@@ -143,7 +142,7 @@ class MissionService:
 
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed; saves a request to a busy board."""
-        return ARMED if self._dialect is not None and self._is_armed() else None
+        return ARMED if self._dialect is not None and self._vehicle.armed else None
 
     @property
     def is_free(self) -> bool:

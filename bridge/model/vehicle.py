@@ -214,6 +214,10 @@ class Vehicle:
     """The latest reading of each kind, and home."""
 
     def __init__(self, airframe: Airframe = Airframe.QUADROTOR) -> None:
+        self.forget(airframe)
+
+    def forget(self, airframe: Airframe = Airframe.QUADROTOR) -> None:
+        """Begin again: the board is another one than before."""
         self.airframe = airframe
         #: The firmware version: major, minor, patch level.
         self.version: tuple[int, int, int] | None = None
@@ -289,6 +293,11 @@ class Vehicle:
         if self.home is not None or position is None:
             return self.home
         return Home(position.lat_e7, position.lon_e7, position.altitude_m)
+
+    def place(self) -> tuple[int, int] | None:
+        """The same in degrees * 1e7."""
+        here = self.home_or_position()
+        return None if here is None else (here.lat_e7, here.lon_e7)
 
     def _place_home(self, *, has_armed: bool) -> None:
         """Home is where the craft was armed. It never moves in flight, even if the link is lost.

@@ -19,9 +19,6 @@ from protocols.mavlink.target import target_of
 _AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
 
 
-_AUTOPILOT = messages.MAV_COMP_ID_AUTOPILOT1
-
-
 class Incoming:
     """Every frame from a ground station passes here: guarded, counted, and answered or passed on.
 
@@ -65,6 +62,17 @@ class Incoming:
                     message = self._decoder.decode(frame)
                     if message is not None and self._is_for_us(message):
                         self._router.take(station, message, now)
+
+    def from_autopilot(self, frames: list[MavlinkFrame]) -> None:
+        """Pass on frames from the line."""
+        if self.routes is not None:
+            self.routes.from_autopilot(frames)
+
+    def forget(self, peer: Peer) -> None:
+        """A ground station is gone."""
+        self._guard.forget(peer)
+        if self.routes is not None:
+            self.routes.forget(peer)
 
     def _pass_on(self, routes: PassThrough, station: Station, frame: MavlinkFrame, now: float) -> None:
         """Send a frame on to its targets, within its sender's rights."""

@@ -4,16 +4,15 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from bridge.gcs.station import Post, Severity
+from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost
-from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_service import NO_LINK, Delivery, HeldMission, MissionService
-from bridge.model.events import EventLog, Incidents
+from bridge.missions.mission_service import NO_LINK, Delivery, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import Result, Verdict
+from bridge.vehicle.mission_context import MissionContext
 from protocols.mission_item import MissionItem, MissionResult
 
 _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the mission that is there")
@@ -22,21 +21,10 @@ _WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would 
 class LocalMissions:
     """Writes, reads and checks whole lists, by the same rules as uploads from ground stations."""
 
-    def __init__(
-        self,
-        missions: MissionService,
-        runner: Runner,
-        post: Post,
-        log_event: EventLog,
-        incidents: Incidents,
-        fallback_home: Callable[[], tuple[int, int] | None],
-    ) -> None:
-        self._missions = missions
-        self._runner = runner
-        self._post = post
-        self._log_event = log_event
-        self._incidents = incidents
-        self._fallback_home = fallback_home
+    def __init__(self, context: MissionContext) -> None:
+        self._context = context
+        self._missions = context.missions
+        self._runner = context.runner
 
     def push(
         self,
@@ -53,14 +41,14 @@ class LocalMissions:
         `may_erase` False: a list without a storable item is refused.
         """
         owner = object()
-        incident = self._incidents.begin("push")
+        incident = self._context.incidents.begin("push")
         arrived: list[ArrivedMission] = []
 
         def conversation() -> Conversation[Delivery | Refusal]:
             report: StoreReport | Refusal = yield from self._missions.preflight()
             if isinstance(report, Refusal):
                 return report
-            verdict = check_list(items, report.rules, self._fallback_home())
+            verdict = check_list(items, report.rules, self._context.vehicle.place())
             arrived.append(ArrivedMission(source, tuple(items), verdict))
             if verdict.result is Result.CLEARED and not may_erase:
                 return _WOULD_ERASE
@@ -72,8 +60,8 @@ class LocalMissions:
                 result = NO_LINK
             if arrived and isinstance(result, Delivery):
                 severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
-                self._post.say(severity, f"{source}: {result.text}")
-            self._log_event(
+                self._context.post.say(severity, f"{source}: {result.text}")
+            self._context.log_event(
                 "info" if result.ack is MissionResult.ACCEPTED else "warning",
                 "mission.push_ended",
                 source=source,
@@ -84,7 +72,7 @@ class LocalMissions:
             )
             on_done(result, arrived[0] if arrived else None)
 
-        self._log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
+        self._context.log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
         refusal = self._missions.acquire(owner)
         if refusal is None:
             self._runner.start(conversation(), done, now)
@@ -106,7 +94,7 @@ class LocalMissions:
 
         def conversation() -> Conversation[Verdict[Any] | Refusal]:
             rules = yield from self._missions.rules()
-            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._fallback_home())
+            return rules if isinstance(rules, Refusal) else check_list(items, rules, self._context.vehicle.place())
 
         def done(verdict: Verdict[Any] | Refusal | LinkLost, _at: float) -> None:
             on_done(NO_LINK if isinstance(verdict, LinkLost) else verdict)

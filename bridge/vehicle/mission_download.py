@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station reads the mission: the vehicle's side of MAVLink's download (docs/mission-rules.md, "Read-back")."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from bridge.gcs.cost import Cost
-from bridge.gcs.station import Post, Severity, Station
+from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import LinkLost
-from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
+from bridge.missions.mission_service import NO_LINK, HeldMission
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Home
+from bridge.vehicle.mission_context import MissionContext
 from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
@@ -46,19 +45,11 @@ class _Snapshot:
 class MissionDownloads:
     """Every ground station reads its own snapshot, so an upload in between cannot mix two lists."""
 
-    def __init__(
-        self,
-        missions: MissionService,
-        runner: Runner,
-        post: Post,
-        is_armed: Callable[[], bool | None],
-        home: Callable[[], Home | None],
-    ) -> None:
-        self._missions = missions
-        self._runner = runner
-        self._post = post
-        self._is_armed = is_armed
-        self._home = home
+    def __init__(self, context: MissionContext) -> None:
+        self._missions = context.missions
+        self._runner = context.runner
+        self._post = context.post
+        self._vehicle = context.vehicle
         self._snapshots: dict[Station, _Snapshot] = {}
         self._questions: dict[_Question, None] = {}
         self._is_reading = False
@@ -67,7 +58,7 @@ class MissionDownloads:
         """MISSION_REQUEST_LIST."""
         if mission_type != MISSION_TYPE_MISSION:
             self._ack(station, MissionResult.UNSUPPORTED, mission_type)
-        elif self._is_armed():
+        elif self._vehicle.armed:
             self._refuse(station, _ARMED)
         else:
             self._ask(_Question(station, None, as_int=True), now)
@@ -79,7 +70,7 @@ class MissionDownloads:
             return
         question = _Question(station, seq, as_int)
         snapshot = self._snapshots.get(station)
-        if self._is_armed():
+        if self._vehicle.armed:
             if seq == 0:
                 self._send_item(station, self._present_home(), as_int=as_int)
             else:
@@ -105,7 +96,7 @@ class MissionDownloads:
         if self._is_reading:
             return
         held = self._missions.held
-        if held is not None and (self._is_armed() or not self._post.allows(question.station, Cost.BOARD)):
+        if held is not None and (self._vehicle.armed or not self._post.allows(question.station, Cost.BOARD)):
             # While armed the list cannot change; a station that asks too often gets the copy, too.
             self._read(held, now)
         else:
@@ -119,7 +110,7 @@ class MissionDownloads:
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):
-                if question.seq == 0 and (self._is_armed() or self._home() is not None):
+                if question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
                     # Mission Planner requests it on arming, which may have just changed the protocol.
                     self._send_item(question.station, self._present_home(), as_int=question.as_int)
                 else:
@@ -134,7 +125,7 @@ class MissionDownloads:
     def _answer(self, question: _Question, items: tuple[MissionItem, ...]) -> None:
         if question.seq is None:
             # DroneKit takes home from a download, and waits for ever without one: so an empty list has home if known.
-            self._send_count(question.station, len(items) or int(self._home() is not None))
+            self._send_count(question.station, len(items) or int(self._vehicle.home_or_position() is not None))
         elif question.seq < len(items):
             self._send_item(question.station, items[question.seq], as_int=question.as_int)
         elif question.seq == 0:
@@ -152,7 +143,7 @@ class MissionDownloads:
 
     def _present_home(self) -> MissionItem:
         """Item 0 as last read, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
-        known, home = self._missions.home_item(), self._home()
+        known, home = self._missions.home_item(), self._vehicle.home_or_position()
         if known is None:
             return self._home_item()
         altitude_m = None if home is None else home.altitude_m
@@ -160,7 +151,7 @@ class MissionDownloads:
 
     def _home_item(self) -> MissionItem:
         """Item 0 of an empty list: home, or zeros if unknown."""
-        home = self._home() or Home(0, 0)
+        home = self._vehicle.home_or_position() or Home(0, 0)
         return MissionItem(
             0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, home.lat_e7, home.lon_e7, home.altitude_m or 0.0
         )

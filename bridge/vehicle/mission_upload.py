@@ -11,19 +11,19 @@ from math import inf
 from typing import Any
 
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
-from bridge.gcs.station import Peer, Post, Severity, Station
+from bridge.gcs.station import Peer, Severity, Station
 from bridge.line.conversation import LinkLost
-from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
-from bridge.missions.mission_service import NO_LINK, OCCUPIED, Delivery, MissionService
+from bridge.missions.mission_service import NO_LINK, OCCUPIED, Delivery
 from bridge.missions.mission_texts import finding_lines
-from bridge.model.events import EventLog, Incidents, Level
+from bridge.model.events import Level
 from bridge.model.finding import Finding, News
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.mission_transfer import MissionTransfer, TransferStep
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
+from bridge.vehicle.mission_context import MissionContext
 from bridge.vehicle.recent_answers import RecentAnswers
 from bridge.vehicle.upload_states import (
     TRANSITIONS,
@@ -63,24 +63,13 @@ class _Upload:
 
 
 class MissionUploads:
-    """All ground stations' uploads and clears. Messages go out through `post`."""
+    """All ground stations' uploads and clears."""
 
-    def __init__(
-        self,
-        missions: MissionService,
-        runner: Runner,
-        post: Post,
-        log_event: EventLog,
-        incidents: Incidents,
-        fallback_home: Callable[[], tuple[int, int] | None],
-        moved_to: Callable[[Station, float], list[Station]],
-    ) -> None:
-        self._missions = missions
-        self._runner = runner
-        self._post = post
-        self._log_event = log_event
-        self._incidents = incidents
-        self._fallback_home = fallback_home
+    def __init__(self, context: MissionContext, moved_to: Callable[[Station, float], list[Station]]) -> None:
+        self._context = context
+        self._missions = context.missions
+        self._runner = context.runner
+        self._post = context.post
         self._moved_to = moved_to
         self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
         self._answers = RecentAnswers(moved_to)
@@ -231,7 +220,7 @@ class MissionUploads:
         self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
         for older in self._uploads:
             older.is_superseded |= older.station == station
-        upload = _Upload(station, count, self._incidents.begin("upload"), Waiting(now))
+        upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(now))
         self._uploads.append(upload)
         refusal = self._missions.armed_refusal() or self._limit(station)
         if refusal is not None:
@@ -325,7 +314,7 @@ class MissionUploads:
         if isinstance(answer, Refusal):
             self._handle(upload, Ended(answer), now)
         else:
-            check = begin_check(upload.count, answer.rules, self._fallback_home())
+            check = begin_check(upload.count, answer.rules, self._context.vehicle.place())
             self._handle(upload, Ready(check), now)
 
     def _request(self, upload: _Upload, state: Receiving, now: float) -> None:
@@ -454,7 +443,7 @@ class MissionUploads:
         )
 
     def _note(self, event: str, upload: _Upload, level: Level = "info", **facts: object) -> None:
-        self._log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)
+        self._context.log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)
 
 
 def _cancelled(why: str) -> Refusal:

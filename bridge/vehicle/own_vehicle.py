@@ -160,11 +160,6 @@ class OwnVehicle:
         self._also_wanted = readings
         self._set_polls(self._ground.everyone())
 
-    def home(self) -> tuple[int, int] | None:
-        """Home; if unknown the present position; degrees * 1e7."""
-        home = self._session.vehicle.home_or_position()
-        return None if home is None else (home.lat_e7, home.lon_e7)
-
     # Requests of ground stations.
 
     def send_once(self, station: Station, msgid: int, index: int = 0) -> bool | None:

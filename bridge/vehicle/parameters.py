@@ -4,10 +4,9 @@
 import math
 
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
-from bridge.gcs.station import Post, Severity, Station
+from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import LinkLost
-from bridge.line.runner import Runner
-from bridge.missions.mission_service import MissionService
+from bridge.vehicle.mission_context import MissionContext
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.mission import MAX_RADIUS_CM
 
@@ -20,10 +19,10 @@ SYSID = "SYSID_THISMAV"
 class Parameters:
     """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET. Values are REAL32."""
 
-    def __init__(self, missions: MissionService, runner: Runner, post: Post, sysid: int) -> None:
-        self._missions = missions
-        self._runner = runner
-        self._post = post
+    def __init__(self, context: MissionContext, sysid: int) -> None:
+        self._missions = context.missions
+        self._runner = context.runner
+        self._post = context.post
         self._sysid = sysid
         self._is_setting = False
 

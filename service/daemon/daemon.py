@@ -222,7 +222,7 @@ class Daemon:
     def flush(self) -> None:
         """Carry out the outputs that the bridge has after an input."""
         bridge = self.bridge
-        self._port.set_speed(bridge.speed)
+        self._port.set_speed(bridge.session.speed)
         self._port.may_gather = bridge.is_passing_through
         if output := bridge.take_fc_output():
             data = b"".join(output)
@@ -254,17 +254,17 @@ class Daemon:
         self.flush()
         if await self.is_at_rest(_FINISH_S):
             return
-        self.bridge.abort_missions(self._loop.time())
+        self.bridge.runner.stop(self._loop.time())
         self.flush()
         await self.is_at_rest(_ABORT_S)
 
     async def is_at_rest(self, seconds: float) -> bool:
         """Wait for the end of all conversations, with a timeout; True if there are none."""
         for _ in range(int(seconds / _REST_INTERVAL_S)):
-            if not self.bridge.is_conversing:
+            if not self.bridge.runner.is_busy:
                 break
             await asyncio.sleep(_REST_INTERVAL_S)
-        return not self.bridge.is_conversing
+        return not self.bridge.runner.is_busy
 
     # The methods of service.links.gcs_events.GcsEvents.
 
@@ -389,7 +389,7 @@ class Daemon:
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answered(answer: object) -> None:
-            self.bridge.store_answered(effect, answer, self._loop.time())
+            self.bridge.runner.store_answered(effect, answer, self._loop.time())
             self.flush()
 
         self.store.carry_out(effect, answered)

@@ -50,7 +50,7 @@ def test_found_at_every_speed_in_time(baud: int, extension: bool) -> None:
         assert world.wait_until(verdict, 20) <= (1.5 if baud == SPEEDS[0] else 8)
         world.wait_ready()
         assert world.kind is (harakiri.PATCHED if extension else harakiri.UNPATCHED)
-        assert world.bridge.speed == baud
+        assert world.bridge.session.speed == baud
         found = world.events("fc.found")
         assert [event.facts["speed_baud"] for event in found] == [baud]
         assert "two equal answers" in str(found[0].facts["why"])
@@ -221,11 +221,11 @@ def test_frsky_telemetry_of_an_armed_craft_is_taken_for_nothing() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     world.wait_ready()
     world.faults.armed = True
-    world.wait_until(lambda w: w.bridge.speed == 9600 and w.kind is harakiri.PATCHED, 15)
+    world.wait_until(lambda w: w.bridge.session.speed == 9600 and w.kind is harakiri.PATCHED, 15)
     world.run(30)
     assert world.bridge.session.vehicle.armed
     world.faults.armed = False
-    world.wait_until(lambda w: w.bridge.speed == 115200 and w.kind is harakiri.PATCHED, 8)
+    world.wait_until(lambda w: w.bridge.session.speed == 115200 and w.kind is harakiri.PATCHED, 8)
     assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
     world.assert_line_was_clean()
 

@@ -21,7 +21,7 @@ def test_the_ring_is_not_lapped_while_a_stored_list_is_read(after_s: float) -> N
         world.run(after_s)
         world.faults.armed = True
         world.run(6)
-        assert world.bridge.speed == 9600
+        assert world.bridge.session.speed == 9600
         assert world.naze.counters.tx_overflows == 0
         world.faults.armed = False
         world.run(5)

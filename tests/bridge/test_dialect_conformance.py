@@ -235,7 +235,7 @@ def test_a_stop_ends_a_push_and_says_what_is_left(craft: Craft, moment: float) -
     assert craft.upload(craft.plan(6)) is ACCEPTED
     outcome = craft.world.push(craft.plan(100, 1))
     craft.world.run(moment)
-    craft.world.bridge.abort_missions(craft.world.now)
+    craft.world.bridge.runner.stop(craft.world.now)
     craft.world.wait_until(lambda _: bool(outcome), 10)
     delivery, _ = outcome[0]
     craft.world.run(4)

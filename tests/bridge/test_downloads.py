@@ -126,11 +126,11 @@ def test_an_empty_list_is_a_count_of_none_until_home_is_known() -> None:
     world.wait_until(lambda w: w.is_found, 5)
     station = GroundStation(world)
     (count,) = ask(station, list_message())
-    assert count.count == int(world.bridge._vehicle.home() is not None)
+    assert count.count == int(world.bridge.session.vehicle.place() is not None)
     world.run(6)
     (home,) = Download(station).run(2)
     assert (home.seq, home.command, home.frame) == (0, 16, 0)
-    assert (home.lat_e7, home.lon_e7) == world.bridge._vehicle.home()
+    assert (home.lat_e7, home.lon_e7) == world.bridge.session.vehicle.place()
     world.run(1.1)
     assert station.said("MISSION_CURRENT")[-1].mission_state == 1
 

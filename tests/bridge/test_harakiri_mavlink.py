@@ -87,7 +87,7 @@ def test_clearing() -> None:
     assert world.stored == ()
     (home,) = Download(station).run()
     assert (home.seq, home.command) == (0, 16)
-    assert (home.lat_e7, home.lon_e7) == world.bridge._vehicle.home()
+    assert (home.lat_e7, home.lon_e7) == world.bridge.session.vehicle.place()
 
 
 def test_armed_is_denied() -> None:

@@ -234,7 +234,7 @@ def test_a_stop_in_the_middle_loads_the_old_list_again() -> None:
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(100, 1))
     world.run(0.4)
-    world.bridge.abort_missions(world.now)
+    world.bridge.runner.stop(world.now)
     assert upload.run(2) is DENIED
     assert any("stopped meanwhile" in text for text in station.texts())
     assert without_home(Download(station).run()) == without_home(plan(10))

@@ -129,7 +129,7 @@ def test_a_push_that_breaks_off_brings_all_of_them_back() -> None:
     bench = Bench(4, 6)
     upload = Upload(bench.station, plan(100, 7))
     bench.world.run(0.4)
-    bench.world.bridge.abort_missions(bench.world.now)
+    bench.world.bridge.runner.stop(bench.world.now)
     upload.run(2)
     bench.world.run(3)
     assert bench.stored() == sets(4, 6)

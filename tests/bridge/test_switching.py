@@ -81,7 +81,7 @@ def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> Non
     for _ in range(2):
         station.heard.clear()
         faults.armed = True
-        world.wait_until(lambda w: w.bridge.speed == 9600 and w.kind is wanted, 5)
+        world.wait_until(lambda w: w.bridge.session.speed == 9600 and w.kind is wanted, 5)
         world.run(60)
         assert world.kind is wanted
         assert station.said("HEARTBEAT")[-1].base_mode & 128
@@ -89,7 +89,7 @@ def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> Non
         assert len(warnings) == (board is DeafWhileArmed)
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         faults.armed = False
-        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.speed == 115200, 5)
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.speed == 115200, 5)
         world.run(3)
         assert max(heartbeat_gaps(station)) <= 1.5
     world.assert_line_was_clean()

@@ -55,7 +55,7 @@ async def shared(*, write: bool = False, state: Path | None = None) -> AsyncIter
     try:
         async with asyncio.timeout(PATIENCE_S):
             bridge = daemon.bridge
-            while bridge.session.vehicle.armed is None or bridge.is_conversing:  # noqa: ASYNC110
+            while bridge.session.vehicle.armed is None or bridge.runner.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         yield daemon, Program(reader, writer)
@@ -116,7 +116,7 @@ async def test_a_mission_transfer_is_not_disturbed() -> None:
         items = load_mission(Path(__file__).parents[2] / "examples" / "long-146.waypoints")
         pushing = asyncio.create_task(MissionJobs(daemon).push(items, "test", lambda _: None))
         async with asyncio.timeout(PATIENCE_S):
-            while not daemon.bridge.is_conversing:  # noqa: ASYNC110
+            while not daemon.bridge.runner.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0)
             (reply,) = await program.ask(IDENT)
             assert reply.direction is Direction.ERROR

@@ -262,7 +262,7 @@ class World:
         self.now = max(self.now, wanted)
         data = self.naze.advance(self.now)
         if data and self._plugged:
-            heard = garble(data, self.naze.baud, self.bridge.speed) if self.bridge.speed else data
+            heard = garble(data, self.naze.baud, self.bridge.session.speed) if self.bridge.session.speed else data
             if heard:
                 self.bridge.fc_received(heard, self.now)
                 self._flush()
@@ -304,13 +304,13 @@ class World:
             frames = MspParser().feed(data)
             assert b"".join(frame.encode() for frame in frames) == data, f"not whole frames: {data.hex()}"
             assert is_clean(data) or self.kind in (inav.PROFILE, multiwii.PROFILE), data.hex()
-        speed = self.bridge.speed
+        speed = self.bridge.session.speed
         self.written.append((self.now, speed, data))
         self.naze.receive(garble(data, speed, self.naze.baud) if speed else data, self.now)
 
     def _carry_out(self, effect: StoreEffect) -> None:
         def answer() -> None:
-            self.bridge.store_answered(effect, self.store.carry_out(effect), self.now)
+            self.bridge.runner.store_answered(effect, self.store.carry_out(effect), self.now)
             self._flush()
 
         self.after(self.store.delay_s, answer)

@@ -10,7 +10,7 @@ A written list is read back, item by item. Single precision holds a coordinate t
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -18,6 +18,7 @@ from bridge.controllers.harakiri.records import items_from_records
 from bridge.controllers.harakiri.rules import MAV_COMMANDS
 from bridge.line.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
 from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.model.vehicle import Vehicle
 from protocols.float32 import neighbours, single
 from protocols.mavlink.codec import MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
@@ -57,10 +58,10 @@ class _Failed(Exception):
 
 
 class HarakiriMavlinkMissions(OneMission):
-    """The mission store of one Harakiri in MAVLink mode. `is_armed`: None before the first heartbeat."""
+    """The mission store of one Harakiri in MAVLink mode."""
 
-    def __init__(self, is_armed: Callable[[], bool | None], rules: HarakiriRules) -> None:
-        self._is_armed = is_armed
+    def __init__(self, vehicle: Vehicle, rules: HarakiriRules) -> None:
+        self._vehicle = vehicle
         self._rules = rules
         self._decoder = MavlinkDecoder()
         self._known: tuple[WpRecord, ...] | None = None
@@ -72,14 +73,14 @@ class HarakiriMavlinkMissions(OneMission):
     def report(self) -> Conversation[StoreReport | None]:
         """Its state from telemetry; the stored list is unknown until it is read."""
         yield from pause(0.0)
-        armed = self._is_armed()
+        armed = self._vehicle.armed
         if armed is None:
             return None
         return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules, None)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult[WpRecord]]:
         """Write the list and read it back."""
-        if self._is_armed() is not False:
+        if self._vehicle.armed is not False:
             # The firmware does not check this: it would accept a list, or lose its own, in flight.
             return PushResult(PushFailure.ARMED)
         wanted = tuple(as_stored(record) for record in records)

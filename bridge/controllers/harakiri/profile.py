@@ -12,12 +12,13 @@ from bridge.controllers.harakiri.mission_store import HarakiriMissions
 from bridge.controllers.harakiri.rules import USUAL_CAPACITY, USUAL_WP_RADIUS_CM
 from bridge.fc.autosense import Spoken
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
+from bridge.fc.profile import FlightController, Profile, RuleSettings
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.model.airframe import airframe
 from bridge.model.refusal import ARMED, Refusal
+from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
 
@@ -55,13 +56,13 @@ def _recognise_unpatched(board: Interview) -> Conversation[FlightController | No
     return FlightController(UNPATCHED, UNPATCHED.name, airframe(ident.mixer), boxes, version=ident.release)
 
 
-def _msp_store(controller: FlightController, _view: VehicleView, settings: RuleSettings) -> AnyFcMissionStore:
+def _msp_store(controller: FlightController, _vehicle: Vehicle, settings: RuleSettings) -> AnyFcMissionStore:
     assert controller.info is not None
     return HarakiriMissions(controller.info, settings.takeoff_max_m)
 
 
-def _mavlink_store(_controller: FlightController, view: VehicleView, settings: RuleSettings) -> AnyFcMissionStore:
-    return HarakiriMavlinkMissions(view.is_armed, rules(settings))
+def _mavlink_store(_controller: FlightController, vehicle: Vehicle, settings: RuleSettings) -> AnyFcMissionStore:
+    return HarakiriMavlinkMissions(vehicle, rules(settings))
 
 
 PATCHED = Profile(

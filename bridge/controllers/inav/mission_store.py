@@ -86,7 +86,7 @@ class InavMissions(NavMissions):
         seen = yield from self._look()
         if seen is None or seen != self._seen:
             return seen is None
-        before = 0 if self._craft.is_armed() else self._before_loaded
+        before = 0 if self._vehicle.armed else self._before_loaded
         return (yield from self._has_same_records(self._known or (), before))
 
     def reload(self) -> Conversation[bool | None]:
@@ -102,7 +102,7 @@ class InavMissions(NavMissions):
 
     def _take_over(self, missions: list[Mission], seen: tuple[NavInfo, int]) -> None:
         self._seen = seen
-        is_armed = bool(self._craft.is_armed())
+        is_armed = bool(self._vehicle.armed)
         loaded = flown(missions, 1 if is_armed else seen[1])
         if not is_armed:
             self._others = tuple(mission for mission in missions if mission is not loaded)
@@ -161,7 +161,7 @@ class InavMissions(NavMissions):
 
     def _restore(self, before: Mission | None) -> Conversation[bool]:
         """Make it LOAD the saved missions; if that is not the old list, write that one again."""
-        if self._craft.is_armed():
+        if self._vehicle.armed:
             return False
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0)

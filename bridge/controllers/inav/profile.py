@@ -4,15 +4,15 @@
 from bridge.controllers.inav.mission_store import InavMissions
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.mission_store import NavCraft
 from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
+from bridge.fc.profile import FlightController, Profile, RuleSettings
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FAILSAFE_BOX
+from bridge.model.vehicle import Vehicle
 from protocols.msp.inav import MIXER, MIXER_SIZE, decode_platform
 from protocols.msp.nav import INFO_SIZE, Nav, decode_info
 
@@ -55,10 +55,8 @@ def _rules(settings: RuleSettings) -> NavRules:
     return NavRules(inav_profile(settings.capacity or INAV_CAPACITY))
 
 
-def _open_store(controller: FlightController, view: VehicleView, _settings: RuleSettings) -> AnyFcMissionStore:
-    assert controller.arm_bit is not None
-    craft = NavCraft(1 << controller.arm_bit, view.is_armed, view.home, view.position)
-    return InavMissions(inav_profile(controller.capacity), craft)
+def _open_store(controller: FlightController, vehicle: Vehicle, _settings: RuleSettings) -> AnyFcMissionStore:
+    return InavMissions(inav_profile(controller.capacity), controller, vehicle)
 
 
 PROFILE = Profile(

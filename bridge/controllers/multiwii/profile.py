@@ -3,14 +3,14 @@
 
 from bridge.controllers.multiwii.mission_store import MultiwiiMissions
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.mission_store import NavCraft
 from bridge.controllers.nav.rules import MULTIWII_CAPACITY, multiwii_profile
 from bridge.fc.interview import Interview
-from bridge.fc.profile import FlightController, Profile, RuleSettings, VehicleView
+from bridge.fc.profile import FlightController, Profile, RuleSettings
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.model.airframe import airframe
+from bridge.model.vehicle import Vehicle
 from protocols.msp.nav import NAV_CONFIG_SIZE, Nav, decode_nav_config
 
 #: IDENT's capability bit of boards that fly missions.
@@ -35,10 +35,8 @@ def _rules(settings: RuleSettings) -> NavRules:
     return NavRules(multiwii_profile(settings.capacity or MULTIWII_CAPACITY))
 
 
-def _open_store(controller: FlightController, view: VehicleView, _settings: RuleSettings) -> AnyFcMissionStore:
-    assert controller.arm_bit is not None
-    craft = NavCraft(1 << controller.arm_bit, view.is_armed, view.home, view.position)
-    return MultiwiiMissions(multiwii_profile(controller.capacity), craft)
+def _open_store(controller: FlightController, vehicle: Vehicle, _settings: RuleSettings) -> AnyFcMissionStore:
+    return MultiwiiMissions(multiwii_profile(controller.capacity), controller, vehicle)
 
 
 PROFILE = Profile(

@@ -7,14 +7,16 @@ and watched in between.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
+from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, pause, receive, send
 from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionItem
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
@@ -40,20 +42,6 @@ _COMPARED = 4
 _MAX_BEGINS = 3
 
 
-@dataclass(frozen=True, slots=True)
-class NavCraft:
-    """The state of the craft that a dialect needs.
-
-    arm_mask: the bit of the box ARM in STATUS. is_armed: as last heard, None if unknown. home: as reported by it;
-    position: home, or else its present position; degrees * 1e7, None if unknown.
-    """
-
-    arm_mask: int
-    is_armed: Callable[[], bool | None]
-    home: Callable[[], tuple[int, int] | None]
-    position: Callable[[], tuple[int, int] | None]
-
-
 class Failed(Exception):
     """An attempt has failed; `is_final`: a retry would not help."""
 
@@ -73,9 +61,11 @@ class NavMissions(OneMission, ABC):
     #: The number of the record that was compared last.
     _compared = 0
 
-    def __init__(self, profile: NavProfile, craft: NavCraft) -> None:
+    def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
         self._profile = profile
-        self._craft = craft
+        self._vehicle = vehicle
+        assert controller.arm_bit is not None
+        self._arm_mask = 1 << controller.arm_bit
         #: The flight controller's list, as last read; None: unknown, or one that cannot be flown.
         self._known: tuple[NavRecord, ...] | None = None
 
@@ -101,15 +91,17 @@ class NavMissions(OneMission, ABC):
 
     def items(self, records: Sequence[NavRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         """A list as a ground station reads it; an empty one has no items, not even home."""
-        return items_from_records(records, home_item(self._craft.position()), sent_as) if records else ()
+        return items_from_records(records, home_item(self._vehicle.place()), sent_as) if records else ()
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Home as on the flight controller; before it has one, as sent, if known."""
         if not items:
             return items
         is_known = bool(items[0].lat_e7 and items[0].lon_e7)
-        home = self._craft.home() if is_known else self._craft.position()
-        return items if home is None else (replace(items[0], lat_e7=home[0], lon_e7=home[1]), *items[1:])
+        home = self._vehicle.place()
+        if home is None or (is_known and not self._vehicle.is_home_settled):
+            return items
+        return (replace(items[0], lat_e7=home[0], lon_e7=home[1]), *items[1:])
 
     def seq_of(self, records: Sequence[NavRecord], number: int) -> int:
         """The seq of the item for record `number`; 0: none."""
@@ -191,7 +183,7 @@ class NavMissions(OneMission, ABC):
         for done, (number, record) in enumerate(order, 1):
             if done == len(order) > 1:
                 yield from self._make_sure_disarmed()
-            elif self._craft.is_armed():
+            elif self._vehicle.armed:
                 raise Failed(PushFailure.ARMED)
             frame = _frame(number, record)
             if self._stores_slowly and (yield from self.read(number)) == record:
@@ -245,7 +237,7 @@ class NavMissions(OneMission, ABC):
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Write the old list again, if known; True if it is there."""
-        if not before or self._craft.is_armed():
+        if not before or self._vehicle.armed:
             return False
         try:
             yield from self._make_sure_disarmed()
@@ -265,7 +257,7 @@ class NavMissions(OneMission, ABC):
     def _ask_armed(self) -> Conversation[bool | None]:
         reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
         status = None if reply is None else decode_status(reply.payload)
-        return None if status is None else bool(status.box_flags & self._craft.arm_mask)
+        return None if status is None else bool(status.box_flags & self._arm_mask)
 
 
 def _frame(number: int, record: NavRecord) -> bytes:

@@ -34,6 +34,7 @@ class Port:
     def meet(self, controller: FlightController) -> None:
         """Begin a new vehicle if this is another board than before."""
         if controller.profile.family != self.family:
-            self.family, self.vehicle = controller.profile.family, Vehicle()
+            self.family = controller.profile.family
+            self.vehicle.forget()
         self.vehicle.airframe = controller.airframe or self.vehicle.airframe
         self.vehicle.version = controller.version or self.vehicle.version
