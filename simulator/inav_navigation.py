@@ -10,7 +10,7 @@ from enum import Enum
 from simulator.inav_mission import CAPACITY, InavMission
 from simulator.msp_firmware import CrashError
 from simulator.nav_status import Error, Mode, NavStatus, State
-from simulator.nav_waypoint import FLAG_LAST, Action
+from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, Action
 from simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
 
 _CRUISE_MS = 3.0
@@ -138,7 +138,8 @@ class InavNavigation:
         height = waypoint.alt_cm / 100
         if waypoint.p3 & _MEAN_SEA_LEVEL:
             height -= FIELD_ALTITUDE_M
-        target = (waypoint.lat_e7, waypoint.lon_e7) if waypoint.lat_e7 or waypoint.lon_e7 else self._home
+        flies_home = waypoint.flag == FLAG_HOME or not (waypoint.lat_e7 or waypoint.lon_e7)
+        target = self._home if flies_home else (waypoint.lat_e7, waypoint.lon_e7)
         wanted = waypoint.p2 if waypoint.action == Action.POSHOLD_TIME else waypoint.p1
         speed = min(wanted / 100, _MAX_MS) if wanted >= _MIN_MISSION_CMS else _CRUISE_MS
         if not self._craft.fly_to(target, height, speed, seconds):

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 _LAYOUT = struct.Struct("<BBiiihhhB")
 WAYPOINT_SIZE = _LAYOUT.size
-FLAG_LAST = 0xA5
+FLAG_LAST, FLAG_HOME = 0xA5, 0x48
 
 
 class Action(IntEnum):

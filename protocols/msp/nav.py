@@ -21,8 +21,8 @@ INFO_SIZE = _INFO.size
 NAV_CONFIG_SIZE = 32
 _HIGHEST_NUMBER = 254
 
-#: The flag of the last record of a mission.
-LAST = 0xA5
+#: The flag of the last record of a mission, and of a leg that INAV flies to home instead.
+LAST, FLY_HOME = 0xA5, 0x48
 
 
 class Nav(IntEnum):

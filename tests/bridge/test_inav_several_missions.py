@@ -18,11 +18,12 @@ from simulator.inav_mission import CAPACITY
 from simulator.msp_board import MspBoard
 from simulator.msp_options import MspOptions
 from simulator.multiwii_mission import MultiWiiMission
-from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
+from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, Action, NavWaypoint, unpack_waypoint
 from simulator.options import Faults
 from tests.bridge.test_inav import RULES, packed, plan
 from tests.bridge.test_inav_boards import ACCEPTED, board_with, without_home
 from tests.support.conversations import Download, Upload, clear_message
+from tests.support.msp_bench import waypoint
 from tests.support.world import GroundStation, World
 
 NAV_WP = 1 << BOXES["9.1.0"].index(28)
@@ -114,6 +115,26 @@ def test_what_does_not_fit_is_told_before_and_copied_to_the_pi() -> None:
     copies = [mission for mission, _ in bench.world.store.missions if mission.source.startswith("copy")]
     assert [[record.pack() for record in copy.verdict.records] for copy in copies] == [sets(4, 30, 60)[2]]
     assert "Mission of 60 records does not fit" in bench.told()
+
+
+def test_what_items_cannot_show_survives_a_read_and_a_write() -> None:
+    """The list of another planner: a user action, a leg that flies home, a landing's ground elevation."""
+    legs = [
+        waypoint(1, p3=0b110),
+        waypoint(2, flag=FLAG_HOME),
+        waypoint(0, lat_e7=0, lon_e7=0, flag=FLAG_HOME),
+        waypoint(3, Action.LAND, p2=130, p3=1),
+        waypoint(4, Action.RTH, lat_e7=0, lon_e7=0, alt_cm=0, flag=FLAG_LAST),
+    ]
+    bench = Bench(9)
+    bench.eeprom[: 5 * WAYPOINT_SIZE] = b"".join(leg.pack(number) for number, leg in enumerate(legs, 1))
+    bench.faults.stick_loads += 1
+    bench.world.run(3)
+    before = bytes(bench.eeprom[: 5 * WAYPOINT_SIZE])
+    items = Download(bench.station).run()
+    assert Upload(bench.station, items).run() is ACCEPTED
+    assert bytes(bench.eeprom[: 5 * WAYPOINT_SIZE]) == before
+    assert bench.world.store.missions[-1][0].verdict.findings == ()
 
 
 def test_clear_clears_the_loaded_one() -> None:

@@ -18,7 +18,7 @@ from bridge.model.verdict import Result, Verdict
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_from_float_message
 from protocols.mission_item import Command, MissionItem, MissionResult
-from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord, UnsafeRecord, decode_wp, encode_set_wp
+from protocols.msp.nav import FLY_HOME, LAST, LEGS, NavAction, NavRecord, UnsafeRecord, decode_wp, encode_set_wp
 from tests.rules.test_rule_properties import degrees, numbers
 
 INAV, MULTIWII = NavRules(inav_profile()), NavRules(multiwii_profile())
@@ -467,3 +467,52 @@ def test_what_differs_was_told(sent: list[MissionItem]) -> None:
         return [comparable(shown)[:1] + comparable(shown)[3:] for shown in of if shown.command not in (177, 178)]
 
     assert without_speeds(verdict.items[1:]) == without_speeds(sent)
+
+
+speeds = st.sampled_from([0, 50, 500])
+heights = st.integers(100, 20_000)
+places = {"lat_e7": st.integers(LAT, LAT + 9000), "lon_e7": st.integers(LON, LON + 9000), "alt_cm": heights}
+flags = st.sampled_from([0, 0, FLY_HOME])
+p3s = st.integers(0, 31)
+foreign_legs = st.one_of(
+    st.builds(NavRecord, st.just(A.WAYPOINT), **places, p1=speeds, p3=p3s, flag=flags),
+    st.builds(NavRecord, st.just(A.WAYPOINT), alt_cm=heights, p1=speeds, p3=p3s, flag=flags),
+    st.builds(NavRecord, st.just(A.POSHOLD_TIME), **places, p1=st.integers(0, 900), p2=speeds, p3=p3s, flag=flags),
+    st.builds(NavRecord, st.just(A.LAND), **places, p1=speeds, p2=st.integers(-400, 4000), p3=p3s, flag=flags),
+)
+foreign_turns = st.one_of(
+    st.builds(NavRecord, st.just(A.SET_POI), **places),
+    st.builds(NavRecord, st.just(A.SET_HEAD), p1=st.integers(-1, 359)),
+)
+
+
+@given(st.lists(st.one_of(foreign_legs, foreign_turns), max_size=8), foreign_legs)
+@settings(max_examples=300)
+def test_another_planners_list_that_is_read_and_written_again_is_the_same(
+    before: list[NavRecord], last: NavRecord
+) -> None:
+    """User actions, legs that fly home and the ground elevation at a landing are shown in no item, but kept."""
+    held = (*before, replace(last, flag=LAST))
+    again = check_list(items_from_records(held, home_item((LAT, LON))), NavRules(inav_profile(), held))
+    assert (again.result, again.findings, again.records) == (Result.ACCEPTED, (), held)
+
+
+@pytest.mark.parametrize(
+    ("record", "lost"),
+    [
+        (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=2), "user actions (1)"),
+        (NavRecord(A.WAYPOINT, LAT, LON, 3000, flag=FLY_HOME), "fly home (1)"),
+        (NavRecord(A.LAND, LAT, LON, 3000, p2=120, p3=1), "ground elevation (1)"),
+        (NavRecord(A.WAYPOINT, 0, 0, 3000, flag=FLY_HOME), ""),
+        (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=1), ""),
+    ],
+)
+def test_what_a_changed_leg_loses_is_told(record: NavRecord, lost: str) -> None:
+    held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
+    items = list(items_from_records(held, home_item((LAT, LON))))
+    items[2] = replace(items[2], alt_m=40.0)
+    verdict = check_list(items, NavRules(inav_profile(), held))
+    expected = [(News.WARNING, f"Lost from the old list, which items cannot show: {lost}")] if lost else []
+    assert [(finding.news, finding.text()) for finding in verdict.findings] == expected
+    assert verdict.records[1].alt_cm == 4000
+    assert (verdict.records[1].p3 >> 1, verdict.records[1].flag) == (0, 0)

@@ -8,7 +8,7 @@ from math import hypot
 
 import pytest
 
-from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
+from simulator.nav_waypoint import FLAG_HOME, FLAG_LAST, Action, NavWaypoint
 from simulator.options import Faults
 from tests.support.msp_bench import MspBench, waypoint
 
@@ -185,3 +185,10 @@ def test_disarming_ends_it() -> None:
     flight.bench.faults.armed = False
     flight.bench.run(1)
     assert flight.status() == (NONE, 0, 1, 1, 0)
+
+
+@pytest.mark.parametrize("home", [waypoint(30, flag=FLAG_HOME), waypoint(lat_e7=0, lon_e7=0)])
+def test_a_leg_without_a_place_or_with_the_flag_home_is_flown_to_home(home: NavWaypoint) -> None:
+    flight = Flight(waypoint(20), home, waypoint(10))
+    flight.until(lambda status: status[3] == 3)
+    assert flight.away_from(waypoint(0)) < 5

@@ -110,7 +110,7 @@ class InavMissions(NavMissions):
         self._known = () if loaded == NOTHING else loaded
 
     def _rules(self) -> NavRules:
-        return NavRules(self._profile, self._others)
+        return NavRules(self._profile, self._known or (), self._others)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""

@@ -22,6 +22,7 @@ from bridge.controllers.nav.rules import (
     NavRule,
 )
 from bridge.controllers.nav.stored_missions import Mission, erased
+from bridge.controllers.nav.unshown import flies_home, keep_unshown
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -48,9 +49,10 @@ _NO_THROTTLE = (0, -1, -2)
 
 @dataclass(frozen=True, slots=True)
 class NavRules:
-    """The rules of one flight controller. others: the other missions in its store."""
+    """The rules of one flight controller. former: its present list. others: the other missions in its store."""
 
     profile: NavProfile
+    former: Mission = ()
     others: tuple[Mission, ...] = ()
 
     @property
@@ -60,7 +62,7 @@ class NavRules:
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "NavCheck":
         """Begin the check of a list."""
-        return NavCheck(self.profile, count, fallback_home, self.others)
+        return NavCheck(self, count, fallback_home)
 
 
 class NavCheck(ListCheck):
@@ -70,16 +72,10 @@ class NavCheck(ListCheck):
     every list; without coordinates it is shown at `fallback_home`.
     """
 
-    def __init__(
-        self,
-        profile: NavProfile,
-        count: int,
-        fallback_home: tuple[int, int] | None = None,
-        others: tuple[Mission, ...] = (),
-    ) -> None:
+    def __init__(self, rules: NavRules, count: int, fallback_home: tuple[int, int] | None = None) -> None:
         super().__init__(count)
-        self._profile = profile
-        self._others = others
+        self._rules = rules
+        self._profile = profile = rules.profile
         self._home = home_item(fallback_home)
         self._records: list[NavRecord] = []
         #: The item of each record.
@@ -135,7 +131,7 @@ class NavCheck(ListCheck):
                 self._records[-1] = replace(self._records[-1], p1=LANDS.high)
                 return self._drop(item, "command", item.command, "the RTL before it lands now")
             item = placed_landing(item, self._records, self._note)
-        if rule.position and (missing := missing_coordinate(item)):
+        if rule.position and (missing := missing_coordinate(item)) and not self._flew_home():
             return self._drop(item, *missing, "no Lat/Long")
         if rejection := refuse_frame(item, needs_position=rule.position):
             return rejection
@@ -148,6 +144,11 @@ class NavCheck(ListCheck):
             self._no_position(item, News.NONE)
         self._keep(item, self._record(item, rule, p1))
         return None
+
+    def _flew_home(self) -> bool:
+        """True if the record to be replaced has no place either."""
+        place = len(self._records)
+        return place < len(self._rules.former) and flies_home(self._rules.former[place])
 
     def _hold(self, item: MissionItem) -> int:
         allowed = self._profile.longest_hold
@@ -279,9 +280,13 @@ class NavCheck(ListCheck):
         return not sets_speed and self._speed.at_jump[place] != leg_speed(self._records[target], 0)
 
     def _conclude(self) -> Verdict[NavRecord]:
-        records = (*self._records[:-1], replace(self._records[-1], flag=LAST))
+        kept, lost = keep_unshown(self._records, self._rules.former)
+        records = (*kept[:-1], replace(kept[-1], flag=LAST))
         items = items_from_records(records, self._home, self._sent_as)
-        for mission in erased(self._others, self._profile.capacity - len(records)):
+        if lost:
+            why = f"Lost from the old list, which items cannot show: {lost}"
+            self._findings.append(Finding(None, "count", len(self._rules.former), len(records), why, news=News.WARNING))
+        for mission in erased(self._rules.others, self._profile.capacity - len(records)):
             why = f"Mission of {len(mission)} records does not fit beside it: erased, a copy is kept on the Pi"
             self._findings.append(Finding(None, "count", len(mission), 0, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))

@@ -87,7 +87,7 @@ class NavMissions(OneMission, ABC):
         return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules(), None)
 
     def _rules(self) -> NavRules:
-        return NavRules(self._profile)
+        return NavRules(self._profile, self._known or ())
 
     def items(self, records: Sequence[NavRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         """A list as a ground station reads it; an empty one has no items, not even home."""

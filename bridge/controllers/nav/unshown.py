@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values of a record that no item can show, from other planners: kept if the leg is written again unchanged."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import zip_longest
+
+from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
+
+_ABOVE_SEA = 1
+
+
+def flies_home(record: NavRecord) -> bool:
+    """True if INAV replaces the leg's missing coordinates by home's."""
+    return record.action in LEGS and not (record.lat_e7 or record.lon_e7)
+
+
+def keep_unshown(records: Sequence[NavRecord], former: Sequence[NavRecord]) -> tuple[list[NavRecord], str]:
+    """The records with the unshown values of those that they replace, and the lost ones as text, "" if there are none.
+
+    `former`: the list on the flight controller. A record is unchanged if its shown values and its number are.
+    """
+    kept: list[NavRecord] = []
+    lost: Counter[str] = Counter()
+    for record, old in zip_longest(records, former):
+        is_same = record is not None and old is not None and record == _shown(old)
+        if record is not None:
+            kept.append(replace(old, flag=old.flag if old.flag == FLY_HOME else 0) if is_same else record)
+        if old is not None and not is_same:
+            lost.update(_unshown(old))
+    return kept, ", ".join(f"{name} ({count})" for name, count in lost.items())
+
+
+def _shown(record: NavRecord) -> NavRecord:
+    p2 = 0 if record.action == NavAction.LAND else record.p2
+    return replace(record, p2=p2, p3=record.p3 & _ABOVE_SEA, flag=0)
+
+
+def _unshown(record: NavRecord) -> list[str]:
+    names = []
+    if record.p3 & ~_ABOVE_SEA:
+        names.append("user actions")
+    if record.flag == FLY_HOME and not flies_home(record):
+        names.append("fly home")
+    if record.action == NavAction.LAND and record.p2:
+        names.append("ground elevation")
+    return names
