@@ -2,22 +2,25 @@
 """How a command of the command line reaches a bridge: the running daemon's, or one of its own with `--fc`."""
 
 import asyncio
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 from service.cli.printing import fail
-from service.control.client import ControlError, NoDaemonError, ask_daemon
+from service.control.client import ControlError, Interrupted, NoDaemonError, ask_daemon
 from service.control.mission_data import Json
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
 from storage.store_error import StoreError
 
 _INTERRUPTED = 130  # as shells have it: 128 + SIGINT
-_GOES_ON = "interrupted; the daemon goes on with it: see `naze-bridge status` and `naze-bridge missions list`"
-_CANCELLED = "interrupted; what was not finished within 2 s was given up: see `naze-bridge pull`"
+_GOES_ON = "the daemon goes on with the mission, and the result follows; to leave, press Ctrl-C again"
+_LEFT = "interrupted; the daemon goes on with the mission: see `naze-bridge missions list`"
+_WRITES = ("push", "restore")
 #: The service's state directory.
 SERVICE_STATE = Path("/var/lib/naze-bridge")
 
@@ -52,8 +55,9 @@ def ask(
         from service.cli.direct_bridge import ask_directly  # the whole daemon: --help does without
 
         return asyncio.run(ask_directly(parse_fc(fc), request, progress))
-    except KeyboardInterrupt:
-        click.echo(f"naze-bridge: {_GOES_ON if fc is None else _CANCELLED}", err=True)
+    except (KeyboardInterrupt, Interrupted) as error:
+        said = _LEFT if fc is None and request["do"] in _WRITES else str(error) or "interrupted"
+        click.echo(f"naze-bridge: {said}", err=True)
         raise SystemExit(_INTERRUPTED) from None
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error
@@ -69,7 +73,27 @@ def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, tot
     columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("Flight controller", total=total)
-        return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
+        with nullcontext() if fc is not None else _first_interrupt(lambda: bar.console.out(f"naze-bridge: {_GOES_ON}")):
+            return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))
+
+
+@contextmanager
+def _first_interrupt(say: Callable[[], None]) -> Iterator[None]:
+    """On the first Ctrl-C only call `say`; the second one raises KeyboardInterrupt, as usual."""
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is not signal.default_int_handler:  # it is ignored, as for a shell's background jobs
+        yield
+        return
+
+    def interrupted(_number: int, _frame: object) -> None:
+        signal.signal(signal.SIGINT, usual)
+        say()
+
+    signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
 
 def ask_store(state_dir: Path | None, request: Json) -> Json:

@@ -5,7 +5,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
-from service.control.client import STATUS, ControlError
+from service.control.client import STATUS, ControlError, Interrupted
 from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
 from service.daemon.daemon import Daemon
@@ -20,15 +20,20 @@ _PORTS_SEARCHED = 3
 #: A round of telemetry takes a second; at 9600 baud two.
 _TELEMETRY_PATIENCE_S = 3.0
 _INTERVAL_S = 0.05
+_UNCONFIRMED = "interrupted; the flight controller has not confirmed that it keeps its mission: see `naze-bridge pull`"
 _TOLD_LATER = ("armed", "battery_v", "satellites", "mission_records")
 
 
 async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
-    """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply."""
+    """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply.
+
+    If cancelled, a push is aborted, and Interrupted says how it ended.
+    """
     set_up_logging("error")
     daemon = Daemon(Settings(fc, takeoff_max_m=takeoff_limit_m()))
     jobs = MissionJobs(daemon)
     running = asyncio.create_task(daemon.run())
+    job: asyncio.Future[Json] | None = None
     try:
         patience_s = _SEARCH_PATIENCE_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
         await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.controller), patience_s)
@@ -40,11 +45,15 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
         # Who it is comes before what it tells of itself, and some controllers never tell all of it.
         if request == STATUS:
             await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
-        return await jobs.do(request, lambda answer: progress(answer["progress"]))
+        job = asyncio.ensure_future(jobs.do(request, lambda answer: progress(answer["progress"])))
+        return await asyncio.shield(job)
     except asyncio.CancelledError:
-        # A mission is either finished or aborted cleanly, never left half-written.
-        await daemon.finish()
-        raise
+        if request["do"] != "push":
+            raise
+        if job is None:
+            raise Interrupted("interrupted; nothing was written") from None
+        await daemon.abort()
+        raise Interrupted(f"interrupted: {job.result()['text']}" if job.done() else _UNCONFIRMED) from None
     finally:
         running.cancel()
         with suppress(asyncio.CancelledError):

@@ -21,6 +21,10 @@ class ControlError(Exception):
     """The daemon refused, or is not there; one sentence."""
 
 
+class Interrupted(Exception):
+    """The user interrupted the request; one sentence about its end."""
+
+
 class NoDaemonError(ControlError):
     """No daemon answers."""
 

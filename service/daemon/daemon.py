@@ -252,8 +252,11 @@ class Daemon:
         """Start no more transfers; the present one finishes soon, or is aborted cleanly."""
         self.bridge.stop_missions(self._loop.time())
         self.flush()
-        if await self.is_at_rest(_FINISH_S):
-            return
+        if not await self.is_at_rest(_FINISH_S):
+            await self.abort()
+
+    async def abort(self) -> None:
+        """Abort the present transfer cleanly."""
         self.bridge.runner.stop(self._loop.time())
         self.flush()
         await self.is_at_rest(_ABORT_S)

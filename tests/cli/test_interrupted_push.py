@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ctrl-C in `push`, typed at a terminal while records are being written."""
+
+import fcntl
+import os
+import pty
+import re
+import signal
+import subprocess
+import termios
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+import pytest
+
+from tests.support.benches import Starter
+from tests.support.programs import NAZE_BRIDGE, PATIENCE, REPOSITORY, Board, run_naze_bridge
+
+EXAMPLES = REPOSITORY / "examples"
+LONG = EXAMPLES / "long-146.waypoints"
+CTRL_C = b"\x03"
+#: Some of the records are written.
+UNDER_WAY = r"[1-9][0-9]*/146"
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Starter]:
+    with ExitStack() as stack:
+        yield Starter(tmp_path, stack)
+
+
+def slow_board(start: Starter) -> Board:
+    """It takes 5 s to write 146 records."""
+    return start.board("--baud", "9600")
+
+
+class Terminal:
+    """A command in a terminal of its own, where Ctrl-C works however the tests were started."""
+
+    def __init__(self, *arguments: str | Path) -> None:
+        self._master, slave = pty.openpty()
+
+        def control_terminal() -> None:
+            fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+        self._process = subprocess.Popen(
+            [*NAZE_BRIDGE, *map(str, arguments)],
+            cwd=REPOSITORY, stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
+            preexec_fn=control_terminal, env=os.environ | {"TERM": "xterm", "COLUMNS": "200"},
+        )  # fmt: skip
+        os.close(slave)
+        self.printed = ""
+
+    def type(self, keys: bytes) -> None:
+        os.write(self._master, keys)
+
+    def wait_for(self, pattern: str) -> None:
+        while not re.search(pattern, self.printed):
+            self.printed += self._read()
+
+    def end(self) -> int:
+        with suppress(OSError):  # the terminal ends with its last program
+            while True:
+                self.printed += self._read()
+        os.close(self._master)
+        return self._process.wait(PATIENCE)
+
+    def _read(self) -> str:
+        return os.read(self._master, 4096).decode(errors="replace")
+
+
+def test_without_a_daemon_the_old_mission_is_kept(start: Starter) -> None:
+    board = slow_board(start)
+    fc = f"{board.link},9600"
+    assert run_naze_bridge("push", EXAMPLES / "naze-field.waypoints", "--fc", fc).returncode == 0
+    before = board.records()
+    assert before
+    terminal = Terminal("push", LONG, "--fc", fc)
+    terminal.wait_for(UNDER_WAY)
+    terminal.type(CTRL_C)
+    assert terminal.end() == 130
+    assert "naze-bridge: interrupted: naze-bridge was stopped meanwhile; the old mission is kept" in terminal.printed
+    assert board.records() == before
+    board.assert_was_treated_well()
+
+
+def test_a_daemon_goes_on_and_its_result_follows(start: Starter) -> None:
+    board = slow_board(start)
+    daemon = start.daemon(f"{board.link},9600")
+    daemon.wait()
+    terminal = Terminal("push", LONG, "--state-dir", daemon.state_dir)
+    terminal.wait_for(UNDER_WAY)
+    terminal.type(CTRL_C)
+    terminal.wait_for("naze-bridge: the daemon goes on with the mission")
+    assert terminal.end() == 0
+    assert "ACCEPTED" in terminal.printed
+    assert len(board.records()) == 146
+
+
+def test_a_second_one_leaves(start: Starter) -> None:
+    board = slow_board(start)
+    daemon = start.daemon(f"{board.link},9600")
+    daemon.wait()
+    terminal = Terminal("push", LONG, "--state-dir", daemon.state_dir)
+    terminal.wait_for(UNDER_WAY)
+    terminal.type(CTRL_C)
+    terminal.wait_for("press Ctrl-C again")
+    terminal.type(CTRL_C)
+    assert terminal.end() == 130
+    assert "naze-bridge: interrupted; the daemon goes on" in terminal.printed
