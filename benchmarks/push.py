@@ -59,7 +59,7 @@ async def _push_all(link: Path) -> list[float]:
     daemon = Daemon(settings)
     running = asyncio.create_task(daemon.run())
     try:
-        while daemon.bridge.missions.dialect is None:  # noqa: ASYNC110 - the daemon tells its log, and nobody else
+        while daemon.bridge.missions.dialect is None:  # noqa: ASYNC110 - only the daemon's log says so
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(seed)) for seed in range(_RUNS)]
     finally:

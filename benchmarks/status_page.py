@@ -55,7 +55,7 @@ def measure() -> list[Figure]:
     floor = Floor(statistics.median(quiet), "in peace")
     name = f"push of 146 records under {answered:.0f} answers/s"
     return [
-        Figure("daemon with everything on, nobody looks: CPU of one core", percent, "%", None, _PROMISED_PERCENT),
+        Figure("daemon with everything on, page not open: CPU of one core", percent, "%", None, _PROMISED_PERCENT),
         Figure("daemon with everything on: resident", resident, "MB", None, _PROMISED_MB),
         Figure("the same after hostile browsers", after, "MB", None, _PROMISED_MB),
         Figure(

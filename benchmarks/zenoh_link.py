@@ -199,7 +199,7 @@ async def _unread_us(with_zenoh: _Fed, without: _Fed) -> list[Figure]:
             await asyncio.sleep(0)
     on, off = map(statistics.median, costs)
     return [
-        Figure("an answer dealt with, zenoh on and nobody reads, CPU", on, "us", Floor(off, "the same without zenoh")),
+        Figure("a reply handled, zenoh on without subscribers, CPU", on, "us", Floor(off, "the same without zenoh")),
         Figure("what zenoh costs there", max(on - off, 0.0), "us", None, 10.0),
     ]
 

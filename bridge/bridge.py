@@ -20,7 +20,7 @@ from bridge.fc.msp_sharing import MspSharing
 from bridge.fc.profile import FlightController, RuleSettings
 from bridge.fc.session import FcSession
 from bridge.fc.states.mavlink import Mavlink
-from bridge.gcs.ground import Ground, Tap
+from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.guard import Guard
 from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity
@@ -49,19 +49,27 @@ from bridge.vehicle.vehicle_report import VehicleReporter
 class Bridge:
     """Wires the parts and routes events between them."""
 
-    def __init__(self, config: BridgeConfig, log_event: EventLog, now: float, tap: Tap | None = None) -> None:
+    def __init__(
+        self, config: BridgeConfig, log_event: EventLog, now: float, on_frames: FrameListener | None = None
+    ) -> None:
         self._config = config
         self._log_event = log_event
         self._store_effects: list[StoreEffect] = []
         self._was_armed = False
-        self._logs_flights = tap is not None
+        self._logs_flights = on_frames is not None
         self._announcer = LinkAnnouncer()
         self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
         incidents = Incidents()
 
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
         self.ground = Ground(
-            config.sysid, config.compid, log_event, self._newcomer, tap or _drop, self.guard.standing, config.signers
+            config.sysid,
+            config.compid,
+            log_event,
+            self._newcomer,
+            on_frames or _drop,
+            self.guard.standing,
+            config.signers,
         )
         self.runner = Runner(self._store_effects.append)
         self.session = FcSession(

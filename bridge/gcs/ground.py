@@ -21,7 +21,7 @@ _MAX_TEXT_ID = 0xFFFF
 #: Returns the signature of a MAVLink 2 frame.
 Signer = Callable[[bytes], bytes]
 #: A frame listener: called with all frames to and from ground stations, each once.
-Tap = Callable[[Sequence[bytes]], None]
+FrameListener = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
@@ -39,7 +39,7 @@ class Ground:
         compid: int,
         log_event: EventLog,
         on_newcomer: Callable[[Peer], None],
-        tap: Tap,
+        on_frames: FrameListener,
         standing: Callable[[Peer], Standing],
         signers: Mapping[str, Signer],
     ) -> None:
@@ -47,7 +47,7 @@ class Ground:
         self._compid = compid
         self._log_event = log_event
         self._on_newcomer = on_newcomer
-        self.tap = tap
+        self.on_frames = on_frames
         self._standing = standing
         self._signers = signers
         self._stations = Stations()
@@ -172,7 +172,7 @@ class Ground:
     def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
         """Pass an accepted frame to the frame listener."""
         if not self._stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
-            self.tap([frame.raw])
+            self.on_frames([frame.raw])
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
         """The connection of a full link to drop; one with standing only if there is no other."""
@@ -207,7 +207,7 @@ class Ground:
         peer = station.peer
         frame = self._write(peer, message, self._version(peer))
         if not self._stations.is_listener(peer):
-            self.tap([frame])
+            self.on_frames([frame])
 
     def allows(self, station: Station, cost: Cost) -> bool:
         """Count work that a ground station causes; False if that exceeds its limit."""
@@ -219,13 +219,13 @@ class Ground:
         frame = FrameWriter(sysid, compid, self._signers.get(peer.link)).frame(pack(message), self._version(peer))
         self._datagrams.append((peer, frame))
         if not self._stations.is_listener(peer):
-            self.tap([frame])
+            self.on_frames([frame])
 
     def greet(self, peer: Peer, heartbeat: Message) -> None:
         """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it continues."""
         frame = self._write(peer, heartbeat, self._version(peer))
         if not self._stations.is_listener(peer):
-            self.tap([frame])
+            self.on_frames([frame])
         self._introduce(peer, heartbeat)
 
     def broadcast(self, message: Message) -> None:
@@ -245,7 +245,7 @@ class Ground:
             else:
                 self._datagrams.append((peer, frame))
         if frame is not None and is_logged:
-            self.tap([frame])
+            self.on_frames([frame])
 
     def introduce(self, heartbeat: Message) -> None:
         """Send the heartbeat in the other MAVLink version too, to peers whose version is unknown.

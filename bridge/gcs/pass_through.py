@@ -89,11 +89,11 @@ class PassThrough:
         if system == 0:
             self._send([frame.raw])
             return
-        self._ground.tap([frame.raw])
+        self._ground.on_frames([frame.raw])
         self._ground.forward([frame.raw], self._peers_of(system, component))
 
     def _send(self, frames: list[bytes]) -> None:
-        self._ground.tap(frames)
+        self._ground.on_frames(frames)
         self._ground.forward(in_datagrams(frames), self._ground.everyone())
 
 

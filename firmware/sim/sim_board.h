@@ -5,7 +5,7 @@
  *
  * Its flash keeps the rules of the STM32F103's: erase works on whole pages and sets every bit; program works on half-words that
  * must be erased, or writes 0000. Anything else is refused and counted in `violations`. Behind the core's pages lies a page
- * that stands for the configuration and that nobody may touch.
+ * that stands for the configuration and must not change.
  *
  * The power can be cut at any flash operation (an erase of one page, a program of one half-word). The operation is then left
  * undone, half done (some bits moved, others not), or done, and everything but the flash is lost.

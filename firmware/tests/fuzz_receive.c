@@ -110,7 +110,7 @@ static void happen(input_t *in)
     }
 }
 
-/* The list in flash, the one in RAM, and the checksum that is reported agree; nobody else's flash was touched. */
+/* The list in flash, the one in RAM, and the checksum that is reported agree; no other flash was touched. */
 static void check_stored(void)
 {
     const uint8_t *records = nm_records(&board.core);

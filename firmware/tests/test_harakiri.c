@@ -35,7 +35,7 @@ static void check(bool condition, const char *what, int line)
 
 static uint8_t *at(uint32_t address)
 {
-    CHECK(address >= MISSION_FLASH_ADDR && address < FLASH_END); /* nobody may write to the program */
+    CHECK(address >= MISSION_FLASH_ADDR && address < FLASH_END); /* the program must not be written to */
     return (uint8_t *)(uintptr_t)address;
 }
 

@@ -22,12 +22,12 @@ def shown(found: object) -> str:
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
 
 
-#: Is told in one sentence of what was mended in a file on reading it.
+#: Called with one sentence for each thing that was fixed in a file on reading it.
 Note = Callable[[str], None]
 
 
 def no_note(_text: str) -> None:
-    """Tell nobody."""
+    """Drop the note."""
 
 
 def refuse_other_plans(commands: Iterable[int], name: str) -> None:

@@ -105,7 +105,7 @@ class Daemon:
             ),
             self._log_event,
             self._loop.time(),
-            self._recording.tap,
+            self._recording.on_frames,
         )
         self._complained_of_accept = False
         #: Why missions are kept in memory only; empty if they are stored.

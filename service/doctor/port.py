@@ -92,7 +92,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     for file in _CMDLINES:
         named = words.search(host.read(file))
         if named:
-            found.append(f"{named[0]} stands in {file}")
+            found.append(f"{named[0]} is in {file}")
             remedies.append(f"sudo sed -i 's/console={named[1]}[^ ]* *//' {file} && sudo reboot")
             break
     else:

@@ -3,7 +3,7 @@
 
 from collections.abc import Awaitable, Callable
 
-from bridge.gcs.ground import Tap
+from bridge.gcs.ground import FrameListener
 from service.links.fc_device import Device
 from service.links.fc_port import FcPort
 from service.recording.tlog_recorder import TlogRecorder
@@ -15,14 +15,14 @@ TLOG_FOLDER = "logs"
 
 
 class Recording:
-    """The recordings set up by `settings`; `tap` takes MAVLink frames. UartFileError if the UART cannot be recorded."""
+    """The recordings that `settings` asks for. Raises UartFileError if the UART cannot be recorded."""
 
     def __init__(self, settings: Settings) -> None:
         self._uart = None if settings.record_uart is None else UartRecorder(settings.record_uart)
         self._tlog: TlogRecorder | None = None
         if settings.tlog is not None and settings.state_dir is not None:
             self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
-        self.tap: Tap | None = None if self._tlog is None else self._tlog.tap
+        self.on_frames: FrameListener | None = None if self._tlog is None else self._tlog.on_frames
 
     def port(
         self,

@@ -16,7 +16,7 @@ _CLOCK_STEP_US = 10_000_000
 
 
 class TlogRecorder:
-    """Offers `tap`. Within a file time runs on evenly; after the clock is set a new file begins.
+    """Offers `on_frames`. Within a file time runs on evenly; after the clock is set a new file begins.
 
     A file begins without ground stations' heartbeats: Mission Planner shows the system whose HEARTBEAT comes first in a
     log, and recognizes only the systems 255 and 253 as ground stations. They are left out until a vehicle's HEARTBEAT.
@@ -34,7 +34,7 @@ class TlogRecorder:
         self._awaits_vehicle = True
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
 
-    def tap(self, frames: Sequence[bytes]) -> None:
+    def on_frames(self, frames: Sequence[bytes]) -> None:
         """Record whole frames that were sent or received just now."""
         now_us = time.monotonic_ns() // 1000
         with self._writer.lock:

@@ -154,7 +154,7 @@ def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
     if host.startswith("[") and host.endswith("]"):
         host = host[1:-1]
     elif ":" in host:
-        raise AddressError(f"{text!r}: an IPv6 address stands in brackets, as in [::1]:5760")
+        raise AddressError(f"{text!r}: write an IPv6 address in brackets, as in [::1]:5760")
     if not colon or not host:
         raise AddressError(f"{text!r} needs a host and a port: {forms}")
     if not port.isdecimal() or not 0 < int(port) < 65536:

@@ -116,7 +116,7 @@ def _name(host: Host, answers: Answers) -> Iterator[Step]:
 def _key(host: Host, answers: Answers) -> Iterator[Step]:
     if answers.key is not None and host.read(KEY_FILE).strip() != answers.key:
         owner = Run(("chown", "naze-bridge:", KEY_FILE))
-        yield Step("set the key without which nobody may write", [WriteFile(KEY_FILE, f"{answers.key}\n", True), owner])
+        yield Step("set the key that is required for writing", [WriteFile(KEY_FILE, f"{answers.key}\n", True), owner])
 
 
 def settings_text(host: Host, answers: Answers) -> str:

@@ -131,7 +131,7 @@ class _State(Collector):
                 counted.add_metric([], value)
                 yield counted
             elif isinstance(value, int):
-                yield _gauge(name, f"As `naze-bridge status` tells it: {name}.", {}, value)
+                yield _gauge(name, f"As in `naze-bridge status`: {name}.", {}, value)
 
     def _links(self) -> Iterator[Metric]:
         for way in ("received", "sent"):

@@ -51,7 +51,7 @@ class CommandQueries:
     async def _restore(self, question: Question) -> None:
         number = question.parameter("number")
         if number is None or not number.isascii() or not number.isdigit() or not 0 < int(number) <= MOST:
-            raise QueryRefused("say which mission: restore?number=3; mission/list tells the numbers")
+            raise QueryRefused("say which mission: restore?number=3; mission/list has the numbers")
         data = await self._jobs.show_mission(int(number))
         count = len(data["received"]["items"])
         _end(question, await self._jobs.restore(int(number), _teller(question, count)))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Diagnoses why a zenoh endpoint rejects the bridge: zenoh itself reports only that it could not connect.
 
-Repeats the first steps with the standard library, which tells an expired certificate from a wrong name.
+Repeats the first steps with the standard library, which distinguishes an expired certificate from a wrong name.
 Blocks for up to a few seconds: not for an event loop.
 """
 
@@ -40,14 +40,14 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
     except ssl.SSLError as error:
         return f"no secure connection: {_words(error)}"
     except socket.gaierror:
-        return f"nobody knows a host {host!r}"
+        return f"the host name {host!r} is unknown"
     except TimeoutError:
         return "no answer"
     except OverflowError:
         return "a port is at most 65535"
     except OSError as error:
         return (error.strerror or str(error)).lower()
-    return "somebody listens there, but lets us not in: check user and password, and that it is a zenoh router"
+    return "a program listens there but refused the session: check user and password, and that it is a zenoh router"
 
 
 def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
@@ -68,7 +68,7 @@ def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
         try:
             secured.recv(1)
         except TimeoutError:
-            return "it takes our certificate, but lets us not in: check user and password, and the router's log"
+            return "it accepted our certificate but refused the session: check user and password, and the router's log"
         except ssl.SSLError as error:
             return f"the router refuses our certificate: {_words(error)}"
     return "the router hangs up: is it a zenoh router?"

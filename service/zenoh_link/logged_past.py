@@ -32,7 +32,7 @@ _SEARCHED = (
 _MAX_READING_S = 5.0
 #: A record has at most 300 bytes.
 _STEP = 4096
-#: Enough for a heartbeat, which tells whether the craft was armed before the range.
+#: Long enough for a heartbeat, which shows if the craft was armed before the range.
 _BEFORE_S = 3.0
 #: A flight controller reports its position five times a second.
 _POSITION_INTERVAL_S = 1.0

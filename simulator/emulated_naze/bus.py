@@ -46,7 +46,7 @@ class Registers:
 
 
 class Bus:
-    """Hands accesses to the blocks, and tells `pace` of each."""
+    """Passes accesses to the blocks, and reports each to `pace`."""
 
     def __init__(self, pace: Pace) -> None:
         self._pace = pace

@@ -30,7 +30,7 @@ _BOOT_LOADER, _BOOT_LOADER_SIZE = 0x1FFF_F000, 0x1000
 _BOOT_LOADER_CODE = struct.pack("<II24xH", _RAM + 0x200, _BOOT_LOADER + 0x21, 0xE7FE)
 #: Unicorn maps memory in pages of this size.
 _MAP_PAGE = 4096
-#: Pin PC15 is how the firmware tells revision 5, with another crystal, where it is high.
+#: The firmware takes the board for revision 5, which has another crystal, if pin PC15 is high.
 _PORT_C_LEVELS = 0x7FFF
 #: The battery's divider: 12.4 V.
 _BATTERY = 1550

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Cortex-M3 core on Unicorn: runs code between two events, enters exceptions and returns from them.
 
-Unicorn counts instructions, not cycles, and tells the count only when it stops. So code runs in stretches that end when
-the next alarm is due; within one, each access to a register block is charged a fixed time.
+Unicorn counts instructions, not cycles, and reports the count only when it stops. So code runs in stretches that
+end when the next alarm is due; within one, each access to a register block is charged a fixed time.
 """
 
 import struct
@@ -34,7 +34,7 @@ class CpuFaultError(Exception):
 
 
 class Cpu:
-    """`core_hz` tells the clock's frequency; `vector_table` where the exception vectors are."""
+    """`core_hz` returns the clock's frequency, `vector_table` the address of the exception vectors."""
 
     def __init__(self, clock: Clock, nvic: Nvic, core_hz: Callable[[], int], vector_table: Callable[[], int]) -> None:
         self._clock = clock

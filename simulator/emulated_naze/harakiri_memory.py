@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What no protocol tells of Harakiri: read from its RAM, by the image's symbols, and from its flash."""
+"""Harakiri's state that no protocol reports, read from its RAM by the image's symbols, and from its flash."""
 
 from enum import Enum
 

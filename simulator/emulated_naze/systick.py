@@ -12,7 +12,7 @@ _MASK = 0xFF_FFFF
 
 
 class SysTick:
-    """`core_hz` tells the core's clock; `on_look` is called before the counter is read."""
+    """`core_hz` returns the core's clock; `on_look` is called before the counter is read."""
 
     def __init__(self, clock: Clock, nvic: Nvic, core_hz: Callable[[], int], on_look: Callable[[], None]) -> None:
         self._clock = clock

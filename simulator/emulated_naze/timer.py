@@ -13,7 +13,7 @@ _UPDATE = 1
 
 
 class Timer(Registers):
-    """`hz`: the clock of its prescaler. `irq`: None for one whose interrupts nobody uses."""
+    """`hz`: the clock of its prescaler. `irq`: None if its interrupt is unused."""
 
     def __init__(self, clock: Clock, nvic: Nvic, hz: Callable[[], int], irq: int | None = None) -> None:
         super().__init__()

@@ -29,7 +29,7 @@ class Log:
 
 def logged(protocol: TelemetryProtocol) -> tuple[World, Log]:
     log = Log()
-    world = World(SimOptions(tele_prot=protocol), tap=log)
+    world = World(SimOptions(tele_prot=protocol), on_frames=log)
     world.wait_ready(30)
     world.run(3)
     return world, log

@@ -399,9 +399,9 @@ def test_signed_frames_reach_the_autopilot_as_they_were_sent() -> None:
 
 @pytest.mark.parametrize("access", [LinkAccess(), LinkAccess(signing(), LINK_ID)])
 def test_setup_signing_goes_nowhere_whoever_sends_it(access: LinkAccess) -> None:
-    taped: list[bytes] = []
+    logged: list[bytes] = []
     world, autopilot = passing({"udp": access})
-    world.bridge.ground.tap = lambda frames: taped.extend(tlog_record(frame, 0) for frame in frames)
+    world.bridge.ground.on_frames = lambda frames: logged.extend(tlog_record(frame, 0) for frame in frames)
     GroundStation(world, "other", sysid=250).send(READS[0])
     world.run(0.1)
     autopilot.received.clear()
@@ -415,7 +415,7 @@ def test_setup_signing_goes_nowhere_whoever_sends_it(access: LinkAccess) -> None
     assert sum(refusals(world).values()) == 2
     assert "Refused: set the key in naze-bridge's settings" in station.texts()
     heard = b"".join(b"".join(each.frames_heard) for each in world.stations.values())
-    for place in (heard, b"".join(taped), repr(world.log_event).encode(), repr(world.bridge._config).encode()):
+    for place in (heard, b"".join(logged), repr(world.log_event).encode(), repr(world.bridge._config).encode()):
         assert KEY not in place
         assert KEY.hex().encode() not in place
         assert repr(KEY).encode() not in place

@@ -139,7 +139,7 @@ def test_a_console_of_the_kernel(pi: FaultyMachine, word: str) -> None:
     name = word.removeprefix("console=").partition(",")[0]
     assert_problem(
         check_console(pi, PORT),
-        f"{word} stands in /boot/firmware/cmdline.txt",
+        f"{word} is in /boot/firmware/cmdline.txt",
         f"sudo sed -i 's/console={name}[^ ]* *//' /boot/firmware/cmdline.txt && sudo reboot",
     )
 

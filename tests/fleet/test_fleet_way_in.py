@@ -63,7 +63,7 @@ def test_somebody_else_listens_there() -> None:
 @pytest.mark.parametrize(
     ("endpoint", "said"),
     [
-        ("tcp/no-such-host.invalid:7447", "nobody knows a host 'no-such-host.invalid'"),
+        ("tcp/no-such-host.invalid:7447", "the host name 'no-such-host.invalid'"),
         ("192.168.4.1:7447", "192.168.4.1:7447"),
         ("tcp/127.0.0.1", "tcp/127.0.0.1"),
         ("smoke/127.0.0.1:7447", "smoke/127.0.0.1:7447"),

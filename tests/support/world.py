@@ -26,7 +26,7 @@ from bridge.fc.autosense import SPEEDS
 from bridge.fc.profile import Profile
 from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.msp import Msp
-from bridge.gcs.ground import Tap
+from bridge.gcs.ground import FrameListener
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
@@ -129,7 +129,7 @@ class World:
         links: Mapping[str, LinkAccess] | None = None,
         profiles: Sequence[Profile] = PROFILES,
         passes_everything: bool = False,
-        tap: Tap | None = None,
+        on_frames: FrameListener | None = None,
     ) -> None:
         self.random = random.Random(seed)
         self.now = 0.0
@@ -148,7 +148,7 @@ class World:
         self._late_s = late_s
         self._lateness_s = 0.0
         config = BridgeConfig(speeds, links=links or {}, profiles=profiles, passes_everything=passes_everything)
-        self.bridge = Bridge(config, self._note, self.now, tap)
+        self.bridge = Bridge(config, self._note, self.now, on_frames)
         if powered:
             self.naze.power_on_booted(self.now)
         if plugged:

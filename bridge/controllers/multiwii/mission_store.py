@@ -38,7 +38,7 @@ class MultiwiiMissions(NavMissions):
         return known
 
     def is_current(self) -> Conversation[bool]:
-        """Read some records, while disarmed: nothing else tells that another client has changed the list."""
+        """Read some records, while disarmed: nothing else shows that another client has changed the list."""
         if self._known is None or self._vehicle.armed is not False:
             return True
         return (yield from self._has_same_records(self._known or self._empty))
