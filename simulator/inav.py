@@ -8,10 +8,11 @@ import struct
 from enum import IntEnum
 
 from simulator.flight import Craft
-from simulator.inav_boxes import ANGLE, ARM, BOXES, NAV_ALTHOLD, NAV_RTH, NAV_WP, box_names
+from simulator.inav_boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP
 from simulator.inav_mission import CAPACITY, FAKE, InavMission
 from simulator.inav_navigation import InavNavigation
 from simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorReplies
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
 
@@ -23,18 +24,15 @@ _CYCLE_TIME_US = 500
 _ARMED_FLAGS = 0b1100  # armed, and armed once
 _LOAD_PERCENT = 7
 _WIND_CMS = 250  # from ahead
-_CELLS, _BATTERY_PERCENT, _DRAWN_MAH = 3, 88, 120
+_CELLS, _BATTERY_PERCENT = 3, 88
 _API_VERSION = bytes((0, 2, 5))
-_FIX_3D = 2
 _HDOP_E2 = 130
-_RSSI = 920
-_LOWEST, _MIDDLE, _CRUISE, _HIGHEST = 1000, 1500, 1450, 2000
 _MISSION_SETTING = b"nav_wp_multi_mission_index\0"
 _FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
 
 
 class InavCommand(IntEnum):
-    """The simulated commands."""
+    """The simulated commands that are INAV's own."""
 
     API_VERSION = 1
     FC_VARIANT = 2
@@ -43,24 +41,7 @@ class InavCommand(IntEnum):
     WP_MISSION_LOAD = 18
     WP_MISSION_SAVE = 19
     WP_GETINFO = 20
-    STATUS = 101
-    RAW_IMU = 102
-    MOTOR = 104
-    RC = 105
-    RAW_GPS = 106
-    COMP_GPS = 107
-    ATTITUDE = 108
-    ALTITUDE = 109
-    ANALOG = 110
-    BOXNAMES = 116
-    WP = 118
-    BOXIDS = 119
-    NAV_STATUS = 121
     STATUS_EX = 150
-    ACC_CALIBRATION = 205
-    MAG_CALIBRATION = 206
-    SET_WP = 209
-    EEPROM_WRITE = 250
     SETTING = 0x1003
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
@@ -75,23 +56,25 @@ class InavFirmware:
         self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
         self._version = tuple(int(part) for part in boot.options.version.split("."))
         self._boxes = BOXES[boot.options.version]
-        self._sensors = _SENSORS | (_PITOT if boot.options.pitot else 0)
         channels = 34 if self._version >= (8, 0, 0) else 18
-        self._channels = channels if boot.options.receiver else 0
+        self._sensors = SensorReplies(
+            {box: NAMES[box] for box in self._boxes},
+            _CYCLE_TIME_US,
+            _SENSORS | (_PITOT if boot.options.pitot else 0),
+            channels=channels if boot.options.receiver else 0,
+            heading_from=0,
+            fix_3d=2,
+            currents_ca=(30, 1250),
+        )
         self.habits = PortHabits(buffer_size=192, cli_guard_s=0.1, obeys_r=self._version <= (8, 0, 1), speaks_v2=True)
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
         self._clock = boot.now
         self._busy = 0.0
-        self._armed = False
+        self.armed = False
         self._stick_loads = boot.faults.stick_loads
         self._home: tuple[int, int] | None = None
-
-    @property
-    def armed(self) -> bool:
-        """True if the craft is armed."""
-        return self._armed
 
     @property
     def stored(self) -> list[bytes]:
@@ -110,14 +93,14 @@ class InavFirmware:
         """Fly until `now`, arm and disarm. CrashError: the check before arming found a JUMP with an invalid target."""
         self._fly_until(now)
         self._follow_sticks()
-        flyable = self._armed or self._mission.is_flyable()
-        if self._faults.armed and not self._armed and flyable and not self._faults.arming_blockers:
-            self._armed = True
+        flyable = self.armed or self._mission.is_flyable()
+        if self._faults.armed and not self.armed and flyable and not self._faults.arming_blockers:
+            self.armed = True
             self._mission.follow_selection()
             self._home = self._craft.position
             self._navigation.arm()
-        elif self._armed and not self._faults.armed:
-            self._armed = False
+        elif self.armed and not self._faults.armed:
+            self.armed = False
             self._navigation.disarm()
             self._craft.rest()
 
@@ -126,16 +109,16 @@ class InavFirmware:
             self._mission.selected = self._faults.selected_mission
         if self._faults.stick_loads > self._stick_loads:
             self._stick_loads = self._faults.stick_loads
-            if not self._armed:
+            if not self.armed:
                 self._mission.load()
 
     def craft_at(self, now: float) -> Craft:
         """The sensor values."""
         self._fly_until(now)
-        return Craft(self._craft.state(), self._armed, self._flags(), self._home)
+        return Craft(self._craft.state(), self.armed, self._flags(), self._home)
 
     def _fly_until(self, now: float) -> None:
-        if not self._armed:
+        if not self.armed:
             self._clock = now
         while self._clock + _STEP_S <= now:
             self._clock += _STEP_S
@@ -149,7 +132,7 @@ class InavFirmware:
     def _flags(self) -> int:
         """The modes in MSP_STATUS: navigation modes follow the flight, not the switch."""
         in_mission, returning = self._navigation.is_in_mission, self._navigation.is_returning
-        flown = {ARM: self._armed, NAV_WP: in_mission, NAV_RTH: returning}
+        flown = {ARM: self.armed, NAV_WP: in_mission, NAV_RTH: returning}
         if in_mission or returning:
             flown |= {ANGLE: True, NAV_ALTHOLD: True}
         return sum(flown.get(box, self._is_on(box)) << bit for bit, box in enumerate(self._boxes[:_STATUS_FLAGS]))
@@ -160,30 +143,30 @@ class InavFirmware:
         """The reply frame: an error frame for refused or unknown commands."""
         self._fly_until(now)
         match command:
-            case InavCommand.SET_WP:
+            case MspCommand.SET_WP:
                 return self._set_waypoint(payload)
-            case InavCommand.WP:
+            case MspCommand.WP:
                 return reply(command, self._waypoint(payload))
             case InavCommand.SETTING:
                 is_known = payload == _MISSION_SETTING
                 return reply(command, bytes((self._mission.selected,))) if is_known else error(command)
             case InavCommand.WP_GETINFO:
-                known = self._mission.known(self._armed)
+                known = self._mission.known(self.armed)
                 return reply(command, bytes((0, CAPACITY, self._mission.is_valid, known)))
             case InavCommand.WP_MISSION_SAVE:
-                return self._when_disarmed(command, len(payload) == 1 and not self._armed and self._save())
+                return self._when_disarmed(command, len(payload) == 1 and not self.armed and self._save())
             case InavCommand.WP_MISSION_LOAD:
-                return self._when_disarmed(command, len(payload) == 1 and not self._armed and self._mission.load())
-            case InavCommand.ACC_CALIBRATION | InavCommand.MAG_CALIBRATION:
+                return self._when_disarmed(command, len(payload) == 1 and not self.armed and self._mission.load())
+            case MspCommand.ACC_CALIBRATION | MspCommand.MAG_CALIBRATION:
                 return self._when_disarmed(command, True)
-            case InavCommand.EEPROM_WRITE:
-                self._busy += 0.0 if self._armed else self._options.eeprom_write_ms / 1000
+            case MspCommand.EEPROM_WRITE:
+                self._busy += 0.0 if self.armed else self._options.eeprom_write_ms / 1000
                 return self._when_disarmed(command, True)
         answer = self._read(command)
         return error(command) if answer is None else reply(command, answer)
 
     def _when_disarmed(self, command: int, done: bool) -> bytes:
-        return reply(command) if done and not self._armed else error(command)
+        return reply(command) if done and not self.armed else error(command)
 
     def _save(self) -> bool:
         saved = self._mission.save()
@@ -195,11 +178,11 @@ class InavFirmware:
     def _set_waypoint(self, payload: bytes) -> bytes:
         """Acknowledge any waypoint of the right size, even if it is not stored."""
         if len(payload) != WAYPOINT_SIZE:
-            return error(InavCommand.SET_WP)
-        closed = self._navigation.is_in_mission if self._version >= (8, 0, 0) else self._armed
+            return error(MspCommand.SET_WP)
+        closed = self._navigation.is_in_mission if self._version >= (8, 0, 0) else self.armed
         if not closed:
             self._mission.write(*unpack_waypoint(payload))
-        return reply(InavCommand.SET_WP)
+        return reply(MspCommand.SET_WP)
 
     def _waypoint(self, payload: bytes) -> bytes:
         number = payload[0] if payload else 0
@@ -211,11 +194,11 @@ class InavFirmware:
             case 255:
                 waypoint = NavWaypoint(FAKE.action, flight.lat_e7, flight.lon_e7, round(flight.altitude_m * 100))
             case _:
-                waypoint = self._mission.read(number, self._armed)
+                waypoint = self._mission.read(number, self.armed)
         return waypoint.pack(number)
 
     def _read(self, command: int) -> bytes | None:
-        craft = Craft(self._craft.state(), self._armed, self._flags(), self._home)
+        craft = Craft(self._craft.state(), self.armed, self._flags(), self._home)
         flight = craft.flight
         match command:
             case InavCommand.API_VERSION:
@@ -226,52 +209,26 @@ class InavFirmware:
                 return bytes(self._version)
             case InavCommand.BOARD_INFO:
                 return b"SIMU\x00\x00\x02\x00\x04SIMU"
-            case InavCommand.STATUS | InavCommand.STATUS_EX:
-                status = struct.pack("<HHHIB", _CYCLE_TIME_US, 0, self._sensors, craft.boxes, 0)
-                return status + (bytes(5) if command == InavCommand.STATUS_EX else b"")
-            case InavCommand.RAW_IMU:
-                return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
-            case InavCommand.MOTOR:
-                return struct.pack("<8H", *(_CRUISE if self._armed else _LOWEST,) * 4, *(0,) * 4)
-            case InavCommand.RC:
-                sticks = (_MIDDLE, _MIDDLE, _MIDDLE, _CRUISE if self._armed else _LOWEST)
-                aux = (_HIGHEST if self._armed else _LOWEST, *(_MIDDLE,) * 30)
-                channels = (*sticks, *aux)[: self._channels]
-                return struct.pack(f"<{len(channels)}H", *channels)
-            case InavCommand.RAW_GPS:
-                position = (flight.lat_e7, flight.lon_e7, round(flight.altitude_m))
-                motion = (round(flight.speed_ms * 100), round(flight.course * 10) % 3600)
-                return struct.pack("<BBiihHHH", _FIX_3D, flight.satellites, *position, *motion, _HDOP_E2)
-            case InavCommand.COMP_GPS:
-                distance, direction = craft.way_home()
-                return struct.pack("<HHB", round(distance), round(direction) % 360, 1)
-            case InavCommand.ATTITUDE:
-                return struct.pack(
-                    "<hhh", round(flight.roll * 10), round(flight.pitch * 10), round(flight.heading) % 360
-                )
-            case InavCommand.ALTITUDE:
-                height = round(flight.height_m * 100)
-                return struct.pack("<ihi", height, round(flight.climb_ms * 100), height)
-            case InavCommand.ANALOG:
-                current = 1250 if self._armed else 30
-                return struct.pack("<BHHh", round(flight.volts * 10), _DRAWN_MAH, _RSSI, current)
-            case InavCommand.BOXNAMES:
-                return box_names(self._boxes)
-            case InavCommand.BOXIDS:
-                return bytes(self._boxes)
+            case InavCommand.STATUS_EX:
+                return (self._sensors.payload(MspCommand.STATUS, craft) or b"") + bytes(5)
             case InavCommand.INAV_STATUS:
-                flags = self._faults.arming_blockers | (_ARMED_FLAGS if self._armed else 0)
-                status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, self._sensors, _LOAD_PERCENT, 0, flags)
+                flags = self._faults.arming_blockers | (_ARMED_FLAGS if self.armed else 0)
+                status = struct.pack("<HHHHBI", _CYCLE_TIME_US, 0, self._sensors.sensors, _LOAD_PERCENT, 0, flags)
                 return status + craft.boxes.to_bytes(8, "little") + b"\0"
             case InavCommand.INAV_ANALOG:
-                current = 1250 if self._armed else 30
+                current = self._sensors.currents_ca[self.armed]
                 volts_e2 = round(flight.volts * 100)
-                drawn = (volts_e2 * current // 100, _DRAWN_MAH, 1300)
-                return struct.pack("<BHHIIIIBH", _CELLS << 4, volts_e2, current, *drawn, 0, _BATTERY_PERCENT, _RSSI)
+                drawn = (volts_e2 * current // 100, DRAWN_MAH, 1300)
+                return struct.pack("<BHHIIIIBH", _CELLS << 4, volts_e2, current, *drawn, 0, _BATTERY_PERCENT, RSSI)
             case InavCommand.INAV_AIR_SPEED:
                 return struct.pack("<I", round(flight.speed_ms * 100) + _WIND_CMS if self._options.pitot else 0)
             case InavCommand.INAV_MIXER:
                 return struct.pack("<BBBBBhBB", 0, 0, 0, self._options.platform, 0, -1, 12, 18)
-            case InavCommand.NAV_STATUS:
+            case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
-        return None
+        usual = self._sensors.payload(command, craft)
+        if command == MspCommand.RAW_GPS and usual is not None:
+            return usual + struct.pack("<H", _HDOP_E2)
+        if command == MspCommand.ALTITUDE and usual is not None:
+            return usual + struct.pack("<i", round(flight.height_m * 100))
+        return usual

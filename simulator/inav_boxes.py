@@ -2,7 +2,7 @@
 """The modes of an INAV copter with GPS, as each version's own simulator lists them: MSP_BOXNAMES and MSP_BOXIDS."""
 
 ARM, ANGLE, NAV_ALTHOLD, NAV_RTH, NAV_WP = 0, 1, 3, 10, 28
-_NAMES = {
+NAMES = {
     0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "NAV ALTHOLD", 5: "HEADING HOLD", 6: "HEADFREE", 7: "HEADADJ", 8: "CAMSTAB",
     10: "NAV RTH", 11: "NAV POSHOLD", 13: "BEEPER", 19: "OSD OFF", 27: "FAILSAFE", 28: "NAV WP", 30: "HOME RESET",
     31: "GCS NAV", 32: "FPV ANGLE MIX", 35: "TURN ASSIST", 38: "KILLSWITCH", 39: "CAMERA CONTROL 1",
@@ -22,8 +22,3 @@ _BOXES_7 = (
 _BOXES_8 = (*(box for box in _BOXES_7 if box != 38), 65, 66, 67)
 _BOXES_9 = (*_BOXES_8[:32], 50, *_BOXES_8[32:])
 BOXES = {"6.1.1": _BOXES_6, "7.1.2": _BOXES_7, "8.0.1": _BOXES_8, "9.0.1": _BOXES_9, "9.1.0": _BOXES_9}
-
-
-def box_names(boxes: tuple[int, ...]) -> bytes:
-    """MSP_BOXNAMES' payload, which may be longer than 255 bytes."""
-    return "".join(f"{_NAMES[box]};" for box in boxes).encode()

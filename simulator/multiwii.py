@@ -3,10 +3,10 @@
 
 import struct
 from dataclasses import replace
-from enum import IntEnum
 
 from simulator.flight import Craft
 from simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.msp_sensors import MspCommand, SensorReplies
 from simulator.multiwii_mission import MultiWiiMission
 from simulator.multiwii_navigation import MultiWiiNavigation
 from simulator.nav_status import State
@@ -16,7 +16,6 @@ from simulator.waypoint_craft import WaypointCraft
 _STEP_S = 0.05
 _VERSION, _QUADX, _MSP_VERSION = 241, 3, 0
 _CAPABILITY = 0x7000_0010  # navigation version 7, and the navigation bit
-_SENSORS = 0b1111
 _EEPROM_BYTE_S = 0.0033
 _BOX_NAMES = {
     0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "BARO", 5: "MAG", 6: "HEADFREE", 7: "HEADADJ", 10: "GPS HOME",
@@ -28,33 +27,8 @@ _FLAG_CRC_ERROR, _FLAG_HOME, _FLAG_HOLD, _FLAG_IN_PROGRESS = 0xFE, 0x01, 0x02, 0
 _HOME, _HOLD = 0, 255
 
 
-class MultiWiiCommand(IntEnum):
-    """The simulated commands."""
-
-    IDENT = 100
-    STATUS = 101
-    RAW_IMU = 102
-    MOTOR = 104
-    RC = 105
-    RAW_GPS = 106
-    COMP_GPS = 107
-    ATTITUDE = 108
-    ALTITUDE = 109
-    ANALOG = 110
-    BOXNAMES = 116
-    WP = 118
-    BOXIDS = 119
-    NAV_STATUS = 121
-    NAV_CONFIG = 122
-    ACC_CALIBRATION = 205
-    MAG_CALIBRATION = 206
-    SET_WP = 209
-    EEPROM_WRITE = 250
-
-
-_ACKNOWLEDGED = frozenset(
-    (MultiWiiCommand.ACC_CALIBRATION, MultiWiiCommand.MAG_CALIBRATION, MultiWiiCommand.EEPROM_WRITE)
-)
+_ACKNOWLEDGED = frozenset((MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATION, MspCommand.EEPROM_WRITE))
+_SENSORS = SensorReplies(_BOX_NAMES, 2800, currents_ca=(0, 0))
 
 
 class MultiWiiFirmware:
@@ -69,13 +43,8 @@ class MultiWiiFirmware:
         self._navigation = MultiWiiNavigation(self._mission, self._craft)
         self._clock = boot.now
         self._busy = 0.0
-        self._armed = False
+        self.armed = False
         self._home: tuple[int, int] | None = None
-
-    @property
-    def armed(self) -> bool:
-        """True if the craft is armed."""
-        return self._armed
 
     @property
     def stored(self) -> list[bytes]:
@@ -90,10 +59,10 @@ class MultiWiiFirmware:
     def follow_pilot(self, now: float) -> None:
         """Fly until `now`, arm and disarm."""
         self._fly_until(now)
-        if self._faults.armed == self._armed:
+        if self._faults.armed == self.armed:
             return
-        self._armed = self._faults.armed
-        if self._armed:
+        self.armed = self._faults.armed
+        if self.armed:
             self._home = self._navigation.home = self._craft.position
         else:
             self._navigation.end()
@@ -102,10 +71,10 @@ class MultiWiiFirmware:
     def craft_at(self, now: float) -> Craft:
         """The sensor values."""
         self._fly_until(now)
-        return Craft(self._craft.state(), self._armed, self._flags(), self._home)
+        return Craft(self._craft.state(), self.armed, self._flags(), self._home)
 
     def _fly_until(self, now: float) -> None:
-        if not self._armed:
+        if not self.armed:
             self._clock = now
         while self._clock + _STEP_S <= now:
             self._clock += _STEP_S
@@ -113,15 +82,15 @@ class MultiWiiFirmware:
 
     def _flags(self) -> int:
         kept = self._faults.boxes & ~(1 << _ARM | 1 << _MISSION)
-        return kept | self._armed << _ARM | (self._navigation.state is not State.NONE) << _MISSION
+        return kept | self.armed << _ARM | (self._navigation.state is not State.NONE) << _MISSION
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """The reply frame; none for a waypoint while a mission is flown."""
         self._fly_until(now)
         match command:
-            case MultiWiiCommand.SET_WP:
+            case MspCommand.SET_WP:
                 return self._set_waypoint(payload.ljust(WAYPOINT_SIZE, b"\0")[:WAYPOINT_SIZE])
-            case MultiWiiCommand.WP:
+            case MspCommand.WP:
                 return reply(command, self._waypoint(payload[0] if payload else _HOME))
         if command in _ACKNOWLEDGED:
             return reply(command)
@@ -138,7 +107,7 @@ class MultiWiiFirmware:
         elif self._mission.store(navigation.number, navigation.step):
             self._counters.flash_writes += 1
             self._busy += WAYPOINT_SIZE * _EEPROM_BYTE_S
-        return reply(MultiWiiCommand.SET_WP)
+        return reply(MspCommand.SET_WP)
 
     def _waypoint(self, number: int) -> bytes:
         """Reply with the last used step, of which only some fields are replaced."""
@@ -159,42 +128,13 @@ class MultiWiiFirmware:
         return replace(step, action=action, lat_e7=position[0], lon_e7=position[1], flag=flag)
 
     def _read(self, command: int) -> bytes | None:
-        craft = Craft(self._craft.state(), self._armed, self._flags(), self._home)
-        flight = craft.flight
         match command:
-            case MultiWiiCommand.IDENT:
+            case MspCommand.IDENT:
                 return struct.pack("<BBBI", _VERSION, _QUADX, _MSP_VERSION, _CAPABILITY)
-            case MultiWiiCommand.STATUS:
-                return struct.pack("<HHHIB", 2800, 0, _SENSORS, craft.boxes, 0)
-            case MultiWiiCommand.RAW_IMU:
-                return struct.pack("<9h", 0, 0, 512, 0, 0, 0, 210, 0, -430)
-            case MultiWiiCommand.MOTOR:
-                return struct.pack("<8H", *(1450 if self._armed else 1000,) * 4, *(0,) * 4)
-            case MultiWiiCommand.RC:
-                throttle, aux = (1450, 2000) if self._armed else (1000, 1000)
-                return struct.pack("<8H", 1500, 1500, 1500, throttle, aux, 1500, 1500, 1500)
-            case MultiWiiCommand.RAW_GPS:
-                position = (flight.lat_e7, flight.lon_e7, round(flight.altitude_m))
-                motion = (round(flight.speed_ms * 100), round(flight.course * 10) % 3600)
-                return struct.pack("<BBiihHH", 1, flight.satellites, *position, *motion)
-            case MultiWiiCommand.COMP_GPS:
-                distance, direction = craft.way_home()
-                return struct.pack("<HhB", round(distance), round((direction + 180) % 360 - 180), 1)
-            case MultiWiiCommand.ATTITUDE:
-                heading = round((flight.heading + 180) % 360 - 180)
-                return struct.pack("<hhh", round(flight.roll * 10), round(flight.pitch * 10), heading)
-            case MultiWiiCommand.ALTITUDE:
-                return struct.pack("<ih", round(flight.height_m * 100), round(flight.climb_ms * 100))
-            case MultiWiiCommand.ANALOG:
-                return struct.pack("<BHHH", round(flight.volts * 10), 120, 920, 0)
-            case MultiWiiCommand.BOXNAMES:
-                return "".join(f"{name};" for name in _BOX_NAMES.values()).encode()
-            case MultiWiiCommand.BOXIDS:
-                return bytes(_BOXES)
-            case MultiWiiCommand.NAV_STATUS:
+            case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
-            case MultiWiiCommand.NAV_CONFIG:
+            case MspCommand.NAV_CONFIG:
                 speeds = (200, 500, 100, 400, 100)
                 limits = (40, 3000, 20, 100, 600)
                 return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
-        return None
+        return _SENSORS.payload(command, Craft(self._craft.state(), self.armed, self._flags(), self._home))

@@ -11,6 +11,8 @@ from service.cli.printing import print_json
 from service.control.client import STATUS
 from service.control.mission_data import Json
 from service.machine.host import Host
+from service.settings.addresses import client_hosts, parse_gcs
+from service.settings.web import ListenAddress, parse_listen
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 
@@ -46,8 +48,8 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
     for link in facts["links"]:
         yield "Connect to", _reachable(link, addresses)
     if facts["page"] is not None:
-        host, _, port = facts["page"].rpartition(":")
-        yield "Page", f"http://{_own(host, addresses)[0]}:{port}/"
+        page = parse_listen(facts["page"])
+        yield "Page", f"http://{ListenAddress(client_hosts(page.host, addresses)[0], page.port)}/"
     if facts["store_trouble"]:
         yield "Missions", f"kept in memory only: {facts['store_trouble']}"
     for text in facts["recording"]:
@@ -94,14 +96,8 @@ def _mission(facts: Json) -> str:
 
 def _reachable(link: str, addresses: list[str]) -> str:
     """What to enter in a ground station for a link that listens; other links as they are written."""
-    kind, _, rest = link.partition(":")
-    host, _, port = rest.rpartition(":")
-    protocol = {"udpin": "UDP", "tcpin": "TCP"}.get(kind)
+    address = parse_gcs(link)
+    protocol = {"udpin": "UDP", "tcpin": "TCP"}.get(address.kind)
     if protocol is None:
         return link
-    return f"{protocol} {' or '.join(_own(host, addresses))}, port {port}"
-
-
-def _own(host: str, addresses: list[str]) -> list[str]:
-    """What to give a client for a listening address; without a network only this machine itself connects."""
-    return (addresses or ["127.0.0.1"]) if host in ("0.0.0.0", "[::]") else [host]  # noqa: S104
+    return f"{protocol} {' or '.join(client_hosts(address.host, addresses))}, port {address.port}"

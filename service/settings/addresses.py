@@ -3,6 +3,7 @@
 
 import re
 import socket
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 UNKNOWN_HOST_HINT = "check the name and the network, or give the address in numbers"
@@ -146,6 +147,16 @@ def parse_gcs(text: str) -> GcsAddress:
 def family_of(host: str) -> socket.AddressFamily:
     """AF_INET6 for an IPv6 address; a name means an IPv4 address."""
     return socket.AF_INET6 if ":" in host else socket.AF_INET
+
+
+def client_hosts(listening: str, own: Sequence[str]) -> Sequence[str]:
+    """The hosts to give a client for a listening address; own: this machine's addresses, none without a network."""
+    return (own or ["127.0.0.1"]) if is_any_address(listening) else [listening]
+
+
+def is_any_address(host: str) -> bool:
+    """True for the addresses that stand for all of a machine's own."""
+    return host in ("", "0.0.0.0", "::")  # noqa: S104
 
 
 def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:

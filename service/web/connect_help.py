@@ -8,7 +8,7 @@ from io import BytesIO
 import segno
 
 from service.control.mission_data import Json
-from service.settings.addresses import GcsAddress
+from service.settings.addresses import GcsAddress, client_hosts, is_any_address
 from service.settings.web import ListenAddress
 
 #: Mission Planner's name for the connection type to choose.
@@ -17,7 +17,7 @@ _CONNECTIONS = {"udpin": "UDPCl", "tcpin": "TCP"}
 
 def page_urls(listen: ListenAddress, own: Iterable[str]) -> list[str]:
     """The page's addresses for other devices; none if only this machine can open it. own: this machine's addresses."""
-    hosts = own if _is_any(listen.host) else [] if _is_loopback(listen.host) else [listen.host]
+    hosts = own if is_any_address(listen.host) else [] if _is_loopback(listen.host) else [listen.host]
     return [f"http://{ListenAddress(host, listen.port)}/" for host in hosts]
 
 
@@ -26,7 +26,7 @@ def connect_help(listen: ListenAddress, links: Sequence[GcsAddress], own: list[s
     stations = [
         {
             "connection": _CONNECTIONS[link.kind],
-            "hosts": (own or ["127.0.0.1"]) if _is_any(link.host) else [link.host],
+            "hosts": client_hosts(link.host, own),
             "port": link.port,
         }
         for link in links
@@ -41,10 +41,6 @@ def qr_code(text: str) -> bytes:
     image = BytesIO()
     segno.make(text, error="m").save(image, kind="svg", scale=4, border=4, dark="#000", light="#fff")
     return image.getvalue()
-
-
-def _is_any(host: str) -> bool:
-    return host in ("", "0.0.0.0", "::")  # noqa: S104
 
 
 def _is_loopback(host: str) -> bool:
