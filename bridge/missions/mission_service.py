@@ -131,23 +131,22 @@ class MissionService:
             return 0
         return self._dialect.seq_of(self.held.records, number)
 
-    def acquire(self, owner: object) -> Refusal | None:
-        """Take the transfer lock; a refusal if another client has it."""
+    def occupied(self) -> Refusal | None:
+        """The reason that no list can be written now, if there is one."""
         if self._closed:
             return _STOPPING
-        if self._owner is not None and self._owner != owner:
-            return OCCUPIED
-        self._owner = owner
-        return None
+        return None if self._owner is None else OCCUPIED
+
+    def acquire(self, owner: object) -> Refusal | None:
+        """Take the transfer lock; a refusal if another client has it."""
+        refusal = self.occupied()
+        if refusal is None:
+            self._owner = owner
+        return refusal
 
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed; saves a request to a busy board."""
         return ARMED if self._dialect is not None and self._vehicle.armed else None
-
-    @property
-    def is_free(self) -> bool:
-        """True if a transfer can begin."""
-        return self._owner is None
 
     def close(self) -> None:
         """Accept no more transfers: the bridge is stopping."""

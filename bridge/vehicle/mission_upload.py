@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-Uploads run one at a time, in the order of their MISSION_COUNT. Mission Planner loses packets of its own and takes any
+Lists arrive side by side, so that a slow ground station does not hold up the others, and are written one at a time.
+Mission Planner loses packets of its own and takes any
 ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed in docs/ground-stations.md.
 """
 
@@ -28,6 +29,7 @@ from bridge.vehicle.recent_answers import RecentAnswers
 from bridge.vehicle.upload_states import (
     TRANSITIONS,
     Asking,
+    Complete,
     Delivered,
     Delivering,
     Ended,
@@ -48,8 +50,10 @@ _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few 
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "This upload is not known here: write it again")
 #: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
 _REMINDERS_S = (2.0, 4.0)
-#: The limit of running and waiting uploads.
-_MOST_UPLOADS = 8
+#: The limit of uploads at a time. Of more, the one with the slowest progress ends.
+_MOST_UPLOADS = 64
+#: The flight controller is not asked more often if it can take a list; one reply serves all uploads that wait for it.
+_ASK_INTERVAL_S = 0.2
 
 
 @dataclass(slots=True, eq=False)
@@ -75,6 +79,7 @@ class MissionUploads:
         self._answers = RecentAnswers(moved_to)
         self._reminders: list[tuple[float, Station, str]] = []
         self._is_asking = False
+        self._may_ask_at = 0.0
 
     @property
     def state(self) -> type[State] | None:
@@ -168,7 +173,7 @@ class MissionUploads:
             return
         if result != MissionResult.ACCEPTED:
             self._end([upload], _cancelled(f"cancelled (result {result})"), now)
-        elif isinstance(upload.state, Receiving):
+        else:
             upload.state.close(now)
 
     # From the rest of the bridge.
@@ -188,7 +193,7 @@ class MissionUploads:
 
     def link_lost(self, now: float) -> None:
         """The flight controller is gone: uploads that still receive items end."""
-        receiving = [upload for upload in self._uploads if isinstance(upload.state, Receiving)]
+        receiving = [upload for upload in self._uploads if isinstance(upload.state, Receiving | Complete)]
         self._end(receiving, Refusal(MissionResult.DENIED, "Flight controller lost during the upload"), now)
 
     def tick(self, now: float) -> None:
@@ -205,12 +210,14 @@ class MissionUploads:
             _, station, text = reminder
             self._post.say(Severity.ERROR, text, station)
         self._begin_next(now)
+        self._ask(now)
 
     def next_deadline(self) -> float:
         """The time of the next `tick`."""
-        if self._missions.is_free and any(isinstance(upload.state, Waiting) for upload in self._uploads):
+        if self._missions.occupied() is not OCCUPIED and self._in(Waiting, Complete):
             return 0.0
-        times = [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
+        times = [self._may_ask_at] if self._in(Asking) and not self._is_asking else []
+        times += [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
         return min(times, default=inf)
 
     # State changes of an upload.
@@ -220,24 +227,30 @@ class MissionUploads:
         self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
         for older in self._uploads:
             older.is_superseded |= older.station == station
-        upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(now))
+        state = Waiting(now) if count else Complete(now, (), CLEARED_LIST)
+        upload = _Upload(station, count, self._context.incidents.begin("upload"), state)
         self._uploads.append(upload)
-        refusal = self._missions.armed_refusal() or self._limit(station)
+        refusal = self._missions.armed_refusal()
+        if refusal is None and not self._post.allows(station, Cost.BOARD):
+            refusal = _TOO_MANY_UPLOADS
         if refusal is not None:
             self._handle(upload, Ended(refusal), now)
+        elif len(self._uploads) > _MOST_UPLOADS:
+            slowest = min(self._undelivered(), key=lambda upload: upload.state.since)
+            self._end([slowest], _cancelled("ended: too many at once"), now)
         self._begin_next(now)
 
     def _begin_next(self, now: float) -> None:
-        """Begin the first waiting upload."""
-        for upload in self._uploads[:]:
-            if isinstance(upload.state, Waiting):
-                refusal = self._missions.acquire(upload)
-                if refusal is OCCUPIED:
-                    return
-                if refusal is not None:
-                    self._handle(upload, Ended(refusal), now)
-                else:
-                    self._handle(upload, Turn() if upload.count else Judged((), CLEARED_LIST), now)
+        """Continue the uploads that wait for another list to be written."""
+        for upload in self._in(Waiting, Complete):
+            if upload not in self._in(Waiting, Complete):
+                # The end of one before it has continued this one.
+                continue
+            is_complete = isinstance(upload.state, Complete)
+            refusal = self._missions.acquire(upload) if is_complete else self._missions.occupied()
+            if refusal is OCCUPIED:
+                return
+            self._handle(upload, Turn() if refusal is None else Ended(refusal), now)
 
     def _handle(self, upload: _Upload, event: Event, now: float) -> None:
         """Change the state by the table."""
@@ -245,6 +258,12 @@ class MissionUploads:
         if TRANSITIONS[type(before)][type(event)] is None:
             self._forget(upload)
         match event:
+            case Turn() if isinstance(before, Complete):
+                if before.verdict.result is Result.REJECTED or self._post.allows(upload.station, Cost.FLASH):
+                    upload.state = Delivering(now)
+                    self._deliver(upload, before.received, before.verdict, now)
+                else:
+                    self._handle(upload, Ended(Refusal(MissionResult.DENIED, TOO_MANY_WRITES)), now)
             case Turn():
                 upload.state = Asking(now)
                 self._ask(now)
@@ -253,11 +272,8 @@ class MissionUploads:
                 self._note("mission.upload_started", upload, count=upload.count)
                 self._request(upload, state, now)
             case Judged(items, verdict):
-                if verdict.result is not Result.REJECTED and not self._post.allows(upload.station, Cost.FLASH):
-                    self._handle(upload, Ended(Refusal(MissionResult.DENIED, TOO_MANY_WRITES)), now)
-                else:
-                    upload.state = Delivering(now)
-                    self._deliver(upload, items, verdict, now)
+                upload.state = Complete(now, items, verdict)
+                self._begin_next(now)
             case Ended(refusal):
                 self._refuse(upload, before, refusal, now)
 
@@ -283,7 +299,7 @@ class MissionUploads:
         if isinstance(state, Waiting):
             upload.count = count
             return True
-        if count != upload.count:
+        if count != upload.count or isinstance(state, Complete):
             self._forget(upload)
             return False
         if isinstance(state, Receiving):
@@ -292,21 +308,18 @@ class MissionUploads:
         return True
 
     def _ask(self, now: float) -> None:
-        """Ask the flight controller; one request serves all uploads that begin before its reply."""
-        if not self._is_asking:
+        """Ask the flight controller if it can take a list, for all uploads that wait for the reply."""
+        if self._in(Asking) and not self._is_asking and now >= self._may_ask_at:
             self._is_asking = True
+            self._may_ask_at = now + _ASK_INTERVAL_S
             self._runner.start(self._missions.preflight(), self._asked, now)
-
-    def _limit(self, station: Station) -> Refusal | None:
-        if len(self._uploads) > _MOST_UPLOADS:
-            return OCCUPIED
-        return None if self._post.allows(station, Cost.BOARD) else _TOO_MANY_UPLOADS
 
     def _asked(self, answer: StoreReport | Refusal | LinkLost, now: float) -> None:
         self._is_asking = False
-        upload = next((upload for upload in self._uploads if isinstance(upload.state, Asking)), None)
-        if upload is None:
-            return
+        for upload in self._in(Asking):
+            self._answered(upload, answer, now)
+
+    def _answered(self, upload: _Upload, answer: StoreReport | Refusal | LinkLost, now: float) -> None:
         if isinstance(answer, LinkLost):
             answer = NO_LINK
         elif isinstance(answer, StoreReport) and (rejection := check_count(upload.count, answer.rules)):
@@ -373,8 +386,7 @@ class MissionUploads:
 
     def _refuse(self, upload: _Upload, state: State, refusal: Refusal, now: float) -> None:
         """Report the reason for the end of an upload; the received items are stored all the same."""
-        if isinstance(state, Receiving) and state.items:
-            items = tuple(state.items[seq] for seq in sorted(state.items))
+        if items := state.received:
             finding = Finding(None, "list", len(items), None, refusal.text)
             verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
             arrived = ArrivedMission(str(upload.station), items, verdict)
@@ -392,6 +404,9 @@ class MissionUploads:
     def _of(self, station: Station) -> _Upload | None:
         """The newest upload of a ground station: one may wait behind another that is being written."""
         return next((upload for upload in reversed(self._uploads) if upload.station == station), None)
+
+    def _in(self, *states: type[State]) -> list[_Upload]:
+        return [upload for upload in self._uploads if isinstance(upload.state, states)]
 
     def _undelivered(self) -> list[_Upload]:
         return [upload for upload in self._uploads if not isinstance(upload.state, Delivering)]

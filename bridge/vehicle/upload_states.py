@@ -22,7 +22,7 @@ class Event:
 
 
 class Turn(Event):
-    """The previous transfer has ended."""
+    """No list is being written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,21 @@ class State(ABC):
 
     seconds: ClassVar[float]
 
+    #: The ground station considers its list written.
+    is_closed = False
+
     def __init__(self, now: float) -> None:
         self.deadline = now + self.seconds
+
+    @property
+    def received(self) -> tuple[MissionItem, ...]:
+        """The items so far, in the order of their numbers."""
+        return ()
+
+    @property
+    def since(self) -> float:
+        """The time of its start or last progress."""
+        return self.deadline - self.seconds
 
     @property
     @abstractmethod
@@ -68,9 +81,13 @@ class State(ABC):
         """The time of the next `tick`."""
         return self.deadline
 
+    def close(self, _now: float) -> None:
+        """The ground station ends the upload: "Write Fast" does so even if items were lost."""
+        self.is_closed = bool(self.received)
+
 
 class Waiting(State):
-    """Another transfer runs. Mission Planner repeats its MISSION_COUNT for 2.8 s."""
+    """Another list is being written. Mission Planner repeats its MISSION_COUNT for 2.8 s."""
 
     seconds = 2.5
     timeout = OCCUPIED
@@ -97,21 +114,20 @@ class Receiving(State):
         self.request = ItemRequest()
         #: MISSION_COUNT came again: the client restarted, or the network duplicated it. The next item shows which.
         self.announced_again = False
-        self._is_closed = False
 
     @property
     def timeout(self) -> Refusal:
         """The refusal for missing items."""
         text = f"Upload silent for {self.seconds:.0f} s, old mission kept"
-        if self._is_closed:
+        if self.is_closed:
             missing = self._count - len(self.items)
             text = f"Mission NOT written: {missing} of {self._count} missing, use Write"
         return Refusal(MissionResult.OPERATION_CANCELLED, text)
 
     @property
-    def is_closed(self) -> bool:
-        """True once the ground station considers its list written."""
-        return self._is_closed
+    def received(self) -> tuple[MissionItem, ...]:
+        """The items so far."""
+        return tuple(self.items[seq] for seq in sorted(self.items))
 
     @property
     def wanted(self) -> int:
@@ -129,7 +145,7 @@ class Receiving(State):
         if item.seq == self._judged:
             self.request.answered(now)
         self.items[item.seq] = item
-        self.deadline = max(self.deadline, now + (_LAST_ITEMS_S if self._is_closed else self.seconds))
+        self.deadline = max(self.deadline, now + (_LAST_ITEMS_S if self.is_closed else self.seconds))
         while self._judged in self.items:
             if self._check.take(self.items[self._judged]) is not None:
                 return self._end()
@@ -137,13 +153,30 @@ class Receiving(State):
         return self._end() if self._judged == self._count else True
 
     def close(self, now: float) -> None:
-        """The ground station ends the upload: "Write Fast" does so even if items were lost."""
+        """Wait only for delayed items."""
         if self.items:
-            self._is_closed = True
+            self.is_closed = True
             self.deadline = now + _LAST_ITEMS_S
 
     def _end(self) -> Judged:
-        return Judged(tuple(self.items[seq] for seq in sorted(self.items)), self._check.finish())
+        return Judged(self.received, self._check.finish())
+
+
+class Complete(State):
+    """The list has arrived, or it is a clear, and another one is being written."""
+
+    seconds = 2.5
+    timeout = OCCUPIED
+
+    def __init__(self, now: float, items: tuple[MissionItem, ...], verdict: Verdict[Any]) -> None:
+        super().__init__(now)
+        self._items = items
+        self.verdict = verdict
+
+    @property
+    def received(self) -> tuple[MissionItem, ...]:
+        """The list."""
+        return self._items
 
 
 class Delivering(State):
@@ -153,10 +186,11 @@ class Delivering(State):
     timeout = Refusal(MissionResult.DENIED, "Still writing the mission: wait for the result")
 
 
-#: State -> event -> next state, None at the end; any other event in a state is a bug. A clear asks for nothing first.
+#: State -> event -> next state, None at the end; any other event in a state is a bug. A clear begins as Complete.
 TRANSITIONS: Mapping[type[State], Mapping[type[Event], type[State] | None]] = {
-    Waiting: {Turn: Asking, Judged: Delivering, Ended: None},
+    Waiting: {Turn: Asking, Ended: None},
     Asking: {Ready: Receiving, Ended: None},
-    Receiving: {Judged: Delivering, Ended: None},
+    Receiving: {Judged: Complete, Ended: None},
+    Complete: {Turn: Delivering, Ended: None},
     Delivering: {Delivered: None, Ended: None},
 }

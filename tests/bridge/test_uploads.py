@@ -232,47 +232,91 @@ def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> Non
 
 
 def test_two_that_press_write_together_both_succeed() -> None:
-    """The second one's MISSION_COUNT is repeated for 2.8 s, and answered when its turn has come."""
+    """Both lists arrive side by side; the one that is whole last is written last."""
     world, station = holding()
     second = GroundStation(world, "second", sysid=254, air=Air(delay_s=0.002))
     station.air = Air(delay_s=0.002)
-    uploads = [Upload(station, waypoints(100)), Upload(second, waypoints(30, 1), repeat_s=0.7, tries=4)]
-    assert [upload.run() for upload in uploads] == [A.ACCEPTED, A.ACCEPTED]
-    assert world.stored == records_of(waypoints(30, 1))
+    uploads = [Upload(station, waypoints(100)), Upload(second, waypoints(30, 1))]
+    world.wait_until(lambda _: all(upload.result is not None for upload in uploads), 10)
+    assert [upload.result for upload in uploads] == [A.ACCEPTED, A.ACCEPTED]
+    assert world.stored == records_of(waypoints(100))
     assert [upload.requested for upload in uploads] == [list(range(100)), list(range(30))]
+
+
+def test_a_slow_ground_station_holds_up_no_other() -> None:
+    world, slow = holding()
+    receiving(world, slow, waypoints(4, 1), 0)
+    for seq in range(4):
+        world.after(4.9 * (seq + 1), lambda seq=seq: slow.send(item_message(seq, waypoints(4, 1)[seq])))  # type: ignore[misc]
+    for number in range(3):
+        plan = waypoints(30, number)
+        assert Upload(GroundStation(world, f"{number}"), plan).run() is A.ACCEPTED
+        assert world.stored == records_of(plan)
+    world.run(20)
+    assert acks(slow) == [A.ACCEPTED]
+    assert world.stored == records_of(waypoints(4, 1))
+
+
+def test_many_that_begin_and_never_end_hold_up_no_other() -> None:
+    """Those with the slowest progress end."""
+    world, station = holding()
+    station.air = Air(delay_s=0.03)
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    for number in range(90):
+        stranger = GroundStation(world, f"crowd {number}", sysid=1 + number)
+        for again in range(20):
+            world.after(0.01 * number + 0.5 * again, lambda stranger=stranger: stranger.send(count_message(9)))  # type: ignore[misc]
+    world.run(1)
+    for number in range(3):
+        assert Upload(station, waypoints(20, number)).run() is A.ACCEPTED
+    assert world.stored == records_of(waypoints(20, 2))
+    world.run(16)
+    assert state(world) is None
+
+
+def hanging_push(world: World) -> None:
+    """The command line pushes a list, which waits for a disk that hangs."""
+    world.store.delay_s = 60
+    world.push(waypoints(3))
 
 
 def test_a_ground_station_whose_turn_does_not_come_is_denied() -> None:
     world, station = holding()
-    second = GroundStation(world, "second", sysid=254)
-    receiving(world, station, waypoints(50), 10)
-    for seq in range(10, 40):
-        world.after((seq - 9) * 0.1, lambda seq=seq: station.send(item_message(seq, waypoints(50)[seq])))  # type: ignore[misc]
+    hanging_push(world)
     for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
-        second.send(message)
+        station.send(message)
     world.run(2.4)
-    assert second.said("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
+    assert station.said("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
     world.run(0.2)
-    assert acks(second) == [A.DENIED]
-    assert second.texts() == ["Another mission transfer is running"]
-    assert "Another mission transfer is running" not in station.texts()
-    assert state(world) is Receiving
+    assert acks(station) == [A.DENIED]
+    assert station.texts() == ["Another mission transfer is running"]
+
+
+def test_a_list_whose_turn_to_be_written_does_not_come_is_denied() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(8), 7)
+    hanging_push(world)
+    station.send(item_message(7, waypoints(8)[7]))
+    world.run(2.4)
+    assert acks(station) == []
+    world.run(0.2)
+    assert acks(station) == [A.DENIED]
+    assert "Another mission transfer is running" in station.texts()
+    world.store.delay_s = 0.0
+    world.run(5)
+    assert world.stored == records_of(waypoints(3))
 
 
 @pytest.mark.parametrize("message", [count_message(0), ack_message(A.OPERATION_CANCELLED)])
 def test_a_ground_station_that_waits_may_cancel(message: Message) -> None:
     world, station = holding()
-    second = GroundStation(world, "second", sysid=254)
-    receiving(world, station, waypoints(8), 3)
-    second.send(count_message(5))
-    second.send(message)
+    hanging_push(world)
+    station.send(count_message(5))
+    station.send(message)
     world.run(0.1)
-    assert acks(second) == [A.OPERATION_CANCELLED]
-    for seq in range(3, 8):
-        station.send(item_message(seq, waypoints(8)[seq]))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(waypoints(8))
+    assert acks(station) == [A.OPERATION_CANCELLED]
+    world.run(5)
+    assert world.stored == records_of(waypoints(3))
 
 
 def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
@@ -284,11 +328,15 @@ def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
     world.wait_until(lambda _: bool(outcome), 2)
     world.run(0.1)
     assert requested(station) == [0]
-    upload = Upload(station, waypoints(30))
+    for seq, item in enumerate(waypoints(5)):
+        station.send(item_message(seq, item))
     world.run(0.02)
+    assert state(world) is Delivering
     denied = world.push(waypoints(3))
     assert denied[0][0].text == "Another mission transfer is running"
-    assert upload.run() is A.ACCEPTED
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(waypoints(5))
 
 
 @pytest.mark.parametrize("sent", [0, 1, 10, 29])
