@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The modes of an INAV copter with GPS, as each version's own simulator lists them: MSP_BOXNAMES and MSP_BOXIDS."""
 
-ARM, ANGLE, NAV_ALTHOLD, NAV_RTH, NAV_WP = 0, 1, 3, 10, 28
+ARM, ANGLE, NAV_ALTHOLD, NAV_RTH, NAV_POSHOLD, NAV_WP = 0, 1, 3, 10, 11, 28
 NAMES = {
     0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "NAV ALTHOLD", 5: "HEADING HOLD", 6: "HEADFREE", 7: "HEADADJ", 8: "CAMSTAB",
     10: "NAV RTH", 11: "NAV POSHOLD", 13: "BEEPER", 19: "OSD OFF", 27: "FAILSAFE", 28: "NAV WP", 30: "HOME RESET",

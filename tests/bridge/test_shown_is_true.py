@@ -9,15 +9,33 @@ import pytest
 
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
+from protocols.mission_item import MissionItem, MissionResult
+from simulator.fc_kinds import make_board
 from simulator.flight import Craft
-from simulator.options import SimOptions, TelemetryProtocol
+from simulator.inav_boxes import ANGLE as INAV_ANGLE
+from simulator.inav_boxes import BOXES as INAV_BOXES
+from simulator.inav_boxes import NAV_POSHOLD, NAV_WP
+from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.conversations import Upload
 from tests.support.world import GroundStation, World
 
 STEP_S, STALE_S = 0.1, 1.5
 FIELD = 453838000, 84733000
 METRES_PER_UNIT = 0.01113
 ANGLE, BARO, GPS_HOLD = 1 << 0, 1 << 2, 1 << 7
-COPTER_STABILIZE, COPTER_ALT_HOLD, COPTER_LOITER = 0, 2, 5
+COPTER_STABILIZE, COPTER_ALT_HOLD, COPTER_AUTO, COPTER_LOITER = 0, 2, 3, 5
+#: Boards on which a mission is flown: the boxes of level flight, of the mission, and of holding a position.
+BOXES = {
+    "inav": [1 << INAV_BOXES["9.1.0"].index(box) for box in (INAV_ANGLE, NAV_WP, NAV_POSHOLD)],
+    "multiwii": [1 << 1, 1 << 10, 1 << 8],
+}
+#: Home, and a way of 300 m around the field.
+MISSION = [
+    MissionItem(seq, 16, 3, 0, 0, 0, 0, FIELD[0] + north, FIELD[1] + east, height_m)
+    for seq, (north, east, height_m) in enumerate(
+        [(0, 0, 0.0), (9000, 0, 20.0), (9000, 9000, 12.0), (1000, 9000, 25.0), (1000, 1000, 20.0)]
+    )
+]
 
 
 def of_home(craft: Craft) -> float:
@@ -70,6 +88,11 @@ SCREEN = {
 }
 
 
+SCREEN_BY_KIND = {
+    kind: [each for each in SCREEN.items() if each[1].kind == kind] for kind in {w.kind for w in SCREEN.values()}
+}
+
+
 @dataclass
 class Screen:
     """Compares what is shown with the craft every 100 ms."""
@@ -80,15 +103,18 @@ class Screen:
     shown: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.look()
         self.station.on_message.append(self.take)
 
     def take(self, message: Message) -> None:
         """Show a message; whatever it says was true a moment ago."""
-        self.look()
-        for name, what in SCREEN.items():
-            value = what.value(message) if message.get_type() == what.kind else None
-            if value is not None:
-                self.shown[name] = self.world.now, value
+        for name, what in SCREEN_BY_KIND.get(message.get_type(), ()):
+            value = what.value(message)
+            if value is None:
+                continue
+            self.shown[name] = self.world.now, value
+            if not self.is_true(what, value):
+                self.look()  # it may be news
                 assert self.is_true(what, value), (self.world.now, name, value, what.truth(self.past[-1][1]))
 
     def look(self) -> None:
@@ -128,13 +154,18 @@ def beat(station: GroundStation) -> None:
     station.world.after(1.0, lambda: beat(station))
 
 
-def on_the_ground(protocol: TelemetryProtocol) -> Screen:
+def on_the_ground(board: str | TelemetryProtocol) -> Screen:
     """A ground station that watches a craft, ready to arm."""
-    world = World(SimOptions(tele_prot=protocol))
+    if isinstance(board, TelemetryProtocol):
+        world = World(SimOptions(tele_prot=board))
+    else:
+        world = World(peer=make_board(board, faults=(faults := Faults(boxes=0))), faults=faults)
     world.wait_ready(30)
     station = GroundStation(world)
     beat(station)
     world.run(6)  # long enough for the switches' ranges to be read
+    if not isinstance(board, TelemetryProtocol):
+        assert Upload(station, MISSION).run() is MissionResult.ACCEPTED
     return Screen(world, station)
 
 
@@ -144,21 +175,25 @@ def arm(screen: Screen) -> None:
         screen.fly(STEP_S, linked=False)
 
 
-ALL = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600]
+ALL = [*TelemetryProtocol, *BOXES]
 
 
-@pytest.mark.parametrize("protocol", ALL)
-def test_two_minutes_of_flight(protocol: TelemetryProtocol) -> None:
-    screen = on_the_ground(protocol)
+def modes_of(board: str | TelemetryProtocol) -> tuple[tuple[int, int], ...]:
+    """The boxes of three parts of a flight, each with the mode that they make."""
+    if isinstance(board, TelemetryProtocol):
+        return (ANGLE, COPTER_STABILIZE), (ANGLE | BARO, COPTER_ALT_HOLD), (ANGLE | BARO | GPS_HOLD, COPTER_LOITER)
+    level, mission, hold = BOXES[board]
+    return (level, COPTER_STABILIZE), (mission, COPTER_AUTO), (hold, COPTER_LOITER)
+
+
+@pytest.mark.parametrize("board", ALL)
+def test_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
+    screen = on_the_ground(board)
     screen.fly(3)
     assert set(screen.shown) == set(SCREEN)
     arm(screen)
     screen.fly(2.5, linked=False)
-    for boxes, mode in (
-        (ANGLE, COPTER_STABILIZE),
-        (ANGLE | BARO, COPTER_ALT_HOLD),
-        (ANGLE | BARO | GPS_HOLD, COPTER_LOITER),
-    ):
+    for boxes, mode in modes_of(board):
         screen.world.faults.boxes = boxes
         screen.fly(40)
         assert screen.heartbeat.custom_mode == mode
@@ -166,12 +201,14 @@ def test_two_minutes_of_flight(protocol: TelemetryProtocol) -> None:
         home = screen.station.said("HOME_POSITION")[-1]
         assert (home.latitude, home.longitude) == FIELD
         assert screen.world.bridge.report.whole().position.home_lat_deg == home.latitude / 1e7
+    assert max(of_home(craft) for _, craft in screen.past) > 20
 
 
-@pytest.mark.parametrize("protocol", ALL)
-def test_what_was_heard_before_the_link_was_lost_is_not_shown_as_new(protocol: TelemetryProtocol) -> None:
-    screen = on_the_ground(protocol)
-    screen.world.faults.boxes = ANGLE | BARO
+@pytest.mark.parametrize("board", ALL)
+def test_what_was_heard_before_the_link_was_lost_is_not_shown_as_new(board: str | TelemetryProtocol) -> None:
+    screen = on_the_ground(board)
+    boxes, mode = modes_of(board)[2]
+    screen.world.faults.boxes = boxes
     screen.fly(2)
     arm(screen)
     screen.fly(10, linked=False)
@@ -179,7 +216,7 @@ def test_what_was_heard_before_the_link_was_lost_is_not_shown_as_new(protocol: T
     screen.fly(20, linked=False)
     assert screen.heartbeat.system_status == m.MAV_STATE_CRITICAL
     assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
-    assert screen.heartbeat.custom_mode == COPTER_ALT_HOLD
+    assert screen.heartbeat.custom_mode == mode
     status = screen.station.said("SYS_STATUS")[-1]
     assert status.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
     assert not status.onboard_control_sensors_health & m.MAV_SYS_STATUS_SENSOR_GPS
