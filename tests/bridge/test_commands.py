@@ -142,6 +142,33 @@ def test_a_mode_is_refused_with_a_text(flying: tuple[World, GroundStation]) -> N
     assert "transmitter switches" in heard[0].text
 
 
+@pytest.mark.parametrize(
+    "refused",
+    [
+        *(long(command, 1.0) for command in (400, 176, 246, 300)),
+        m.MAVLink_set_mode_message(1, 1, 4),
+        m.MAVLink_mission_set_current_message(1, 1, 3),
+        m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", -1.0, 9),
+        m.MAVLink_mission_item_message(1, 1, 0, 3, 16, 2, 0, 0, 0, 0, 0, 45.0, 8.0, 20.0),
+        m.MAVLink_mission_write_partial_list_message(1, 1, 1, 2),
+    ],
+    ids=lambda message: message.get_type(),
+)
+def test_a_refusal_is_told_to_who_asked_and_to_nobody_else(refused: Message) -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    asking, other = GroundStation(world, "asking"), GroundStation(world, "other", sysid=254)
+    for station in (asking, other):
+        station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+    world.run(1)
+    asking.take()
+    other.take()
+    asking.send(refused)
+    world.run(3)
+    assert asking.texts()
+    assert other.texts() == []
+
+
 def test_the_current_waypoint_cannot_be_set(flying: tuple[World, GroundStation]) -> None:
     flying[0].run(_SILENCE_S)
     heard = answers(flying, m.MAVLink_mission_set_current_message(1, 1, 3))

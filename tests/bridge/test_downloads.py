@@ -12,6 +12,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
+from simulator.fc_kinds import make_board
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import (
     Download,
@@ -304,13 +305,22 @@ def test_armed_in_mavlink_mode_home_is_served_and_no_more() -> None:
     assert "Armed: disarm to read the mission" in texts
 
 
-@pytest.mark.parametrize("protocol", list(TelemetryProtocol))
-def test_a_craft_that_is_armed_from_the_start_has_an_item_0(protocol: TelemetryProtocol) -> None:
-    world = World(SimOptions(tele_prot=protocol), Faults(armed=True), powered=False, plugged=False)
+def armed_before(board: str | TelemetryProtocol) -> World:
+    """A bridge that starts beside a craft that flies already."""
+    if not isinstance(board, TelemetryProtocol):
+        faults = Faults(armed=True, boxes=0)
+        return World(peer=make_board(board, faults=faults), faults=faults)
+    world = World(SimOptions(tele_prot=board), Faults(armed=True), powered=False, plugged=False)
     world.power_on()
     world.run(6)
     world.plug()
-    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 12)
+    return world
+
+
+@pytest.mark.parametrize("board", [*TelemetryProtocol, "inav", "multiwii"])
+def test_a_craft_that_is_armed_from_the_start_has_an_item_0(board: str | TelemetryProtocol) -> None:
+    world = armed_before(board)
+    world.wait_until(lambda w: bool(w.bridge.session.vehicle.armed), 15)
     station = GroundStation(world)
     (item,) = ask(station, request_message(0))
     assert item.get_type() == "MISSION_ITEM_INT"
@@ -318,7 +328,7 @@ def test_a_craft_that_is_armed_from_the_start_has_an_item_0(protocol: TelemetryP
     (home_item,) = ask(station, request_message(0))
     for home in station.said("HOME_POSITION")[-1:]:
         assert (home_item.x, home_item.y, home_item.z) == (home.latitude, home.longitude, home.altitude / 1000)
-    assert not any("disarm" in text for text in station.texts())
+    assert not any("disarm to change" in text for text in station.texts())
 
 
 def test_reading_goes_on_beside_an_upload_by_another() -> None:
