@@ -39,8 +39,8 @@ def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_jso
         raise SystemExit(_UNREADABLE) from error
     request: Json = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}
     delivery = ask_with_progress(state_dir, fc, request | {"may_erase": erase}, len(items))
-    if _would_erase(delivery) and not as_json and sys.stdin.isatty():
-        click.confirm(f"{delivery['text']}. Erase it?", abort=True, err=True)
+    is_asked = _would_erase(delivery) and not as_json and sys.stdin.isatty()
+    if is_asked and click.confirm(f"{delivery['text']}. Erase it?", err=True):
         delivery = ask_with_progress(state_dir, fc, request, len(items))
     show_delivery(delivery, as_json=as_json)
 

@@ -4,6 +4,7 @@
 import json
 import math
 import os
+import pty
 import stat
 import subprocess
 import sys
@@ -99,6 +100,30 @@ def test_a_list_that_would_erase_the_mission_is_asked_for(daemon: Daemon, tmp_pa
     assert daemon.held()["records"] == held
     assert ask(daemon, "push", "--erase", nothing).returncode == 0
     assert daemon.held()["records"] == []
+
+
+@pytest.mark.parametrize(("typed", "code", "left"), [(b"n\n", 3, 7), (b"\n", 3, 7), (b"y\n", 0, 0)])
+def test_a_person_at_a_terminal_is_asked_before_the_mission_is_erased(
+    daemon: Daemon, tmp_path: Path, typed: bytes, code: int, left: int
+) -> None:
+    ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
+    nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
+    terminal, far_end = pty.openpty()
+    try:
+        os.write(terminal, typed)
+        ended = ask(daemon, "push", nothing, stdin=far_end)
+    finally:
+        os.close(terminal)
+        os.close(far_end)
+    assert "Erase it? [y/N]" in ended.stderr
+    assert ended.returncode == code, ended
+    assert len(daemon.held()["records"]) == left
+
+
+def test_a_list_that_is_too_long_is_refused_without_its_rows(daemon: Daemon, tmp_path: Path) -> None:
+    refused = ask(daemon, "push", write_plan(tmp_path / "long", plain_plan(5000)))
+    assert refused.returncode == 1
+    assert refused.stdout == "NO_SPACE: Mission rejected: 5000 items, but only 146 fit\n"
 
 
 def test_an_unreadable_file_ends_with_2(daemon: Daemon, tmp_path: Path) -> None:
