@@ -44,6 +44,7 @@ from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.vehicle_report import VehicleReporter
+from protocols.mission_item import MissionResult
 
 
 class Bridge:
@@ -183,7 +184,7 @@ class Bridge:
         self._watch.tick(now)
         for peer in self.ground.expire(now):
             self._incoming.forget(peer)
-        self._say(self._announcer.tick(now))
+        self._say(self._announcer.tick(now, self.session.trouble))
         if self._is_represented:
             self._vehicle.tick(now)
 
@@ -219,7 +220,8 @@ class Bridge:
         self._downloads.forget_all()
         vehicle = self.session.vehicle
         if controller is None:
-            self.missions.use(NO_LINK)
+            trouble = self.session.trouble
+            self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK)
             self._uploads.link_lost(now)
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return

@@ -3,6 +3,7 @@
 
     FAULT VALUE         a field of the board's faults and a number (switches: 0 or 1)
     power on|off
+    reset               the CPU's reset line
     plug, unplug
     stats               one line of JSON: counters, state, and the stored records in hex
     truth               one line of JSON: the craft's true state (simulator.flight)
@@ -60,6 +61,9 @@ class ControlledBoard(FarEnd, Protocol):
     def power_off(self, now: float) -> None:
         """Cut the supply."""
 
+    def reset(self, now: float) -> None:
+        """Pull the CPU's reset line."""
+
 
 class Plug(Protocol):
     """The board's connection to a client."""
@@ -107,6 +111,8 @@ class Control:
                 self._board.power_on(now)
             case ["power", "off"]:
                 self._board.power_off(now)
+            case ["reset"]:
+                self._board.reset(now)
             case ["plug"]:
                 try:
                     self._link.plug()

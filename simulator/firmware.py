@@ -91,7 +91,7 @@ class Firmware:
         self._sender = MavlinkSender()
         # Harakiri's own list and MAVLink upload, also alongside the extension.
         self._floppy = Floppy(flash, self._board, self._missions, self._send_message)
-        self._cli = CommandLine(self._cli_status)
+        self._cli = CommandLine(options.tree, self._cli_status)
         self._schedule = MavlinkSchedule(now)
         self._frsky_number, self._frsky_time = 0, now
         self._traps = TrapCounters()

@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The part of Harakiri's command line that a companion may reach (cli.c): status, wpflush, save and exit.
-
-Commands take effect at the end of a line; empty lines are ignored.
-"""
+"""The part of Harakiri's command line that a companion may reach (cli.c): status, wpflush, save and exit."""
 
 from collections.abc import Callable
 from enum import Enum, auto
 
+from simulator.options import Tree
+from simulator.typed_line import TypedLine
+
 PROMPT = b"\r\n# "
 BANNER = b"\r\nEntering CLI Mode, type 'exit' or 'save' to return, or 'help' \r\n\r\n" + PROMPT
-_LONGEST_LINE = 48
-_ENTER = b"\r\n"
 
 
 class CliRequest(Enum):
@@ -24,20 +22,17 @@ class CliRequest(Enum):
 class CommandLine:
     """Takes typed bytes. `status` returns the lines about the stored missions."""
 
-    def __init__(self, status: Callable[[], str]) -> None:
+    def __init__(self, tree: Tree, status: Callable[[], str]) -> None:
         self._status = status
-        self._line = bytearray()
+        self._line = TypedLine(48) if tree is Tree.TESTCODE3 else TypedLine(47, rubs_out=False)
 
     def type(self, byte: int) -> tuple[bytes, CliRequest | None]:
         """Take a byte; returns the output and the request to the firmware."""
-        if byte in _ENTER and self._line:
-            line, self._line = bytes(self._line), bytearray()
-            text, asked = self._run(line.decode("ascii"))
-            return b"\r\n" + text.encode() + (b"" if asked in _LAST_WORDS else PROMPT), asked
-        if ord(" ") <= byte <= ord("~") and len(self._line) < _LONGEST_LINE and (self._line or byte != ord(" ")):
-            self._line.append(byte)
-            return bytes((byte,)), None
-        return b"", None
+        echo, line = self._line.type(byte)
+        if line is None:
+            return echo, None
+        text, asked = self._run(line)
+        return echo + text.encode() + (b"" if asked in _LAST_WORDS else PROMPT), asked
 
     def _run(self, line: str) -> tuple[str, CliRequest | None]:
         match line.split()[0].lower():

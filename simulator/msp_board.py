@@ -16,9 +16,13 @@ from simulator.msp_port import MspReceiver
 from simulator.msp_v2 import MspReceiverV2
 from simulator.options import Counters, Faults
 from simulator.serial_ring import SerialRing
+from simulator.typed_line import TypedLine
 
 _CLI_PROMPT = b"\r\n# "
 _CLI_BANNER = b"\r\nEntering CLI Mode, type 'exit' to reboot" + _CLI_PROMPT
+_UNKNOWN_COMMAND = b"### ERROR: Unknown command, try 'help'"
+_CLI_LEFT = b"\r\nLeaving CLI mode, unsaved changes lost.\r\nRebooting"
+_CLI_LINE_SIZE = 64
 _NO_SPEED = 115200
 #: The interval at which the pilot retries a refused arming.
 _ARM_RETRY_S = 0.1
@@ -59,6 +63,7 @@ class MspBoard:
         self._busy = 0.0
         # An unserved '#' or 'R', and when the last byte was read.
         self._pending: str | None = None
+        self._typed = TypedLine(_CLI_LINE_SIZE)
         self._last_byte = 0.0
 
     @property
@@ -98,8 +103,7 @@ class MspBoard:
     def power_on(self, now: float) -> None:
         """Switch the power on; the board boots."""
         if self.power is MspPower.OFF:
-            self.power = MspPower.BOOTING
-            self._boots_at = now + self.options.boot_ms / 1000
+            self._boot(now)
 
     def power_on_booted(self, now: float) -> None:
         """Switch the power on early enough that the board has booted by `now`."""
@@ -110,6 +114,12 @@ class MspBoard:
         self._run_until(now)
         self._ring.clear()
         self._stop(MspPower.OFF)
+
+    def reset(self, now: float) -> None:
+        """Pull the CPU's reset line: it boots again."""
+        self._run_until(now)
+        if self.power is not MspPower.OFF:
+            self._reset(now)
 
     def receive(self, data: bytes, now: float) -> None:
         """Put bytes on the wire to the board."""
@@ -171,6 +181,14 @@ class MspBoard:
         self._pending = None
         self._next_task = self._next_look = self._last_byte = at
 
+    def _reset(self, now: float) -> None:
+        self.counters.resets += 1
+        self._boot(now)
+
+    def _boot(self, now: float) -> None:
+        self._stop(MspPower.BOOTING)
+        self._boots_at = now + self.options.boot_ms / 1000
+
     def _boot_at(self, at: float) -> Boot:
         return Boot(self.options, self.faults, self.counters, self._eeprom, at)
 
@@ -226,6 +244,7 @@ class MspBoard:
     def _serve_letter(self, at: float) -> None:
         if self._pending == "#":
             self.power = MspPower.CLI
+            self._typed = TypedLine(_CLI_LINE_SIZE)
             self.counters.cli_entered = True
             self._ring.write(_CLI_BANNER, at)
         else:
@@ -235,10 +254,14 @@ class MspBoard:
     def _serve_cli(self, at: float) -> None:
         self._ring.arrive(at)
         while (byte := self._ring.read()) is not None:
-            if byte == ord("\r"):
-                self._ring.write(_CLI_PROMPT, at)
-            elif ord(" ") <= byte <= ord("~"):
-                self._ring.write(bytes((byte,)), at)
+            echo, line = self._typed.type(byte)
+            self._ring.write(echo, at)
+            if line == "exit":
+                self._ring.write(_CLI_LEFT, at)
+                self._reset(at)
+                return
+            if line is not None:
+                self._ring.write(_UNKNOWN_COMMAND + _CLI_PROMPT, at)
 
     def _disturb(self, data: bytes) -> bytes:
         return disturb(data, self.faults.lost_byte_rate, self.faults.bit_error_rate, self._random)

@@ -116,6 +116,12 @@ class SimulatedNaze:
         self._run_until(now)
         self._cut_power()
 
+    def reset(self, now: float) -> None:
+        """Pull the CPU's reset line: it boots again."""
+        self._run_until(now)
+        if self.power is not Power.OFF:
+            self._reset(now)
+
     def receive(self, data: bytes, now: float) -> None:
         """Put bytes on the wire to the RX pin; they arrive at line rate."""
         self._run_until(now)
@@ -167,8 +173,11 @@ class SimulatedNaze:
         except PowerCutError:
             self._cut_power()
         except ResetError:
-            self.counters.resets += 1
-            self._boot(at)
+            self._reset(at)
+
+    def _reset(self, now: float) -> None:
+        self.counters.resets += 1
+        self._boot(now)
 
     def _boot(self, now: float) -> None:
         self._firmware = None

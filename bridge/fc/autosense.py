@@ -5,7 +5,8 @@ A disarmed Harakiri sends MAVLink heartbeats until it receives something, and an
 speak MAVLink only. So the search listens for both, but probes for MSP and prefers it.
 
 Each visit to a speed runs through the phases below. Evidence is two matching MSP replies to our own probes, or a
-heartbeat with plausible fields; noise produces neither (tests/bridge/test_autosense_noise.py).
+heartbeat with plausible fields; noise produces neither (tests/bridge/test_autosense_noise.py). A board that echoes our
+probes is in its command line.
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives other bytes than we send;
 tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
 """
@@ -20,6 +21,7 @@ from protocols.frsky import FRSKY_SPEED, FrskyWatch
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.heartbeat import is_plausible_heartbeat
 from protocols.msp.commands import Msp
+from protocols.msp.echo import EchoWatch
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
 #: Tried in this order; 115200, Harakiri's default, comes twice, for a board that was still booting.
@@ -35,6 +37,8 @@ _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
 #: Harakiri sends three and more every 125 ms. By chance one of four ids and a mark in the right place: 1 in 1024 each.
 _FRSKY_EVIDENCE = 6
+#: A command line's echo of one probe: `$M<dd`.
+_ECHO_SIZE = 5
 
 
 class Phase(Enum):
@@ -47,11 +51,12 @@ class Phase(Enum):
 
 
 class Spoken(Enum):
-    """The protocols that a flight controller may speak."""
+    """The protocols that a flight controller may speak, and its command line, in which it answers none of them."""
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
     FRSKY = "FrSky"
+    CLI = "command line"
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +95,7 @@ class _Visit:
     heartbeat: MavlinkFrame | None = None
     last_mavlink: MavlinkFrame | None = None
     frsky: FrskyWatch = field(default_factory=FrskyWatch)
+    echo: EchoWatch = field(default_factory=EchoWatch)
 
 
 class Autosense:
@@ -128,6 +134,9 @@ class Autosense:
             self._mavlink_frame(mavlink_frame, now)
         if self.speed == FRSKY_SPEED:
             self._visit.frsky.feed(data)
+        self._visit.echo.feed(data)
+        if not self.found and self._visit.echo.is_echo():
+            self._conclude(Spoken.CLI, "it echoes our probes")
 
     def tick(self, now: float) -> None:
         """Move on at the end of a phase or visit."""
@@ -163,10 +172,12 @@ class Autosense:
         room = self.pending.room(self.speed, now)
         waiting = self.pending.questions(self.speed, now)
         interval_s = _PROBE_INTERVAL_S * max(waiting / _QUICK_PROBES, 1)
-        # Every second probe also fills a parser that is stuck in the middle of a frame.
-        if self._visit.probes % 2 and room >= RESYNC_REPLY_SIZE:
+        # Every second probe also fills a parser that is stuck in the middle of a frame; a command line is not filled.
+        is_typed = self._visit.echo.is_echo(_ECHO_SIZE)
+        if self._visit.probes % 2 and not is_typed and room >= RESYNC_REPLY_SIZE:
             return self._ask(RESYNC, RESYNC_REPLY_SIZE, now) + interval_s
         if room >= _ANSWER_SIZE:
+            self._visit.echo.sent(PROBE)
             return self._ask(PROBE, _ANSWER_SIZE, now) + interval_s
         return interval_s
 

@@ -8,7 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 
 from bridge.fc.profile import FlightController, Profile
 from bridge.fc.states.base import Closed, State
-from bridge.fc.states.events import Event, FrskyFound, Identified, Lost, MavlinkFound, MspFound, PortClosed, PortOpened
+from bridge.fc.states.cli import Cli
+from bridge.fc.states.events import (
+    CliFound,
+    Event,
+    FrskyFound,
+    Identified,
+    Lost,
+    MavlinkFound,
+    MspFound,
+    PortClosed,
+    PortOpened,
+)
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.msp import Identifying, Msp, MspLine
@@ -29,21 +40,23 @@ TRANSITIONS: Mapping[type[State], Mapping[type[Event], type[State]]] = {
         MspFound: Identifying,
         MavlinkFound: Mavlink,
         FrskyFound: Frsky,
+        CliFound: Cli,
         Lost: Searching,
         PortClosed: Closed,
     },
-    Identifying: {Identified: Msp, MavlinkFound: Mavlink, Lost: Searching, PortClosed: Closed},
-    Msp: {Identified: Msp, MavlinkFound: Mavlink, Lost: Searching, PortClosed: Closed},
+    Identifying: {Identified: Msp, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
+    Msp: {Identified: Msp, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
     Mavlink: {Lost: Searching, PortClosed: Closed},
     Frsky: {Lost: Searching, PortClosed: Closed},
+    Cli: {Lost: Searching, PortClosed: Closed},
 }
 
 
 class FcSession:
     """Runs the state machine of one port.
 
-    `on_change` is called with each flight controller that is found, and with None when it is lost. `on_mavlink` gets
-    its MAVLink frames.
+    `on_change` is called with each flight controller that is found, and with None when it is lost or cannot be used.
+    `on_mavlink` gets its MAVLink frames.
     """
 
     def __init__(
@@ -89,6 +102,11 @@ class FcSession:
     def speed(self) -> int | None:
         """The speed that the port must be set to, baud; None where it has none."""
         return self.state.speed
+
+    @property
+    def trouble(self) -> str:
+        """Why the board on the line cannot be used and what the pilot must do; empty if nothing."""
+        return self.state.trouble
 
     @property
     def is_searching(self) -> bool:
@@ -154,7 +172,7 @@ class FcSession:
         if not isinstance(event, Identified):
             self._leave(before, event, now)
         self.state = self._enter(after, event, now)
-        if isinstance(event, MspFound | MavlinkFound | FrskyFound):
+        if isinstance(event, MspFound | MavlinkFound | FrskyFound | CliFound):
             self._log_event(
                 "debug",
                 "fc.sensed",
@@ -165,10 +183,17 @@ class FcSession:
             )
         if self.state.controller is not None:
             self._welcome(self.state.controller, event, now)
+        if self.state.trouble:
+            self._on_change(None, now)
+            self._log_event(
+                "warning", "fc.in_command_line", speed_baud=self.state.speed, incident=self._follow_incident()
+            )
 
     def _leave(self, state: State, event: Event, now: float) -> None:
         """Forget the flight controller and end its conversations."""
         self.state = Closed(self._port, state.speed)
+        if state.trouble:
+            self._on_change(None, now)
         if not isinstance(state, MspLine) and state.controller is None:
             return
         self._port.runner.link_down(now)
@@ -196,6 +221,8 @@ class FcSession:
                 return Mavlink(self._port, event, now)
             case FrskyFound():
                 return Frsky(self._port, event, now)
+            case CliFound():
+                return Cli(self._port, event, now)
 
     def _welcome(self, controller: FlightController, event: Event, now: float) -> None:
         assert isinstance(event, Identified | MavlinkFound | FrskyFound)

@@ -46,13 +46,13 @@ class LinkAnnouncer:
             return None
         return Severity.INFO, f"Found {controller.name}"
 
-    def tick(self, now: float) -> tuple[Severity, str] | None:
-        """Report a loss, and again every 10 s."""
+    def tick(self, now: float, trouble: str) -> tuple[Severity, str] | None:
+        """Report a loss, and again every 10 s; `trouble`: its cause, if known, and what the pilot must do."""
         if self._silent_since is None or now < self._say_at:
             return None
         self.is_lost = True
         self._say_at = now + _REPEAT_S
-        return Severity.WARNING, f"Flight controller lost: silent for {now - self._silent_since:.0f} s"
+        return Severity.WARNING, trouble or f"Flight controller lost: silent for {now - self._silent_since:.0f} s"
 
     def next_deadline(self) -> float | None:
         """The time of the next `tick`."""

@@ -132,8 +132,8 @@ class Daemon:
 
     @property
     def fc_trouble(self) -> str:
-        """Why the flight controller's port cannot be opened; empty if it could be."""
-        return self._port.trouble
+        """Why the flight controller cannot be used: its port, or the state that it is in; empty if it can be."""
+        return self._port.trouble or self.bridge.session.trouble
 
     @property
     def fc_where(self) -> str:
@@ -351,7 +351,7 @@ class Daemon:
             self._recording.flies(is_flying=_FLIGHT[event])
         if event == "fc.found":
             self.found_at, self.lost_at = self._loop.time(), None
-        elif event in ("fc.lost", "fc.port_lost") and self.found_at is not None:
+        elif event in ("fc.lost", "fc.port_lost", "fc.in_command_line") and self.found_at is not None:
             self.found_at, self.lost_at = None, self._loop.time()
         for follower in self._followers:
             follower.event(level, event, facts)

@@ -4,12 +4,15 @@
 from collections.abc import Callable
 
 from bridge.fc.states.base import Closed
+from bridge.fc.states.cli import Cli
 from service.control.client import ControlError
 from service.control.mission_data import Json
 from service.doctor.checked import Checked, note, ok, problem
 from service.settings.addresses import FcAddress
 
 _WIRING = "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART"
+
+_AGAIN = "then run `sudo naze-bridge doctor` again"
 
 
 def check_flight_controller(
@@ -33,13 +36,15 @@ def check_flight_controller(
     try:
         return [_who(fc, ask_port())]
     except ControlError as error:
-        return [problem("flight controller", str(error), _WIRING)]
+        return [problem("flight controller", str(error), _AGAIN if str(error) == Cli.trouble else _WIRING)]
 
 
 def _who(fc: FcAddress, status: Json) -> Checked:
     name = status["flight_controller"]
     if status["state"] == Closed.name:
         return note("flight controller", f"{fc} cannot be opened yet", "see the port, and the daemon's log")
+    if status["state"] == Cli.name:
+        return problem("flight controller", Cli.trouble, _AGAIN)
     if name is None:
         return problem("flight controller", f"no reply on {fc}: {status['state']}", _WIRING)
     speed = "" if status["speed_baud"] is None else f" at {status['speed_baud']} baud"

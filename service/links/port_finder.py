@@ -91,10 +91,10 @@ class PortFinder:
     # The methods of service.daemon.daemon.Follower.
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        """Remember the port of a flight controller that was found; wait for a lost one to come back."""
+        """Remember the port on which a flight controller was found; wait for a lost one to come back."""
         if self._present is None:
             return
-        if event == "fc.found":
+        if event in ("fc.found", "fc.in_command_line"):
             self._stop_waiting()
             self._watch = None
             self._passed.pop(self._present.path, None)

@@ -135,6 +135,12 @@ class EmulatedNaze:
         self._catch_up(now)
         self._cut_power()
 
+    def reset(self, now: float) -> None:
+        """Pull the chip's reset line: it boots again."""
+        self._catch_up(now)
+        if self.power is not EmulatedPower.OFF:
+            self._reset()
+
     def receive(self, data: bytes, now: float) -> None:
         """Put bytes on the wire to the RX pin; they arrive at line rate."""
         self._catch_up(now)
@@ -177,8 +183,7 @@ class EmulatedNaze:
             if self._lost_power:
                 self._cut_power()
             elif chip.wants_reset:
-                self._counters.resets += 1
-                chip.reset()
+                self._reset()
             elif chip.is_in_boot_loader:
                 self._counters.bootloader_entered = True
                 self.power = EmulatedPower.BOOT_LOADER
@@ -193,6 +198,11 @@ class EmulatedNaze:
     def _on_power_cut(self) -> None:
         self._lost_power = True
         self._chip.cpu.pause()
+
+    def _reset(self) -> None:
+        self._counters.resets += 1
+        self._chip.reset()
+        self.power = EmulatedPower.RUNNING
 
     def _cut_power(self) -> None:
         self._lost_power = False

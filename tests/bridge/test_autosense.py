@@ -17,7 +17,6 @@ from protocols.msp.frame import request
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.fake_controllers import (
     HARAKIRI_CAPABILITY,
-    CommandLine,
     Loopback,
     MavlinkOnly,
     MspFake,
@@ -319,12 +318,12 @@ def test_a_heartbeat_without_content_is_no_heartbeat() -> None:
     assert thinks_armed(world) is True
 
 
-@pytest.mark.parametrize("peer", [QuietLine, Loopback, CommandLine])
+@pytest.mark.parametrize("peer", [QuietLine, Loopback])
 def test_nobody_is_found_where_nobody_is(peer: Callable[[], QuietLine]) -> None:
     world = World(peer=peer())
     world.run(60)
     assert isinstance(world.bridge.session.state, Searching)
-    assert world.events("fc.found") == []
+    assert world.events("fc.found") == world.events("fc.in_command_line") == []
 
 
 def test_a_line_that_is_looped_back_is_no_answer() -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from bridge.fc.autosense import SPEEDS
 from bridge.line.msp_link import PROBE, RESYNC
+from protocols.msp.echo import RUB_OUT_LINE, typed_and_rubbed_out
 from protocols.msp.hazards import HAZARDS, RUN_LENGTH, is_clean
 from simulator.line import garble
 from simulator.options import SimOptions
@@ -43,6 +44,7 @@ def test_no_run_within_a_probe(read: int) -> None:
     for sent, clock in itertools.product(SENT, CLOCKS):
         assert runs(heard(PROBE, sent, read, clock)) == 0
         assert runs(heard(RESYNC, sent, read, clock)) == 0
+        assert runs(heard(RUB_OUT_LINE + typed_and_rubbed_out(PROBE) * 2, sent, read, clock)) == 0
         # The frames that follow without a pause, again and again: the sampling falls into many places.
         assert runs(heard(RESYNC * 4, sent, read, clock)) == 0
 

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.fc.states.cli import Cli
 from service.control.client import ControlError
+from service.control.mission_data import Json
 from service.doctor.checked import Checked, Grade
 from service.doctor.examination import examine
 from service.doctor.flight_controller import check_flight_controller
@@ -192,6 +194,16 @@ def test_a_flight_controller_that_says_nothing() -> None:
     assert_problem(found, "no reply on /dev/serial0: searching", "TX goes to RX")
     (_, found) = check_flight_controller(PORT, lambda: silent | {"state": "no port"}, None)
     assert_note(found, "/dev/serial0 cannot be opened yet")
+
+
+def test_a_flight_controller_in_its_command_line() -> None:
+    (_, found) = check_flight_controller(PORT, lambda: STATUS | {"flight_controller": None, "state": Cli.name}, None)
+    assert_problem(found, "in its command line: type exit there, or unplug it", "naze-bridge doctor` again")
+
+    def listened() -> Json:
+        raise ControlError(Cli.trouble)
+
+    assert_problem(check_flight_controller(PORT, nobody, listened), Cli.trouble, "naze-bridge doctor` again")
 
 
 def test_a_daemon_is_asked_and_the_port_left_alone() -> None:

@@ -13,7 +13,7 @@ from tests.support.benches import Bench, Starter
 from tests.support.mission_planner import MissionPlanner, UploadFailed
 from tests.support.plain_station import udp_station
 from tests.support.plan import judge, plain_plan, records_of
-from tests.support.programs import until
+from tests.support.programs import run_naze_bridge, until
 
 OLD, NEW = plain_plan(40), plain_plan(146, start=40)
 
@@ -112,6 +112,29 @@ def test_unplugged_and_plugged_in_again(bench: Bench, planner: MissionPlanner) -
     assert_retry_works(bench, planner)
     lost = bench.daemon.has_logged("fc.port_lost")
     assert lost is not None
+
+
+def test_left_in_its_command_line(start: Starter) -> None:
+    board = start.board()
+    with board.link.open("r+b", buffering=0) as terminal:
+        terminal.write(b"\r\r\r")
+        until(lambda: board.stats()["cli_entered"], "the command line")
+    daemon = start.daemon(str(board.link))
+    daemon.wait("command line")
+    trouble = "The flight controller is in its command line: type exit there, or unplug it"
+    done = run_naze_bridge("status", "--state-dir", str(daemon.state_dir))
+    assert trouble in done.stdout
+    planner = MissionPlanner(daemon.address)
+    with planner:
+        planner.be_connected()
+        planner.wait_for_text("is in its command line: type")
+        assert_denied(lambda: planner.write(NEW))
+        with board.link.open("r+b", buffering=0) as terminal:
+            terminal.write(b"exit\r")
+        daemon.wait()
+        planner.write(NEW)
+    assert board.records() == records_of(judge(NEW))
+    assert board.stats()["hazard_runs"] == 1
 
 
 def test_another_list_is_there_after_the_board_was_changed(start: Starter) -> None:

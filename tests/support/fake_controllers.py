@@ -48,17 +48,6 @@ class Loopback(QuietLine):
         self.outgoing += data
 
 
-class CommandLine(QuietLine):
-    """A Harakiri that was left in its CLI: it echoes what can be printed."""
-
-    def receive(self, data: bytes, now: float) -> None:
-        for byte in data:
-            if byte == ord("\r"):
-                self.outgoing += b"\r\n# "
-            elif ord(" ") <= byte <= ord("~"):
-                self.outgoing.append(byte)
-
-
 class MspFake(QuietLine):
     """Answers MSP from a table; what is not in it is an error, or nothing if `silent_on_unknown`."""
 

@@ -22,6 +22,8 @@ class State(ABC):
     name: ClassVar[str]
     #: Whether the flight controller is still being looked for.
     is_searching: ClassVar[bool] = False
+    #: Why the board cannot be used and what the pilot must do; empty if nothing.
+    trouble: ClassVar[str] = ""
     controller: FlightController | None = None
     link: MspLink | None = None
 

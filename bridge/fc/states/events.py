@@ -45,6 +45,13 @@ class FrskyFound:
 
 
 @dataclass(frozen=True, slots=True)
+class CliFound:
+    """The board echoes what it is asked: it is in its command line."""
+
+    found: Found
+
+
+@dataclass(frozen=True, slots=True)
 class Identified:
     """The board on an MSP link is known."""
 
@@ -62,4 +69,4 @@ class Lost:
     pending: PendingReplies = field(default_factory=PendingReplies)
 
 
-Event = PortOpened | PortClosed | MspFound | MavlinkFound | FrskyFound | Identified | Lost
+Event = PortOpened | PortClosed | MspFound | MavlinkFound | FrskyFound | CliFound | Identified | Lost

@@ -8,13 +8,14 @@ from bridge.fc.identify import identify_msp
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController
 from bridge.fc.states.base import State
-from bridge.fc.states.events import Event, Identified, Lost, MavlinkFound, MspFound
+from bridge.fc.states.events import CliFound, Event, Identified, Lost, MavlinkFound, MspFound
 from bridge.fc.states.foreign import ForeignBytes
 from bridge.fc.states.port import Port
 from bridge.line.conversation import LinkLost
 from bridge.line.msp_link import MspLink
 from bridge.line.pending_replies import PendingReplies
 from protocols.frsky import FRSKY_SPEED
+from protocols.msp.echo import EchoWatch
 from protocols.msp.frame import MspFrame
 
 #: A flight controller that answers nothing for this long is gone: unplugged, reset, or switched to another protocol.
@@ -42,6 +43,7 @@ class MspLine(State):
         self.link = link
         self.found = found
         self._foreign = ForeignBytes()
+        self._echo = EchoWatch()
 
     @property
     def bad_checksums(self) -> int | None:
@@ -54,6 +56,10 @@ class MspLine(State):
         for frame in frames:
             self.take_frame(frame, now)
         self._foreign.note(data, self.link, is_msp=bool(frames))
+        if not frames:
+            self._echo.feed(data)
+            if self._echo.is_echo():
+                return CliFound(Found(Spoken.CLI, self.speed, "it echoes where it answered before"))
         return self.finished()
 
     def tick(self, now: float) -> Event | None:
@@ -72,7 +78,10 @@ class MspLine(State):
 
     def take_output(self) -> list[bytes]:
         """The link's requests."""
-        return super().take_output() + self.link.take_output()
+        requests = self.link.take_output()
+        for frame in requests:
+            self._echo.sent(frame)
+        return super().take_output() + requests
 
     def unanswered(self) -> PendingReplies:
         """What the link still waits for."""

@@ -3,7 +3,7 @@
 
 from bridge.fc.autosense import Autosense, Spoken
 from bridge.fc.states.base import State
-from bridge.fc.states.events import Event, FrskyFound, Lost, MavlinkFound, MspFound
+from bridge.fc.states.events import CliFound, Event, FrskyFound, Lost, MavlinkFound, MspFound
 from bridge.fc.states.port import Port
 
 
@@ -45,6 +45,12 @@ class Searching(State):
         self.port.output += self._search.take_output()
         if found.spoken is Spoken.MSP or (self.port.known_speed is None and found.spoken is Spoken.MAVLINK):
             self.port.known_speed = found.speed
-        if found.spoken is Spoken.MSP:
-            return MspFound(found, self._search.pending)
-        return MavlinkFound(found) if found.spoken is Spoken.MAVLINK else FrskyFound(found)
+        match found.spoken:
+            case Spoken.MSP:
+                return MspFound(found, self._search.pending)
+            case Spoken.MAVLINK:
+                return MavlinkFound(found)
+            case Spoken.FRSKY:
+                return FrskyFound(found)
+            case Spoken.CLI:
+                return CliFound(found)

@@ -26,7 +26,8 @@ function badgesOf(state, silent_s) {
   const wasArmed = armed ? [badge("bad", "WAS ARMED")] : [];
   if (silent_s !== null) return [badge("bad", "NO REPLY FROM THE PI", silent_s), ...wasArmed];
   if (state.link.flight_controller === null) {
-    const what = state.lost_s === null ? badge("bad", state.port.trouble ? "PORT PROBLEM" : "SEARCHING") : badge("bad", "LOST", state.lost_s);
+    const problem = state.link.state === "command line" ? "COMMAND LINE" : state.port.trouble ? "PORT PROBLEM" : "SEARCHING";
+    const what = state.lost_s === null ? badge("bad", problem) : badge("bad", "LOST", state.lost_s);
     return [what, ...wasArmed];
   }
   const known = armed === null ? badge("soft", "ARMED STATE UNKNOWN") : armed ? badge("bad", "ARMED") : badge("good", "DISARMED");

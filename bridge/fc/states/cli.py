@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The flight controller is in its command line, which only a reset leaves."""
+
+from bridge.fc.states.base import State
+from bridge.fc.states.events import CliFound, Event, Lost
+from bridge.fc.states.port import Port
+from bridge.line.msp_link import PROBE
+from protocols.mavlink.frame import MavlinkSplitter
+from protocols.msp.echo import RUB_OUT_LINE, typed_and_rubbed_out
+from protocols.msp.frame import Direction, MspParser
+
+#: A person may be typing: nothing is sent until the line has been quiet for this long, and then once in this time.
+_QUIET_S = 3.0
+#: Two requests without an echo: it restarts, or has no power.
+_SILENCE_S = 7.0
+
+
+class Cli(State):
+    """Somebody left the board in its command line, or a terminal program opened it.
+
+    Sent are only whole requests without a line end, and DEL, which takes them off the line again: neither is a command,
+    and the pilot's `exit` is not appended to something else. A reply or a heartbeat shows that it is back.
+    """
+
+    name = "command line"
+    trouble = "The flight controller is in its command line: type exit there, or unplug it"
+
+    def __init__(self, port: Port, event: CliFound, now: float) -> None:
+        super().__init__(port, event.found.speed)
+        self._heard_at = self._sent_at = now
+        self._begin_listening()
+        port.output.append(RUB_OUT_LINE)
+
+    def receive(self, data: bytes, now: float) -> Event | None:
+        """Watch for anything but echoes."""
+        self._heard_at = now
+        answers = [frame for frame in self._msp.feed(data) if frame.direction is not Direction.REQUEST]
+        return Lost("it has left its command line") if answers or self._mavlink.feed(data) else None
+
+    def tick(self, now: float) -> Event | None:
+        """Ask now and then whether it is back."""
+        if now >= self._heard_at + _SILENCE_S:
+            return Lost("its command line no longer echoes")
+        if now >= self._ask_at:
+            self._sent_at = now
+            self._begin_listening()
+            self.port.output.append(typed_and_rubbed_out(PROBE))
+        return None
+
+    def deadline(self) -> float:
+        """The next request, or the end of the silence."""
+        return min(self._ask_at, self._heard_at + _SILENCE_S)
+
+    @property
+    def _ask_at(self) -> float:
+        return max(self._heard_at, self._sent_at) + _QUIET_S
+
+    def _begin_listening(self) -> None:
+        # An echoed header hides what follows it from the parser.
+        self._msp, self._mavlink = MspParser(), MavlinkSplitter()

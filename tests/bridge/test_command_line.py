@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A board in its command line: recognised by its echo, reported, never typed at, and found again when it is back."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from bridge.fc.states.cli import Cli
+from bridge.fc.states.searching import Searching
+from protocols.mission_item import MissionResult
+from protocols.msp.frame import request
+from simulator.fc_kinds import make_board
+from simulator.naze import SimulatedNaze
+from simulator.options import Faults, SimOptions, Tree
+from tests.support.conversations import Upload, waypoints
+from tests.support.world import GroundStation, World
+
+BOARDS: dict[str, Callable[[], Any]] = {
+    "testcode3": lambda: SimulatedNaze(SimOptions(tree=Tree.TESTCODE3)),
+    "webstore1": lambda: SimulatedNaze(SimOptions(tree=Tree.WEBSTORE1)),
+    "inav": lambda: make_board("inav", faults=Faults(boxes=0)),
+}
+TROUBLE = "The flight controller is in its command line: type exit there, or unplug it"
+
+
+def is_in_cli(world: World) -> bool:
+    return isinstance(world.bridge.session.state, Cli)
+
+
+def open_command_line(world: World) -> None:
+    """With a terminal program on the board's other socket: its keys do not go through the bridge."""
+    for _ in range(3):
+        world.naze.receive(b"#" if world.naze.protocol is None else b"\r", world.now)
+    world.run_until(lambda w: w.naze.counters.cli_entered, 1)
+    assert world.naze.counters.cli_entered
+
+
+def type_exit(world: World) -> bytes:
+    """What is echoed."""
+    world.run(0.1)
+    heard: list[bytes] = []
+    receive = world.bridge.fc_received
+
+    def listen(data: bytes, now: float) -> None:
+        heard.append(data)
+        receive(data, now)
+
+    world.bridge.fc_received = listen  # type: ignore[method-assign]
+    world.naze.receive(b"exit\r", world.now)
+    world.run(0.5)
+    world.bridge.fc_received = receive  # type: ignore[method-assign]
+    return b"".join(heard)
+
+
+def left_in_cli(board: Any) -> World:
+    """The port is opened some time after somebody has left the board in its command line."""
+    world = World(peer=board, plugged=False)
+    if world.naze.protocol is None:
+        world.run(1)
+    open_command_line(world)
+    world.run(60)
+    world.plug()
+    return world
+
+
+def assert_nothing_was_typed(world: World, since: float) -> None:
+    """No line ended, and each request was taken off the line again."""
+    written = b"".join(data for at, _, data in world.written if at >= since)
+    assert not {0x0D, 0x0A, 0x04, 0x09, 0x0C, ord("?")} & set(written)
+
+
+@pytest.mark.parametrize("kind", BOARDS)
+def test_it_is_recognised_when_the_port_is_opened(kind: str) -> None:
+    world = left_in_cli(BOARDS[kind]())
+    station = GroundStation(world)
+    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.wait_until(is_in_cli, 2)
+    (event,) = world.events("fc.in_command_line")
+    assert event.facts["speed_baud"] == 115200
+    world.run(30)
+    assert is_in_cli(world)
+    assert " ".join(station.texts()).count(TROUBLE) == 3
+    assert world.bridge.session.trouble == TROUBLE
+    assert not world.events("fc.found")
+    assert Upload(station, waypoints(5)).run() is MissionResult.DENIED
+    assert " ".join(station.texts()[-2:]) == TROUBLE
+    assert_nothing_was_typed(world, 0)
+
+
+@pytest.mark.parametrize("kind", BOARDS)
+def test_it_is_recognised_in_mid_conversation_and_exit_brings_it_back(kind: str) -> None:
+    world = World(peer=BOARDS[kind]())
+    station = GroundStation(world)
+    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.wait_ready()
+    world.run(5 + (kind == "inav"))
+    open_command_line(world)
+    began = world.now
+    world.wait_until(is_in_cli, 2)
+    world.run(20)
+    assert is_in_cli(world)
+    assert_nothing_was_typed(world, began)
+    echo = type_exit(world)
+    if kind == "webstore1":
+        # It ignores DEL, so the first `exit` is appended to the requests.
+        assert b"Rebooting" not in echo
+        echo = type_exit(world)
+    assert b"Rebooting" in echo
+    world.wait_until(lambda w: w.is_found, 20)
+    world.run(5)
+    assert any("back after" in text for text in station.texts())
+    assert Upload(station, waypoints(5)[kind == "inav" :]).run() is MissionResult.ACCEPTED
+
+
+@pytest.mark.parametrize("kind", BOARDS)
+def test_unplugging_it_brings_it_back(kind: str) -> None:
+    world = left_in_cli(BOARDS[kind]())
+    world.wait_until(is_in_cli, 2)
+    world.run(10)
+    world.power_off()
+    world.wait_until(lambda w: isinstance(w.bridge.session.state, Searching), 10)
+    assert world.bridge.session.trouble == ""
+    world.power_on()
+    world.wait_until(lambda w: w.is_found, 20)
+    world.run(1)
+
+
+@pytest.mark.parametrize("kind", BOARDS)
+def test_one_request_every_three_seconds_for_as_long_as_it_takes(kind: str) -> None:
+    world = left_in_cli(BOARDS[kind]())
+    world.wait_until(is_in_cli, 2)
+    began = world.now
+    world.run(600)
+    assert is_in_cli(world)
+    assert len([at for at, _, _ in world.written if at > began]) <= 201
+    assert_nothing_was_typed(world, 0)
+
+
+def test_nothing_is_sent_while_a_person_types() -> None:
+    world = left_in_cli(BOARDS["testcode3"]())
+    world.wait_until(is_in_cli, 2)
+    world.run(1)
+    began = world.now
+    for character in b"set looptime=3500":
+        world.naze.receive(bytes((character,)), world.now)
+        world.run(1)
+    assert not [at for at, _, _ in world.written if at > began]
+    world.run(10)
+    world.naze.receive(b"\r", world.now)
+    world.run(10)
+    assert is_in_cli(world)
+
+
+def test_a_list_that_looks_like_an_echo_is_none() -> None:
+    """The header of a request in a coordinate, twice in what the board sends: 67.5040548 N."""
+    world = World()
+    world.wait_ready()
+    at = int.from_bytes(request(100)[:3] + b"(", "little")
+    station = GroundStation(world)
+    items = [replace(item, lat_e7=at) for item in waypoints(40)]
+    assert Upload(station, items).run() is MissionResult.ACCEPTED
+    world.bridge.missions.held = None
+    for _ in range(5):
+        world.push(items)
+        world.run(3)
+    assert not world.events("fc.in_command_line")
+    assert len(world.events("fc.found")) == 1
