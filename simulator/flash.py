@@ -23,6 +23,7 @@ class NorFlash:
         self._faults = faults
         self.operations = 0
         self._busy_seconds = 0.0
+        self._is_cut = False
 
     @property
     def memory(self) -> memoryview:
@@ -58,6 +59,9 @@ class NorFlash:
         """Count an operation; False if the flash controller does not execute it."""
         self.operations += 1
         self._busy_seconds += seconds
+        if self._faults.power_cut_at_flash_operation:
+            self._faults.power_cut_at_flash_operation -= 1
+            self._is_cut = not self._faults.power_cut_at_flash_operation
         if self._faults.flash_failures > 0 and not self._is_cut:
             self._faults.flash_failures -= 1
             return False
@@ -65,10 +69,7 @@ class NorFlash:
 
     def _end(self, verified: bool) -> None:
         if self._is_cut:
+            self._is_cut = False
             raise PowerCutError
         if not verified:
             raise FlashError
-
-    @property
-    def _is_cut(self) -> bool:
-        return self.operations == self._faults.power_cut_at_flash_operation

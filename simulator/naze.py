@@ -99,7 +99,7 @@ class SimulatedNaze:
 
     @property
     def flash_operations(self) -> int:
-        """The number of erases and programs so far, as counted by `faults.power_cut_at_flash_operation`."""
+        """The number of erases and programs so far."""
         return self._flash.operations
 
     def power_on(self, now: float) -> None:

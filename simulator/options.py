@@ -60,8 +60,8 @@ class Faults:
 
     The rates are probabilities per bit and per byte, in both directions. `armed` is the pilot's request: the firmware
     refuses it while a configuration write is scheduled. `boxes`: the other switches, one bit for each of BOXNAMES.
-    `extension` takes effect at the next boot. Without `msp` only MAVLink is answered. The power fails during the given
-    flash operation (page erases and 16-byte programs, from 1; 0: never), or the given number of them fail.
+    `extension` takes effect at the next boot. Without `msp` only MAVLink is answered. The power fails during the
+    given flash operation from now on (page erases and 16-byte programs, from 1; 0: never), or so many of them fail.
     `arming_blockers`: INAV's arming flags (runtime_config.h). `stick_loads`: the number of times the pilot has loaded
     the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none.
     """

@@ -101,7 +101,7 @@ class EmulatedNaze:
 
     @property
     def flash_operations(self) -> int:
-        """Erases and programs so far, as `faults.power_cut_at_flash_operation` counts them."""
+        """Erases and programs so far."""
         return self._chip.flash_controller.operations
 
     def peek(self, address: int, size: int) -> bytes:

@@ -10,8 +10,8 @@ class EmulatedFaults:
 
     The rates are probabilities a bit and a byte, in both directions. `armed` is the pilot's wish: throttle down and yaw
     to the side until the firmware does it; the firmware may refuse. Otherwise the sticks and switches are where these
-    say, in microseconds. The power goes in the middle of that flash operation (page erases and half-words programmed,
-    from 1; 0: never), or so many of them fail. `hang` stops the core, not the time.
+    say, in microseconds. The power goes in the middle of that flash operation from now on (page erases and half-words
+    programmed, from 1; 0: never), or so many of them fail. `hang` stops the core, not the time.
     """
 
     bit_error_rate: float = 0.0

@@ -24,7 +24,7 @@ def test_a_power_cut_at_any_operation_leaves_a_whole_list(bench: RealBench, figu
         bench.push(old)
         operations = naze.flash_operations - before
         operation = 1 + cut * (operations - 1) // max(_CUTS - 1, 1)
-        faults.power_cut_at_flash_operation = naze.flash_operations + operation
+        faults.power_cut_at_flash_operation = operation
         try:
             bench.push(new)
         except AssertionError:

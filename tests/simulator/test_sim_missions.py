@@ -429,7 +429,7 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
         if old:
             bench = in_use()
             bench.push(mission(old))
-        bench.naze.faults.power_cut_at_flash_operation = bench.naze.flash_operations + operation
+        bench.naze.faults.power_cut_at_flash_operation = operation
         bench.send(encode_begin(identify(new)))
         for index in range(20):
             bench.run(0.2)
@@ -457,7 +457,7 @@ def test_a_power_cut_in_the_configuration_loses_it_but_not_the_list() -> None:
     bench.payload(encode_radius(350))
     bench.run(1.5)
     bench.payload(encode_radius(500))
-    bench.naze.faults.power_cut_at_flash_operation = bench.naze.flash_operations + 2
+    bench.naze.faults.power_cut_at_flash_operation = 2
     bench.run(1.5)
     assert bench.naze.power is Power.OFF
     bench.naze.power_on(bench.now)

@@ -84,7 +84,7 @@ class Simulated:
         self._missions = self._boot_missions(self._flash, self._board)
 
     def cut_power_at(self, operation: int) -> None:
-        self._faults.power_cut_at_flash_operation = operation and self._flash.operations + operation
+        self._faults.power_cut_at_flash_operation = operation
 
     def fail_at(self, operation: int) -> None:
         assert operation in (0, 1), "the simulated flash lets the next operations fail, not a later one"
