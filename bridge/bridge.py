@@ -26,7 +26,7 @@ from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity
 from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, Delivery, MissionService
+from bridge.missions.mission_service import NO_LINK, DeliveryResult, MissionService
 from bridge.model.events import EventLog, Incidents
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.mission_transfer import MissionTransfer
@@ -59,7 +59,7 @@ class Bridge:
         self._was_armed = False
         self._logs_flights = on_frames is not None
         self._announcer = LinkAnnouncer()
-        self._mission_endings: list[tuple[ArrivedMission, Delivery]] = []
+        self._mission_endings: list[tuple[ArrivedMission, DeliveryResult]] = []
         incidents = Incidents()
 
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
@@ -153,7 +153,7 @@ class Bridge:
         self._store_effects.clear()
         return effects
 
-    def take_mission_endings(self) -> list[tuple[ArrivedMission, Delivery]]:
+    def take_mission_endings(self) -> list[tuple[ArrivedMission, DeliveryResult]]:
         """The missions concluded since the last call, each with its result."""
         endings, self._mission_endings = self._mission_endings, []
         return endings

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from protocols.msp.mission import Status
+from protocols.msp.mission import ReplyStatus
 from protocols.wp_record import RECORD_SIZE
 from simulator.flash import FlashError, NorFlash, PowerCutError
 from simulator.mission_slots import flash_size, slot_pages
@@ -80,7 +80,7 @@ class CompiledCore:
         status = self._library.nm_store(self._core, records, len(records) // RECORD_SIZE)
         if self._board.power_is_cut:
             raise PowerCutError
-        if status == Status.FLASH:
+        if status == ReplyStatus.FLASH:
             raise FlashError
 
     @property

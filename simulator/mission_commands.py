@@ -11,9 +11,9 @@ from protocols.msp.mission import (
     Info,
     InfoFlag,
     MissionCommand,
-    Progress,
     Radius,
-    Status,
+    ReplyStatus,
+    Staged,
     Stored,
     unmask,
 )
@@ -123,10 +123,10 @@ class MissionCommands:
             flash_writes=self._slots.writes,
         )
 
-    def _refusal(self) -> Status | None:
+    def _refusal(self) -> ReplyStatus | None:
         if self._board.armed:
-            return Status.ARMED
-        return Status.BUSY if self._board.write_pending else None
+            return ReplyStatus.ARMED
+        return ReplyStatus.BUSY if self._board.write_pending else None
 
     def _spend_write(self) -> bool:
         """Take a write from the budget; False if there is none."""
@@ -135,116 +135,118 @@ class MissionCommands:
             return True
         return False
 
-    def _progress(self, status: Status) -> Progress:
+    def _progress(self, status: ReplyStatus) -> Staged:
         """The progress of the transfer, with `status`; zeros without one."""
         staged = self._transfer.next if self._transfer else 0
-        return Progress(status, staged, self._slots.staged_checksum(staged))
+        return Staged(status, staged, self._slots.staged_checksum(staged))
 
-    def _begin(self, body: bytes | None, now: float) -> Status:
+    def _begin(self, body: bytes | None, now: float) -> ReplyStatus:
         if body is None or len(body) != _LIST.size:
-            return Status.BAD_REQUEST
+            return ReplyStatus.BAD_REQUEST
         if refusal := self._refusal():
             return refusal
         identity = ListIdentity(*_LIST.unpack(body))
         if self._transfer and self._transfer.identity == identity:
             self._transfer.touched = now
-            return Status.OK
+            return ReplyStatus.OK
         self._transfer = None
         if identity.count > self._options.capacity:
-            return Status.NO_SPACE
+            return ReplyStatus.NO_SPACE
         if identity.count == 0 and identity.checksum:
-            return Status.BAD_REQUEST
+            return ReplyStatus.BAD_REQUEST
         if identity == self._slots.stored:
-            return Status.SAME
+            return ReplyStatus.SAME
         if not self._slots.is_prepared:
             if not self._spend_write():
-                return Status.BUSY
+                return ReplyStatus.BUSY
             try:
                 self._slots.prepare()
             except FlashError:
-                return Status.FLASH
+                return ReplyStatus.FLASH
         self._transfer = _Upload(identity, now)
-        return Status.OK
+        return ReplyStatus.OK
 
-    def _chunk(self, body: bytes | None, now: float) -> Status:
+    def _chunk(self, body: bytes | None, now: float) -> ReplyStatus:
         count, rest = divmod(len(body) - 2 if body else 0, RECORD_SIZE)
         if not body or rest or not 1 <= count <= self._options.chunk_records:
-            return Status.BAD_REQUEST
+            return ReplyStatus.BAD_REQUEST
         if refusal := self._refusal():
             return refusal
         transfer = self._transfer
         if transfer is None:
-            return Status.NO_TRANSFER
+            return ReplyStatus.NO_TRANSFER
         transfer.touched = now
         first = int.from_bytes(body[:2], "little")
         if first != transfer.next:
-            return Status.OK if first < transfer.next else Status.SEQUENCE
+            return ReplyStatus.OK if first < transfer.next else ReplyStatus.SEQUENCE
         if first + count > transfer.identity.count:
-            return Status.RANGE
+            return ReplyStatus.RANGE
         records = [body[at : at + RECORD_SIZE] for at in range(2, len(body), RECORD_SIZE)]
         if any(record[-1] > max(WpCommand) for record in records):
             self._transfer = None
-            return Status.BAD_RECORD
+            return ReplyStatus.BAD_RECORD
         try:
             for record in records:
                 self._slots.stage(transfer.next, record)
                 transfer.next += 1
         except FlashError:
             self._transfer = None
-            return Status.FLASH
-        return Status.OK
+            return ReplyStatus.FLASH
+        return ReplyStatus.OK
 
-    def _commit(self, body: bytes | None, now: float) -> Status:
+    def _commit(self, body: bytes | None, now: float) -> ReplyStatus:
         if body is None or len(body) != _LIST.size:
-            return Status.BAD_REQUEST
+            return ReplyStatus.BAD_REQUEST
         if refusal := self._refusal():
             return refusal
         identity = ListIdentity(*_LIST.unpack(body))
         transfer = self._transfer
         if transfer is None:
-            return Status.OK if identity == self._slots.stored else Status.NO_TRANSFER
+            return ReplyStatus.OK if identity == self._slots.stored else ReplyStatus.NO_TRANSFER
         transfer.touched = now
         if transfer.next < transfer.identity.count:
-            return Status.INCOMPLETE
+            return ReplyStatus.INCOMPLETE
         self._transfer = None
         staged = ListIdentity(transfer.next, self._slots.staged_checksum(transfer.next))
         if not identity == transfer.identity == staged:
-            return Status.CHECKSUM
+            return ReplyStatus.CHECKSUM
         try:
             self._slots.commit(identity)
         except FlashError:
-            return Status.FLASH
-        return Status.OK
+            return ReplyStatus.FLASH
+        return ReplyStatus.OK
 
-    def _abort(self, payload: bytes) -> Status:
+    def _abort(self, payload: bytes) -> ReplyStatus:
         if payload:
-            return Status.BAD_REQUEST
+            return ReplyStatus.BAD_REQUEST
         self._transfer = None
-        return Status.OK
+        return ReplyStatus.OK
 
     def _read(self, body: bytes | None) -> bytes:
         if body is None or len(body) != _READ.size:
-            return _RECORDS_HEADER.pack(Status.BAD_REQUEST, 0)
+            return _RECORDS_HEADER.pack(ReplyStatus.BAD_REQUEST, 0)
         first, count, zero = _READ.unpack(body)
         if zero or not count:
-            return _RECORDS_HEADER.pack(Status.BAD_REQUEST, 0)
+            return _RECORDS_HEADER.pack(ReplyStatus.BAD_REQUEST, 0)
         if first >= self._slots.stored.count:
-            return _RECORDS_HEADER.pack(Status.RANGE, first)
-        return _RECORDS_HEADER.pack(Status.OK, first) + self._slots.read(first, min(count, self._options.read_records))
+            return _RECORDS_HEADER.pack(ReplyStatus.RANGE, first)
+        return _RECORDS_HEADER.pack(ReplyStatus.OK, first) + self._slots.read(
+            first, min(count, self._options.read_records)
+        )
 
-    def _radius(self, body: bytes | None, now: float) -> Status:
+    def _radius(self, body: bytes | None, now: float) -> ReplyStatus:
         if body is None or len(body) != _RADIUS.size:
-            return Status.BAD_REQUEST
+            return ReplyStatus.BAD_REQUEST
         value, inverse = _RADIUS.unpack(body)
         if value ^ inverse != 0xFFFF:
-            return Status.BAD_REQUEST
+            return ReplyStatus.BAD_REQUEST
         if value > MAX_RADIUS_CM:
-            return Status.RANGE
+            return ReplyStatus.RANGE
         if self._board.armed:
-            return Status.ARMED
+            return ReplyStatus.ARMED
         if value == self._board.wp_radius_cm:
-            return Status.OK
+            return ReplyStatus.OK
         if self._board.write_pending or not self._spend_write():
-            return Status.BUSY
+            return ReplyStatus.BUSY
         self._board.set_wp_radius(value, now)
-        return Status.OK
+        return ReplyStatus.OK

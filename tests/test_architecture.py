@@ -2,6 +2,7 @@
 """Imports run one way: service -> bridge -> protocols, storage below service, and down inside bridge/ and service/."""
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -85,6 +86,14 @@ def test_inside_the_service(package: str) -> None:
 
 def test_no_package_of_the_service_is_left_out() -> None:
     assert {path.name for path in (REPOSITORY / "service").glob("[!_.]*")} == {*SERVICE}
+
+
+def test_a_class_name_stands_for_one_thing() -> None:
+    """Among ourselves; a simulated firmware may use a name of its own for what it simulates."""
+    files = (file for package in PACKAGES.keys() - {"simulator"} for file in (REPOSITORY / package).rglob("*.py"))
+    nodes = (node for file in files for node in ast.walk(ast.parse(file.read_text())))
+    names = Counter(node.name for node in nodes if isinstance(node, ast.ClassDef) and node.name[0] != "_")
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 @pytest.mark.parametrize("package", ["protocols", "bridge"])

@@ -47,7 +47,7 @@ def test_worked_exchange_is_true() -> None:
 
 def test_every_status_and_command_is_on_the_page() -> None:
     page = PAGE.read_text()
-    for status in ext.Status:
+    for status in ext.ReplyStatus:
         assert f"| {status.value} | {status.name} |" in page
     for command in ext.MissionCommand:
         assert f"### {command.value} {command.name}" in page

@@ -22,7 +22,7 @@ from bridge.fc.states.events import (
 )
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink
-from bridge.fc.states.msp import Identifying, Msp, MspLine
+from bridge.fc.states.msp import Identifying, MspLine, Polling
 from bridge.fc.states.port import Port
 from bridge.fc.states.searching import Searching
 from bridge.line.msp_link import MspLink
@@ -44,8 +44,8 @@ TRANSITIONS: Mapping[type[State], Mapping[type[Event], type[State]]] = {
         Lost: Searching,
         PortClosed: Closed,
     },
-    Identifying: {Identified: Msp, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
-    Msp: {Identified: Msp, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
+    Identifying: {Identified: Polling, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
+    Polling: {Identified: Polling, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
     Mavlink: {Lost: Searching, PortClosed: Closed},
     Frsky: {Lost: Searching, PortClosed: Closed},
     Cli: {Lost: Searching, PortClosed: Closed},
@@ -216,7 +216,7 @@ class FcSession:
             case MspFound():
                 return Identifying(self._port, event, now)
             case Identified():
-                return Msp(self._port, event, now)
+                return Polling(self._port, event, now)
             case MavlinkFound():
                 return Mavlink(self._port, event, now)
             case FrskyFound():

@@ -10,7 +10,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from bridge.model.mission_log import ArrivedMission, Conclusion, PendingMission
+from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
 from protocols.mavlink.codec import Packed
 from protocols.mission_record import ListIdentity
 from protocols.msp.frame import MspFrame, frame_size
@@ -29,7 +29,7 @@ class OutOfTime(LinkLost):
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class TimeLimit:
     """Raise OutOfTime after `seconds`, plus the time of `size` bytes on the line. It replaces an earlier limit."""
 
     seconds: float
@@ -90,7 +90,8 @@ class Conclude:
     """Store the outcome of mission `number`. Answer: True if stored."""
 
     number: int
-    conclusion: Conclusion
+    outcome: Outcome
+    detail: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +106,7 @@ class FindPending:
     """Look up missions that were never concluded. Answer: a sequence of PendingMission."""
 
 
-Effect = Limit | Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | FindPending
+Effect = TimeLimit | Send | Receive | Transmit | Await | Pause | Save | Conclude | Recall | FindPending
 StoreEffect = Save | Conclude | Recall | FindPending
 
 _MAX_ASKS = 5
@@ -162,7 +163,7 @@ def _lasting(reply: MspFrame, size: int | None) -> MspFrame:
 
 def limit(seconds: float, size: int = 0) -> Conversation[None]:
     """From now on, take no longer than this; see Limit."""
-    yield Limit(seconds, size)
+    yield TimeLimit(seconds, size)
 
 
 def pause(seconds: float) -> Conversation[None]:
@@ -176,9 +177,9 @@ def save(mission: ArrivedMission) -> Conversation[int | None]:
     return number
 
 
-def conclude(number: int, conclusion: Conclusion) -> Conversation[bool]:
-    """Store the outcome of a mission; True if stored."""
-    done: bool | None = yield Conclude(number, conclusion)
+def conclude(number: int, outcome: Outcome, detail: str) -> Conversation[bool]:
+    """Store the outcome of a mission with one sentence; True if stored."""
+    done: bool | None = yield Conclude(number, outcome, detail)
     return bool(done)
 
 

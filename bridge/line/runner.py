@@ -10,7 +10,6 @@ from typing import Any, Generic, TypeVar
 from bridge.line.conversation import (
     Await,
     Conversation,
-    Limit,
     LinkLost,
     OutOfTime,
     Pause,
@@ -18,6 +17,7 @@ from bridge.line.conversation import (
     Send,
     Stopped,
     StoreEffect,
+    TimeLimit,
     Transmit,
 )
 from bridge.line.mavlink_line import MavlinkLine
@@ -169,7 +169,7 @@ class Runner:
             while True:
                 effect = conversation.throw(answer) if isinstance(answer, LinkLost) else conversation.send(answer)
                 answer = None
-                if isinstance(effect, Limit):
+                if isinstance(effect, TimeLimit):
                     line_s = effect.size * self._link.byte_s if self._link is not None else 0.0
                     self._limit = now + effect.seconds + line_s
                 elif isinstance(effect, Send | Receive) and self._link is None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from bridge.missions.value_range import UNUSED, Range
-from bridge.model.finding import DROPPED, Finding, News, Rejection, reject, reject_list
+from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from bridge.model.verdict import CLEARED_LIST, Verdict, rejected
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 
@@ -29,9 +29,9 @@ class ListCheck(ABC):
         self._count = count
         self._taken = 0
         self._findings: list[Finding] = []
-        self._rejection: Rejection | None = None
+        self._rejection: RejectingFinding | None = None
 
-    def take(self, item: MissionItem) -> Rejection | None:
+    def take(self, item: MissionItem) -> RejectingFinding | None:
         """Check the next item; a rejection is final and is returned as soon as it is certain."""
         if self._rejection is None:
             item = replace(item, seq=self._taken)
@@ -47,11 +47,11 @@ class ListCheck(ABC):
         return rejected(tuple(self._findings), rejection) if rejection else self._conclude()
 
     @abstractmethod
-    def _judge(self, item: MissionItem) -> Rejection | None:
+    def _judge(self, item: MissionItem) -> RejectingFinding | None:
         """Keep or drop the item, or reject the list."""
 
     @abstractmethod
-    def _refuse_kept_list(self) -> Rejection | None:
+    def _refuse_kept_list(self) -> RejectingFinding | None:
         """Apply the rules that need the whole list."""
 
     @abstractmethod
@@ -108,14 +108,14 @@ class HomeOnly(ListCheck):
     MAVSDK clears an ARDUPILOTMEGA vehicle with one item of zeros; Mission Planner's empty Write sends home.
     """
 
-    def _judge(self, item: MissionItem) -> Rejection | None:
+    def _judge(self, item: MissionItem) -> RejectingFinding | None:
         numbers = (item.p1, item.p2, item.p3, item.p4, item.alt_m)
         is_blank = missing_coordinate(item) is not None and not any(given(number) for number in numbers)
         if item.command == Command.NAV_WAYPOINT and item.frame in RELATIVE_FRAMES and is_blank:
             return None
         return _HOME_ONLY
 
-    def _refuse_kept_list(self) -> Rejection | None:
+    def _refuse_kept_list(self) -> RejectingFinding | None:
         return None
 
     def _conclude(self) -> Verdict[Any]:
@@ -136,7 +136,7 @@ class MissionRules(Protocol):
         """Begin the check of `count` items; `fallback_home` (lat_e7, lon_e7) replaces a home without coordinates."""
 
 
-def check_count(count: int, rules: MissionRules) -> Rejection | None:
+def check_count(count: int, rules: MissionRules) -> RejectingFinding | None:
     """Check a MISSION_COUNT; 0 clears the list and is valid."""
     if count > rules.max_items:
         return reject_list(MissionResult.NO_SPACE, count, f"{count} items, but only {rules.max_items} fit")
@@ -163,7 +163,7 @@ def check_list(
     return check.finish()
 
 
-def refuse_frame(item: MissionItem, *, needs_position: bool) -> Rejection | None:
+def refuse_frame(item: MissionItem, *, needs_position: bool) -> RejectingFinding | None:
     """Reject frames without a usable position; frame MISSION is accepted for commands that need none."""
     known = item.frame in (*RELATIVE_FRAMES, *SEA_LEVEL_FRAMES, *TERRAIN_FRAMES)
     if known or (item.frame == Frame.MISSION and not needs_position):
@@ -171,7 +171,7 @@ def refuse_frame(item: MissionItem, *, needs_position: bool) -> Rejection | None
     return reject(MissionResult.UNSUPPORTED_FRAME, item, "frame", f"frame {item.frame} not supported")
 
 
-def refuse_position(item: MissionItem) -> Rejection | None:
+def refuse_position(item: MissionItem) -> RejectingFinding | None:
     """Reject coordinates out of range."""
     if abs(item.lat_e7 or 0) > MAX_LAT_E7:
         return reject(MissionResult.INVALID_PARAM5_X, item, "lat_e7", "latitude beyond 90 deg")

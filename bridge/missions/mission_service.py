@@ -19,7 +19,7 @@ from bridge.missions.fc_mission_store import (
 )
 from bridge.missions.list_check import MissionRules
 from bridge.missions.mission_texts import summary
-from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome, PendingMission
+from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
 from bridge.model.mission_transfer import MissionTransfer, TransferStep
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import Vehicle
@@ -33,7 +33,7 @@ _BUSY_INTERVAL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Delivery:
+class DeliveryResult:
     """The result of a mission. `number` is its number in the store, None if it could not be stored.
 
     `is_lossy`: accepted, but an item was lost, the list erased, or an altitude changed its meaning. `change`: the
@@ -80,7 +80,7 @@ class MissionService:
     `on_ending` is called with the result of each mission.
     """
 
-    def __init__(self, on_ending: Callable[[ArrivedMission, Delivery], None], vehicle: Vehicle) -> None:
+    def __init__(self, on_ending: Callable[[ArrivedMission, DeliveryResult], None], vehicle: Vehicle) -> None:
         self._on_ending = on_ending
         self._vehicle = vehicle
         self._dialect: AnyFcMissionStore | None = None
@@ -195,7 +195,7 @@ class MissionService:
 
     def deliver(
         self, arrived: ArrivedMission, progress: Callable[[int], None], *, is_kept: bool = True
-    ) -> Conversation[Delivery]:
+    ) -> Conversation[DeliveryResult]:
         """Store the mission, write it to the flight controller if the rules accept it, and store the outcome.
 
         `is_kept` False: do not store it, because too many lists arrived.
@@ -206,7 +206,7 @@ class MissionService:
 
     def _deliver(
         self, arrived: ArrivedMission, progress: Callable[[int], None], *, is_kept: bool
-    ) -> Conversation[Delivery]:
+    ) -> Conversation[DeliveryResult]:
         number = (yield from save(arrived)) if is_kept else None
         verdict = arrived.verdict
         if verdict.result is Result.REJECTED:
@@ -225,7 +225,7 @@ class MissionService:
             wanted = identify(verdict.records if result.held is None else result.held)
             self._pending.append(PendingMission(number, wanted, before))
             self._is_settled, self.held = False, None
-            return Delivery(MissionResult.DENIED, result.failure.value, number)
+            return DeliveryResult(MissionResult.DENIED, result.failure.value, number)
         if result.failure is not None:
             if result.failure in LIST_IS_GONE:
                 self.held = None
@@ -350,17 +350,17 @@ class MissionService:
         for mission in pending:
             has_arrived = mission.identity == held.identity
             if mission.identity is None:
-                conclusion = Conclusion(Outcome.CANCELLED, "interrupted, old mission kept")
+                outcome, text = Outcome.CANCELLED, "interrupted, old mission kept"
             elif has_arrived:
-                conclusion = Conclusion(Outcome.VERIFIED, f"The mission did arrive: {held.identity.count} records")
+                outcome, text = Outcome.VERIFIED, f"The mission did arrive: {held.identity.count} records"
             elif mission.before == held.identity or (mission.before is None and held.records):
-                conclusion = Conclusion(Outcome.FAILED, "The mission did not arrive: old mission kept")
+                outcome, text = Outcome.FAILED, "The mission did not arrive: old mission kept"
             else:
-                conclusion = Conclusion(Outcome.FAILED, "The mission did not arrive whole: write it again")
+                outcome, text = Outcome.FAILED, "The mission did not arrive whole: write it again"
             if mission.number is not None:
-                yield from conclude(mission.number, conclusion)
+                yield from conclude(mission.number, outcome, text)
             if mission.identity is not None:
-                news = MissionChange(conclusion.detail, is_warning=not has_arrived)
+                news = MissionChange(text, is_warning=not has_arrived)
         return news
 
     def _copy_erased(self, dialect: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
@@ -369,17 +369,19 @@ class MissionService:
             items = dialect.items(mission, {})
             verdict = Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, mission, items)
             number = yield from save(ArrivedMission(_ERASED_SOURCE, items, verdict))
-            if number is None or not (yield from conclude(number, Conclusion(Outcome.CANCELLED, _ERASED))):
+            if number is None or not (yield from conclude(number, Outcome.CANCELLED, _ERASED)):
                 return False
         return True
 
     def _refreshed(self, dialect: AnyFcMissionStore, held: HeldMission) -> HeldMission:
         return replace(held, items=dialect.refreshed(held.items))
 
-    def _conclude(self, number: int | None, outcome: Outcome, ack: MissionResult, text: str) -> Conversation[Delivery]:
-        if number is not None and not (yield from conclude(number, Conclusion(outcome, text))):
+    def _conclude(
+        self, number: int | None, outcome: Outcome, ack: MissionResult, text: str
+    ) -> Conversation[DeliveryResult]:
+        if number is not None and not (yield from conclude(number, outcome, text)):
             number = None
-        return Delivery(ack, text, number)
+        return DeliveryResult(ack, text, number)
 
 
 _ACKS = {

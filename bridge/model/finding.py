@@ -102,20 +102,20 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Rejection:
+class RejectingFinding:
     """The rejection of a list: the MISSION_ACK code, and the finding for the pilot."""
 
     ack: MissionResult
     finding: Finding
 
 
-def reject(ack: MissionResult, item: MissionItem, name: str, why: str) -> Rejection:
+def reject(ack: MissionResult, item: MissionItem, name: str, why: str) -> RejectingFinding:
     """Reject the list because of one item's field `name`."""
     was = getattr(item, name)
     # NaN means "not given"; findings are stored as JSON, which has no NaN.
-    return Rejection(ack, Finding(item.seq, name, was if was == was else None, REJECTED, why, item.command))
+    return RejectingFinding(ack, Finding(item.seq, name, was if was == was else None, REJECTED, why, item.command))
 
 
-def reject_list(ack: MissionResult, count: int, why: str) -> Rejection:
+def reject_list(ack: MissionResult, count: int, why: str) -> RejectingFinding:
     """Reject a list as a whole."""
-    return Rejection(ack, Finding(None, "count", count, REJECTED, why))
+    return RejectingFinding(ack, Finding(None, "count", count, REJECTED, why))

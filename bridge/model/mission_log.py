@@ -40,11 +40,3 @@ class PendingMission:
     number: int | None
     identity: ListIdentity | None
     before: ListIdentity | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Conclusion:
-    """The outcome, with one sentence of detail."""
-
-    outcome: Outcome
-    detail: str

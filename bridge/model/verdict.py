@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Any, Generic, TypeVar
 
-from bridge.model.finding import Finding, Rejection
+from bridge.model.finding import Finding, RejectingFinding
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.mission_record import MissionRecord
 
@@ -42,6 +42,6 @@ class Verdict(Generic[RecordT]):
 CLEARED_LIST: Verdict[Any] = Verdict(Result.CLEARED, MissionResult.ACCEPTED)
 
 
-def rejected(findings: tuple[Finding, ...], rejection: Rejection) -> Verdict[Any]:
+def rejected(findings: tuple[Finding, ...], rejection: RejectingFinding) -> Verdict[Any]:
     """The verdict on a rejected list."""
     return Verdict(Result.REJECTED, rejection.ack, findings=(*findings, rejection.finding))

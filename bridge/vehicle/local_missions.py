@@ -8,7 +8,7 @@ from bridge.gcs.station import Severity
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_service import NO_LINK, Delivery, HeldMission
+from bridge.missions.mission_service import NO_LINK, DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import Result, Verdict
@@ -31,7 +31,7 @@ class LocalMissions:
         items: Sequence[MissionItem],
         source: str,
         on_progress: Callable[[int], None],
-        on_done: Callable[[Delivery | Refusal, ArrivedMission | None], None],
+        on_done: Callable[[DeliveryResult | Refusal, ArrivedMission | None], None],
         now: float,
         *,
         may_erase: bool = True,
@@ -44,7 +44,7 @@ class LocalMissions:
         incident = self._context.incidents.begin("push")
         arrived: list[ArrivedMission] = []
 
-        def conversation() -> Conversation[Delivery | Refusal]:
+        def conversation() -> Conversation[DeliveryResult | Refusal]:
             report: StoreReport | Refusal = yield from self._missions.preflight()
             if isinstance(report, Refusal):
                 return report
@@ -54,18 +54,18 @@ class LocalMissions:
                 return _WOULD_ERASE
             return (yield from self._missions.deliver(arrived[0], on_progress))
 
-        def done(result: Delivery | Refusal | LinkLost, _at: float) -> None:
+        def done(result: DeliveryResult | Refusal | LinkLost, _at: float) -> None:
             self._missions.release(owner)
             if isinstance(result, LinkLost):
                 result = NO_LINK
-            if arrived and isinstance(result, Delivery):
+            if arrived and isinstance(result, DeliveryResult):
                 severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
                 self._context.post.say(severity, f"{source}: {result.text}")
             self._context.log_event(
                 "info" if result.ack is MissionResult.ACCEPTED else "warning",
                 "mission.push_ended",
                 source=source,
-                mission=result.number if isinstance(result, Delivery) else None,
+                mission=result.number if isinstance(result, DeliveryResult) else None,
                 ack=result.ack.name,
                 detail=result.text,
                 incident=incident,

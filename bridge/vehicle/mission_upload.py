@@ -16,7 +16,7 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
-from bridge.missions.mission_service import NO_LINK, OCCUPIED, Delivery
+from bridge.missions.mission_service import NO_LINK, OCCUPIED, DeliveryResult
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.events import Level
 from bridge.model.finding import Finding, News
@@ -37,8 +37,8 @@ from bridge.vehicle.upload_states import (
     Judged,
     Ready,
     Receiving,
-    State,
     Turn,
+    UploadState,
     Waiting,
 )
 from protocols.mavlink.dialect import messages
@@ -61,7 +61,7 @@ class _Upload:
     station: Station
     count: int
     incident: str
-    state: State
+    state: UploadState
     #: Its ground station has announced another list while this one was written.
     is_superseded: bool = False
 
@@ -82,7 +82,7 @@ class MissionUploads:
         self._may_ask_at = 0.0
 
     @property
-    def state(self) -> type[State] | None:
+    def state(self) -> type[UploadState] | None:
         """The state of the first upload; None if there is none."""
         return type(self._uploads[0].state) if self._uploads else None
 
@@ -355,9 +355,11 @@ class MissionUploads:
         """False if a ground station sent too many lists that did not reach the flight controller."""
         return self._post.allows(upload.station, Cost.STORED)
 
-    def _delivered(self, upload: _Upload, verdict: Verdict[Any], delivery: Delivery | LinkLost, now: float) -> None:
+    def _delivered(
+        self, upload: _Upload, verdict: Verdict[Any], delivery: DeliveryResult | LinkLost, now: float
+    ) -> None:
         if isinstance(delivery, LinkLost):
-            delivery = Delivery(NO_LINK.ack, NO_LINK.text, None)
+            delivery = DeliveryResult(NO_LINK.ack, NO_LINK.text, None)
         self._tell(upload.station, verdict, delivery)
         if upload in self._uploads:
             if not upload.is_superseded:
@@ -369,7 +371,7 @@ class MissionUploads:
         self._note("mission.upload_ended", upload, "info" if accepted else "warning", **facts)
         self._begin_next(now)
 
-    def _tell(self, station: Station, verdict: Verdict[Any], delivery: Delivery) -> None:
+    def _tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations."""
         if delivery.ack is not MissionResult.ACCEPTED:
             self._post.say(Severity.ERROR, delivery.text, station)
@@ -384,7 +386,7 @@ class MissionUploads:
             severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
             self._post.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
 
-    def _refuse(self, upload: _Upload, state: State, refusal: Refusal, now: float) -> None:
+    def _refuse(self, upload: _Upload, state: UploadState, refusal: Refusal, now: float) -> None:
         """Report the reason for the end of an upload; the received items are stored all the same."""
         if items := state.received:
             finding = Finding(None, "list", len(items), None, refusal.text)
@@ -405,7 +407,7 @@ class MissionUploads:
         """The newest upload of a ground station: one may wait behind another that is being written."""
         return next((upload for upload in reversed(self._uploads) if upload.station == station), None)
 
-    def _in(self, *states: type[State]) -> list[_Upload]:
+    def _in(self, *states: type[UploadState]) -> list[_Upload]:
         return [upload for upload in self._uploads if isinstance(upload.state, states)]
 
     def _undelivered(self) -> list[_Upload]:

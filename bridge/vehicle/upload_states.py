@@ -51,7 +51,7 @@ class Ended(Event):
     refusal: Refusal
 
 
-class State(ABC):
+class UploadState(ABC):
     """A state times out at `deadline`, `seconds` after its start or last progress, with `timeout` as the answer."""
 
     seconds: ClassVar[float]
@@ -86,21 +86,21 @@ class State(ABC):
         self.is_closed = bool(self.received)
 
 
-class Waiting(State):
+class Waiting(UploadState):
     """Another list is being written. Mission Planner repeats its MISSION_COUNT for 2.8 s."""
 
     seconds = 2.5
     timeout = OCCUPIED
 
 
-class Asking(State):
+class Asking(UploadState):
     """The flight controller has been asked if it can take a list."""
 
     seconds = 5.0
     timeout = Refusal(MissionResult.DENIED, "The flight controller does not answer: try again")
 
 
-class Receiving(State):
+class Receiving(UploadState):
     """Receives items; each is checked once all before it have arrived."""
 
     seconds = 5.0
@@ -162,7 +162,7 @@ class Receiving(State):
         return Judged(self.received, self._check.finish())
 
 
-class Complete(State):
+class Complete(UploadState):
     """The list has arrived, or it is a clear, and another one is being written."""
 
     seconds = 2.5
@@ -179,7 +179,7 @@ class Complete(State):
         return self._items
 
 
-class Delivering(State):
+class Delivering(UploadState):
     """The list is stored, written and read back: 146 records take 25 s at 1200 baud."""
 
     seconds = 60.0
@@ -187,7 +187,7 @@ class Delivering(State):
 
 
 #: State -> event -> next state, None at the end; any other event in a state is a bug. A clear begins as Complete.
-TRANSITIONS: Mapping[type[State], Mapping[type[Event], type[State] | None]] = {
+TRANSITIONS: Mapping[type[UploadState], Mapping[type[Event], type[UploadState] | None]] = {
     Waiting: {Turn: Asking, Ended: None},
     Asking: {Ready: Receiving, Ended: None},
     Receiving: {Judged: Complete, Ended: None},

@@ -29,7 +29,7 @@ class MissionCommand(IntEnum):
     RADIUS = 196
 
 
-class Status(IntEnum):
+class ReplyStatus(IntEnum):
     """First byte of every reply."""
 
     OK = 0
@@ -85,7 +85,7 @@ class Info:
     def encode(self) -> bytes:
         """Return the reply's payload."""
         return _INFO.pack(
-            Status.OK,
+            ReplyStatus.OK,
             self.version,
             self.flags,
             self.chunk_records,
@@ -102,10 +102,10 @@ class Info:
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class Staged:
     """Reply to BEGIN and CHUNK: the next record wanted, and the checksum of those staged before it."""
 
-    status: Status
+    status: ReplyStatus
     next: int
     checksum: int
 
@@ -118,7 +118,7 @@ class Progress:
 class Stored:
     """Reply to COMMIT: the list that is in flash now."""
 
-    status: Status
+    status: ReplyStatus
     stored: ListIdentity
 
     def encode(self) -> bytes:
@@ -130,7 +130,7 @@ class Stored:
 class Records:
     """Reply to READ."""
 
-    status: Status
+    status: ReplyStatus
     first: int
     records: Sequence[WpRecord]
 
@@ -143,7 +143,7 @@ class Records:
 class Radius:
     """Reply to RADIUS: the gps_wp_radius in force, cm."""
 
-    status: Status
+    status: ReplyStatus
     wp_radius_cm: int
 
     def encode(self) -> bytes:
@@ -151,8 +151,8 @@ class Radius:
         return _RADIUS_REPLY.pack(self.status, self.wp_radius_cm)
 
 
-def _status(value: int) -> Status | None:
-    return Status(value) if value <= max(Status) else None
+def _status(value: int) -> ReplyStatus | None:
+    return ReplyStatus(value) if value <= max(ReplyStatus) else None
 
 
 def decode_info(payload: bytes) -> Info | None:
@@ -174,7 +174,7 @@ def decode_info(payload: bytes) -> Info | None:
         staged,
         writes,
     ) = _INFO.unpack_from(payload)
-    if status != Status.OK or not (version and chunk_records and chunk_window and read_records):
+    if status != ReplyStatus.OK or not (version and chunk_records and chunk_window and read_records):
         return None
     return Info(
         version=version,
@@ -191,13 +191,13 @@ def decode_info(payload: bytes) -> Info | None:
     )
 
 
-def decode_progress(payload: bytes) -> Progress | None:
+def decode_progress(payload: bytes) -> Staged | None:
     """Read the reply to BEGIN or CHUNK."""
     if len(payload) < _PROGRESS.size:
         return None
     status, following, checksum = _PROGRESS.unpack_from(payload)
     known = _status(status)
-    return None if known is None else Progress(known, following, checksum)
+    return None if known is None else Staged(known, following, checksum)
 
 
 def decode_stored(payload: bytes) -> Stored | None:

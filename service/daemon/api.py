@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import structlog
 
-from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle_groups import Group
@@ -78,7 +78,7 @@ class MissionJobs:
         """Check, push and verify a list; an empty one clears the mission. `may_erase`: see LocalMissions.push."""
         future: asyncio.Future[Json] = self._loop.create_future()
 
-        def done(outcome: Delivery | Refusal, arrived: ArrivedMission | None) -> None:
+        def done(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | None) -> None:
             answer: Json = {"ack": f"MAV_MISSION_{outcome.ack.name}", "text": outcome.text}
             if arrived is not None:
                 answer |= {
@@ -86,7 +86,7 @@ class MissionJobs:
                     "sent": as_dicts(arrived.items),
                     "stored": as_dicts(arrived.verdict.items),
                     "findings": as_dicts(arrived.verdict.findings),
-                    "mission": outcome.number if isinstance(outcome, Delivery) else None,
+                    "mission": outcome.number if isinstance(outcome, DeliveryResult) else None,
                 }
             _resolve(future, answer)
 

@@ -18,7 +18,7 @@ from bridge.fc.msp_sharing import refused
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.station import Peer
 from bridge.line.conversation import StoreEffect
-from bridge.missions.mission_service import Delivery
+from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
@@ -72,7 +72,7 @@ class Follower(Protocol):
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
         """An event was logged."""
 
-    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+    def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         """A received mission was completed or rejected."""
 
     def status(self) -> Json:

@@ -8,9 +8,9 @@ from dataclasses import fields
 from fnmatch import fnmatchcase
 from typing import Any, get_args
 
-from service.fleet.vehicle import Vehicle
+from service.fleet.vehicle import FleetVehicle
 
-Condition = Callable[[Vehicle], bool]
+Condition = Callable[[FleetVehicle], bool]
 
 
 def _kind(hint: object) -> type:
@@ -19,7 +19,7 @@ def _kind(hint: object) -> type:
     return next(kind for kind in (bool, str, float) if kind in kinds or kind is float)
 
 
-FIELDS = {each.name: _kind(each.type) for each in fields(Vehicle) if each.name != "session_id"}
+FIELDS = {each.name: _kind(each.type) for each in fields(FleetVehicle) if each.name != "session_id"}
 _FORM = re.compile(r"\s*(?P<field>\w+)\s*(?P<sign>!=|<=|>=|=|<|>)\s*(?P<value>.*?)\s*")
 _SIGNS: dict[str, Callable[[Any, Any], bool]] = {
     "=": operator.eq,
@@ -43,14 +43,14 @@ def parse_condition(text: str) -> Condition:
         raise ValueError(f"vehicles have no {name!r}, only {', '.join(FIELDS)}")
     wanted, compare = _wanted(name, kind, sign, value)
 
-    def holds(vehicle: Vehicle) -> bool:
+    def holds(vehicle: FleetVehicle) -> bool:
         found = getattr(vehicle, name)
         return compare(found, wanted) if found is not None else sign == "!="
 
     return holds
 
 
-def matching(fleet: Iterable[Vehicle], conditions: Sequence[Condition]) -> list[Vehicle]:
+def matching(fleet: Iterable[FleetVehicle], conditions: Sequence[Condition]) -> list[FleetVehicle]:
     """The vehicles that fulfil all conditions."""
     return [vehicle for vehicle in fleet if all(condition(vehicle) for condition in conditions)]
 

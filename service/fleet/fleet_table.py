@@ -7,12 +7,12 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from service.fleet.vehicle import Vehicle
+from service.fleet.vehicle import FleetVehicle
 
 _UNKNOWN = "-"
 
 
-def watch_table(rows: Sequence[tuple[Vehicle, float | None, str]]) -> Table:
+def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table:
     """One row per bridge, each on one line of 80 columns: vehicle, age of its state, problem."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     table.add_column("Vehicle", no_wrap=True, overflow="ellipsis", max_width=20)
@@ -30,7 +30,7 @@ def watch_table(rows: Sequence[tuple[Vehicle, float | None, str]]) -> Table:
     return table
 
 
-def fleet_table(fleet: Sequence[Vehicle]) -> Table:
+def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
     """Make one row per bridge."""
     caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, caption=caption, caption_justify="left")
@@ -45,7 +45,7 @@ def fleet_table(fleet: Sequence[Vehicle]) -> Table:
     return table
 
 
-def complaints(fleet: Iterable[Vehicle]) -> list[str]:
+def complaints(fleet: Iterable[FleetVehicle]) -> list[str]:
     """The problems of the fleet, a line each."""
     lines: dict[str, None] = {}
     for vehicle in fleet:
@@ -57,7 +57,7 @@ def complaints(fleet: Iterable[Vehicle]) -> list[str]:
     return list(lines)
 
 
-def _cells(vehicle: Vehicle) -> list[Text]:
+def _cells(vehicle: FleetVehicle) -> list[Text]:
     armed = {True: Text("ARMED", style="bold red"), False: Text("no"), None: Text(_UNKNOWN)}[vehicle.armed]
     mission = _UNKNOWN
     if vehicle.mission_count is not None:

@@ -6,7 +6,7 @@ import zenoh
 from service.control.mission_data import Json
 from service.fleet.payload import decode_reply
 from service.fleet.session import FleetError, ask
-from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, replier, vehicle_of
+from service.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
 from service.zenoh_link.keys import ALIVE, STATE, full
 
 #: After this a bridge without a reply is shown as not answering.
@@ -25,7 +25,7 @@ def alive(session: zenoh.Session, prefix: str) -> set[BridgeState]:
     return {bridge for sample in samples if (bridge := bridge_of(str(sample.key_expr), prefix)) is not None}
 
 
-def roll_call(session: zenoh.Session, prefix: str) -> list[Vehicle]:
+def roll_call(session: zenoh.Session, prefix: str) -> list[FleetVehicle]:
     """The fleet by name. Takes as long as the slowest bridge, two seconds at most."""
     bridges = alive(session, prefix)
     states: dict[BridgeState, Json] = {}

@@ -22,7 +22,7 @@ class BridgeState:
 
 
 @dataclass(frozen=True, slots=True)
-class Vehicle:
+class FleetVehicle:
     """The known data of one vehicle; None: not known.
 
     `answers`: True if its bridge sent its state. `bridges`: how many use this name, normally 1.
@@ -63,11 +63,11 @@ def replier(reply: zenoh.Reply) -> BridgeState | None:
     return BridgeState(vehicle_in(reply.ok.key_expr), str(reply.replier_id.zid))
 
 
-def vehicle_of(bridge: BridgeState, state: Json | None) -> Vehicle:
+def vehicle_of(bridge: BridgeState, state: Json | None) -> FleetVehicle:
     """Make a vehicle from the payload of its `state`; None: it sent none."""
     if state is None:
-        return Vehicle(bridge.vehicle, bridge.session_id)
-    return Vehicle(
+        return FleetVehicle(bridge.vehicle, bridge.session_id)
+    return FleetVehicle(
         bridge.vehicle,
         bridge.session_id,
         answers=True,
@@ -84,7 +84,7 @@ def vehicle_of(bridge: BridgeState, state: Json | None) -> Vehicle:
     )
 
 
-def as_fleet(vehicles: Iterable[Vehicle]) -> list[Vehicle]:
+def as_fleet(vehicles: Iterable[FleetVehicle]) -> list[FleetVehicle]:
     """Sort vehicles by name, and count the bridges per name."""
     found = list(vehicles)
     bridges = Counter(vehicle.name for vehicle in found)

@@ -12,7 +12,7 @@ import zenoh
 from service.control.mission_data import Json
 from service.fleet.payload import decode, number
 from service.fleet.session import send_query
-from service.fleet.vehicle import BridgeState, Vehicle, as_fleet, bridge_of, replier, vehicle_of
+from service.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
 from service.zenoh_link.keys import ALIVE, STATE, full, vehicle_in
 
 _STATE_TIMEOUT_S = 2.0
@@ -51,7 +51,7 @@ class Watch:
         if reply.ok is not None and bridge is not None:
             self._take(reply.ok, bridge)
 
-    def look(self) -> tuple[list[Vehicle], list[float | None]]:
+    def look(self) -> tuple[list[FleetVehicle], list[float | None]]:
         """The vehicles that are alive, by name, and the age of each one's newest state."""
         with self._lock:
             now = self._clock()

@@ -15,7 +15,7 @@ from service.fleet.conditions import Condition
 from service.fleet.fleet_table import watch_table
 from service.fleet.keyboard import scrolling, wait_for_scroll
 from service.fleet.session import is_connected
-from service.fleet.vehicle import Vehicle
+from service.fleet.vehicle import FleetVehicle
 from service.fleet.watch import Watch
 
 _REFRESH_S = 0.5
@@ -27,10 +27,10 @@ _LINKED = ("MSP", "MAVLink")
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ScreenRow:
     """A vehicle on the screen; `age_s`: of its newest state, None if there is none."""
 
-    vehicle: Vehicle
+    vehicle: FleetVehicle
     age_s: float | None
 
     @property
@@ -58,7 +58,7 @@ def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condit
             top += wait_for_scroll(_REFRESH_S, page)
 
 
-def screen(rows: Sequence[Row], top: int, page: int, *, is_connected: bool) -> Group | Text:
+def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool) -> Group | Text:
     """The screen: counts, then armed vehicles, then those with problems, then the others."""
     if not is_connected:
         return Text("The router is gone; waiting for it. Ctrl-C ends.", style="red")
@@ -77,7 +77,7 @@ def screen(rows: Sequence[Row], top: int, page: int, *, is_connected: bool) -> G
 
 def print_changes(seen: Watch, conditions: Sequence[Condition]) -> None:
     """Print a line for each vehicle that appears, changes or disappears, until KeyboardInterrupt."""
-    known: dict[str, Vehicle] = {}
+    known: dict[str, FleetVehicle] = {}
     while True:
         now = {row.vehicle.session_id: row.vehicle for row in _rows(seen, conditions)}
         for session_id, vehicle in now.items():
@@ -89,8 +89,8 @@ def print_changes(seen: Watch, conditions: Sequence[Condition]) -> None:
         time.sleep(_REFRESH_S)
 
 
-def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[Row]:
+def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[ScreenRow]:
     fleet, ages_s = seen.look()
-    rows = [Row(vehicle, age_s) for vehicle, age_s in zip(fleet, ages_s, strict=True)]
+    rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in zip(fleet, ages_s, strict=True)]
     rows = [row for row in rows if all(condition(row.vehicle) for condition in conditions)]
     return sorted(rows, key=lambda row: (row.vehicle.armed is not True, not row.problem, row.vehicle.name))

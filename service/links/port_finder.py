@@ -16,7 +16,7 @@ import serial
 import structlog
 
 from bridge.fc.port_listener import OtherDeviceWatch, PortListener
-from bridge.missions.mission_service import Delivery
+from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
@@ -106,7 +106,7 @@ class PortFinder:
     def telemetry(self, groups: frozenset[Group]) -> None:
         """Not used."""
 
-    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+    def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         """Not used."""
 
     def status(self) -> dict[str, Any]:

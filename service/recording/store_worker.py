@@ -93,8 +93,8 @@ class StoreWorker:
             match effect:
                 case Save(mission):
                     return self._store.add(_received(mission))
-                case Conclude(number, conclusion):
-                    self._store.conclude(number, conclusion.outcome.value, conclusion.detail, time.time())
+                case Conclude(number, outcome, detail):
+                    self._store.conclude(number, outcome.value, detail, time.time())
                     return True
                 case Recall(identity):
                     found = self._store.latest_verified(identity.count, identity.checksum)

@@ -17,7 +17,7 @@ from service.settings.settings import (
 from service.settings.share import parse_share
 from service.settings.web import DEFAULT_LISTEN, parse_listen
 from service.settings.write_access import parse_link
-from service.settings.zenoh import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, Profile, check_name, check_rates
+from service.settings.zenoh import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, ZenohProfile, check_name, check_rates
 
 LOG_LEVELS = ("debug", "info", "warning", "error")
 _LIMITS = TlogLimits()
@@ -126,9 +126,9 @@ KEYS = (
     ),
     Key(
         "zenoh.profile",
-        Choice([each.value for each in Profile], Profile),
+        Choice([each.value for each in ZenohProfile], ZenohProfile),
         "Data volume: full sends each sample; metered sends a group every 5 s, but changes such as arming at once.",
-        f'"{Profile.FULL.value}"',
+        f'"{ZenohProfile.FULL.value}"',
     ),
     Key(
         "zenoh.rates",

@@ -28,7 +28,7 @@ class PayloadEncoding(Enum):
     CBOR = "cbor"
 
 
-class Profile(Enum):
+class ZenohProfile(Enum):
     """How much data a vehicle's link may use."""
 
     FULL = "full"
@@ -57,7 +57,7 @@ class ZenohSettings:
     prefix: str = DEFAULT_PREFIX
     vehicle: str = field(default_factory=host_name)
     encoding: PayloadEncoding = PayloadEncoding.JSON
-    profile: Profile = Profile.FULL
+    profile: ZenohProfile = ZenohProfile.FULL
     rates: Mapping[str, float] = field(default_factory=dict)
     connect: tuple[str, ...] = ()
     listen: tuple[str, ...] = ()

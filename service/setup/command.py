@@ -12,7 +12,7 @@ from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
 from service.setup.change import Machine, SetupError, Step, is_root
-from service.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, Answers, missing_steps
+from service.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
 from service.web.token import DEFAULT_NAME
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
@@ -66,7 +66,7 @@ def setup(
             raise click.UsageError("a hotspot needs a password: --password-file FILE")
         password = click.prompt("Its password, 8 characters or more", hide_input=True, confirmation_prompt=True)
     _check_wifi(hotspot, password)
-    answers = Answers(
+    answers = SetupChoices(
         fc=fc,
         page=page,
         hotspot=None if hotspot is None or password is None else (hotspot, password),
@@ -114,7 +114,7 @@ def _carry_out(steps: list[Step], machine: Machine) -> None:
         click.echo("done")
 
 
-def _tell_where(host: Host, answers: Answers) -> None:
+def _tell_where(host: Host, answers: SetupChoices) -> None:
     addresses = [_ADDRESS_OF_HOTSPOT] if answers.hotspot else host.ipv4_addresses()
     name = answers.name or host.read("/etc/hostname").strip()
     local = [f"{name}.local"] if name and host.path("/etc/avahi").exists() else []

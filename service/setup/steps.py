@@ -29,7 +29,7 @@ _PI_5_CONSOLES = ("ttyAMA0",)
 
 
 @dataclass(frozen=True, slots=True)
-class Answers:
+class SetupChoices:
     """The pilot's choices.
 
     `hotspot`: its name and password; None keeps the network. `name`: the host name, for NAME.local.
@@ -44,13 +44,13 @@ class Answers:
     key: str | None = None
 
 
-def missing_steps(host: Host, answers: Answers) -> list[Step]:
+def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
     """The remaining steps on this machine, in order."""
     makers = (_console, _uart, _country, _name, _key, _settings, _others, _announcement, _service, _hotspot)
     return [step for make in makers for step in make(host, answers)]
 
 
-def _console(host: Host, answers: Answers) -> Iterator[Step]:
+def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
     model = pi_model(host)
     consoles = _PI_5_CONSOLES if model is not None and model.header_uart == "/dev/ttyAMA0" else _HEADER_CONSOLES
     file = boot_file(host, "cmdline.txt")
@@ -70,7 +70,7 @@ def _console(host: Host, answers: Answers) -> Iterator[Step]:
         yield Step("free the UART on the header from the login console", changes, needs_reboot=in_cmdline)
 
 
-def _uart(host: Host, answers: Answers) -> Iterator[Step]:
+def _uart(host: Host, answers: SetupChoices) -> Iterator[Step]:
     file = boot_file(host, "config.txt")
     if file is None:
         return
@@ -91,7 +91,7 @@ def _is_on(text: str, line: str) -> bool:
     return bool(given) and f"{key}{given[-1] or '=on'}" == line
 
 
-def _country(host: Host, answers: Answers) -> Iterator[Step]:
+def _country(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if answers.country is not None and host.path("/usr/bin/raspi-config").exists():
         if f"cfg80211.ieee80211_regdom={answers.country}" in host.read(boot_file(host, "cmdline.txt") or ""):
             return
@@ -99,7 +99,7 @@ def _country(host: Host, answers: Answers) -> Iterator[Step]:
         yield Step(f"set the Wi-Fi country to {answers.country}", [Run(command)])
 
 
-def _name(host: Host, answers: Answers) -> Iterator[Step]:
+def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if answers.name is None or host.read("/etc/hostname").strip() == answers.name:
         return
     old = host.read("/etc/hostname").strip()
@@ -113,13 +113,13 @@ def _name(host: Host, answers: Answers) -> Iterator[Step]:
     )
 
 
-def _key(host: Host, answers: Answers) -> Iterator[Step]:
+def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if answers.key is not None and host.read(KEY_FILE).strip() != answers.key:
         owner = Run(("chown", "naze-bridge:", KEY_FILE))
         yield Step("set the key that is required for writing", [WriteFile(KEY_FILE, f"{answers.key}\n", True), owner])
 
 
-def settings_text(host: Host, answers: Answers) -> str:
+def settings_text(host: Host, answers: SetupChoices) -> str:
     """The drop-in file with the choices."""
     lines = ["# Written by `naze-bridge setup`, which may be run again.", f'fc = "{answers.fc}"']
     if answers.key is not None or host.path(KEY_FILE).exists():
@@ -129,7 +129,7 @@ def settings_text(host: Host, answers: Answers) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _settings(host: Host, answers: Answers) -> Iterator[Step]:
+def _settings(host: Host, answers: SetupChoices) -> Iterator[Step]:
     text = settings_text(host, answers)
     if host.read(SETTINGS_FILE) != text:
         what = f"fc = {answers.fc}, status page {'on' if answers.page else 'off'}"
@@ -139,7 +139,7 @@ def _settings(host: Host, answers: Answers) -> Iterator[Step]:
         yield Step(f"settings: {what}", changes)
 
 
-def _others(host: Host, answers: Answers) -> Iterator[Step]:
+def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:
     """Keep the name /dev/naze from USB devices that proved not to be a flight controller."""
     try:
         others = json.loads(host.read(f"{STATE_FOLDER}/{PORTS_FILE}") or "{}").get("others", {})
@@ -159,7 +159,7 @@ def _others(host: Host, answers: Answers) -> Iterator[Step]:
         yield Step("keep the name /dev/naze from radios and GPS receivers", changes)
 
 
-def _announcement(host: Host, answers: Answers) -> Iterator[Step]:
+def _announcement(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if not host.path(Path(_AVAHI_FILE).parent).exists():
         return  # without Avahi there is no NAME.local either, as the closing message says
     services = [("_mavlink._udp", GCS_PORT)] + ([("_http._tcp", PAGE_PORT)] if answers.page else [])
@@ -174,12 +174,12 @@ def _announcement(host: Host, answers: Answers) -> Iterator[Step]:
         yield Step("announce the bridge on the network (zeroconf)", [WriteFile(_AVAHI_FILE, text)])
 
 
-def _service(host: Host, answers: Answers) -> Iterator[Step]:
+def _service(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if not host.path(_WANTED_BY).is_symlink():
         yield Step("start the bridge with the machine", [Run(("systemctl", "enable", *_now(host), "naze-bridge"))])
 
 
-def _hotspot(host: Host, answers: Answers) -> Iterator[Step]:
+def _hotspot(host: Host, answers: SetupChoices) -> Iterator[Step]:
     """The last step, because it may cut the connection over which setup is run."""
     if answers.hotspot is None:
         return

@@ -14,7 +14,7 @@ from prometheus_client.registry import Collector
 
 from bridge.fc.session import TRANSITIONS
 from bridge.line.round_trips import BOUNDS_S, RoundTrips
-from bridge.missions.mission_service import Delivery
+from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
@@ -75,7 +75,7 @@ class Metrics:
             elapsed_s = time.monotonic() - self._begun.pop(incident)
             self._durations.labels(facts["ack"]).observe(elapsed_s)
 
-    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+    def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         """Count a mission."""
         self._missions.labels(delivery.ack.name).inc()
         for finding in mission.verdict.findings:

@@ -16,7 +16,7 @@ from functools import partial
 import structlog
 import zenoh
 
-from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
@@ -107,7 +107,7 @@ class Node:
         if level != "debug":
             self._publish_soon()
 
-    def mission_ended(self, mission: ArrivedMission, delivery: Delivery) -> None:
+    def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
         """Publish the mission report."""
         self._send_reliably(keys.MISSION_REPORT, lambda: vehicle_data.mission_report(mission, delivery))
         self._publish_soon()

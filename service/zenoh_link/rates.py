@@ -9,7 +9,7 @@ from math import inf
 from typing import Any
 
 from bridge.model.vehicle_groups import Group
-from service.settings.zenoh import STATE_NAME, Profile
+from service.settings.zenoh import STATE_NAME, ZenohProfile
 
 #: The metered profile: each group every 5 s, the state every 15 s, and changes of the fields below at once.
 _METERED_S = 5.0
@@ -25,9 +25,9 @@ MAX_REQUEST_HZ = 50.0
 class SampleRates:
     """Decides for each sample whether it goes out. Names are those of the groups, and "state"."""
 
-    def __init__(self, profile: Profile, limits_hz: Mapping[str, float]) -> None:
+    def __init__(self, profile: ZenohProfile, limits_hz: Mapping[str, float]) -> None:
         usual = {group.value: _METERED_S for group in Group} | {STATE_NAME: _METERED_STATE_S}
-        self._interval_s = usual if profile is Profile.METERED else {}
+        self._interval_s = usual if profile is ZenohProfile.METERED else {}
         self._interval_s |= {name: 1 / hz if hz else inf for name, hz in limits_hz.items()}
         self._requests: dict[str, tuple[float, float]] = {}
         self._due_at: dict[str, float] = {}

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from bridge.bridge import Bridge
-from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from service.control.mission_data import Json
@@ -47,7 +47,7 @@ def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
     return {"level": level, "event": name, "facts": {key: _fact(value) for key, value in facts.items()}}
 
 
-def mission_report(mission: ArrivedMission, delivery: Delivery) -> Json:
+def mission_report(mission: ArrivedMission, delivery: DeliveryResult) -> Json:
     """The result of a received mission."""
     verdict = mission.verdict
     body: Json = strict(

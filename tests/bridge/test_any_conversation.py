@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from bridge.fc.states.msp import Msp
+from bridge.fc.states.msp import Polling
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.wp_record import WpRecord
@@ -154,7 +154,7 @@ class Conversation(RuleBasedStateMachine):
             world.power_on()
         world.run(10)
         self.the_board_holds_a_list_that_was_sent()
-        assert isinstance(world.bridge.session.state, Msp)
+        assert isinstance(world.bridge.session.state, Polling)
         assert world.bridge._uploads.state is None
         assert not world.bridge.runner.is_busy
         items = waypoints(LONGEST + 5, 900)

@@ -19,7 +19,7 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.autosense import SPEEDS
 from bridge.missions.fc_mission_store import LIST_IS_GONE, PushFailure
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import Outcome
 from bridge.model.verdict import Result
 from protocols.mission_item import Command, MissionItem, MissionResult
@@ -104,7 +104,9 @@ def test_every_dialect_is_here() -> None:
     assert MAKERS.keys() == {profile.name for profile in PROFILES if profile.open_store is not None}
 
 
-def assert_is_true(craft: Craft, delivery: Delivery, old: Sequence[MissionItem], new: Sequence[MissionItem]) -> None:
+def assert_is_true(
+    craft: Craft, delivery: DeliveryResult, old: Sequence[MissionItem], new: Sequence[MissionItem]
+) -> None:
     """What was said of a push that was cut off is what the flight controller holds. UNCERTAIN promises nothing."""
     if delivery.ack is ACCEPTED:
         assert craft.holds(new)

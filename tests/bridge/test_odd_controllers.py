@@ -12,7 +12,7 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Records, Status, Stored
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, QuietLine, ident
 from tests.support.world import GroundStation, World
@@ -51,7 +51,7 @@ class Odd(QuietLine):
     def answer(self, frame: MspFrame) -> bytes | None:
         """Answer a command of the extension; None: not at all."""
         draw = self.random
-        status = draw.choice((Status.OK, Status.OK, *Status))
+        status = draw.choice((ReplyStatus.OK, ReplyStatus.OK, *ReplyStatus))
         count, checksum = draw.choice((0, 1, 5, 146, 65535)), draw.choice((0, 1, 0xFFFFFFFF))
         match draw.randrange(8):
             case 0:
@@ -64,7 +64,7 @@ class Odd(QuietLine):
                 return Stored(status, ListIdentity(count, checksum)).encode()
             case 4:
                 return Records(status, draw.choice((0, 6, 12, 7, 65535)), records_of(waypoints(6))).encode()
-        return Progress(status, count, checksum).encode()
+        return Staged(status, count, checksum).encode()
 
 
 class Stubborn(Odd):
@@ -75,7 +75,7 @@ class Stubborn(Odd):
         self.answers = answers
 
     def answer(self, frame: MspFrame) -> bytes | None:
-        return self.answers.get(frame.command, Progress(Status.OK, 0, 0).encode())
+        return self.answers.get(frame.command, Staged(ReplyStatus.OK, 0, 0).encode())
 
 
 def found(peer: QuietLine) -> tuple[World, GroundStation]:
@@ -94,20 +94,20 @@ def test_every_procedure_ends_whatever_is_answered(seed: int) -> None:
     assert world.bridge._uploads.state is None
 
 
-PROOF = Stored(Status.OK, identify(records_of(waypoints(30)))).encode()
+PROOF = Stored(ReplyStatus.OK, identify(records_of(waypoints(30)))).encode()
 
 
 @pytest.mark.parametrize(
     "answers",
     [
-        {MissionCommand.CHUNK: Progress(Status.SEQUENCE, 0, 0).encode()},
-        {MissionCommand.CHUNK: Progress(Status.OK, 0, 0).encode()},
-        {MissionCommand.COMMIT: Stored(Status.INCOMPLETE, ListIdentity(0, 0)).encode()},
-        {MissionCommand.COMMIT: Stored(Status.OK, ListIdentity(0, 0)).encode()},
-        {MissionCommand.COMMIT: Stored(Status.ARMED, ListIdentity(0, 0)).encode()},
-        {MissionCommand.BEGIN: Progress(Status.SAME, 0, 0).encode()},
-        {MissionCommand.BEGIN: Progress(Status.BUSY, 0, 0).encode()},
-        {MissionCommand.BEGIN: Progress(Status.OK, 30, 0).encode()},
+        {MissionCommand.CHUNK: Staged(ReplyStatus.SEQUENCE, 0, 0).encode()},
+        {MissionCommand.CHUNK: Staged(ReplyStatus.OK, 0, 0).encode()},
+        {MissionCommand.COMMIT: Stored(ReplyStatus.INCOMPLETE, ListIdentity(0, 0)).encode()},
+        {MissionCommand.COMMIT: Stored(ReplyStatus.OK, ListIdentity(0, 0)).encode()},
+        {MissionCommand.COMMIT: Stored(ReplyStatus.ARMED, ListIdentity(0, 0)).encode()},
+        {MissionCommand.BEGIN: Staged(ReplyStatus.SAME, 0, 0).encode()},
+        {MissionCommand.BEGIN: Staged(ReplyStatus.BUSY, 0, 0).encode()},
+        {MissionCommand.BEGIN: Staged(ReplyStatus.OK, 30, 0).encode()},
         {MissionCommand.BEGIN: b"\xff"},
     ],
 )
@@ -119,11 +119,11 @@ def test_a_board_that_insists_is_given_up(answers: dict[int, bytes]) -> None:
 @pytest.mark.parametrize(
     "answer",
     [
-        Records(Status.OK, 0, []),
-        Records(Status.OK, 0, records_of(waypoints(3))),
-        Records(Status.OK, 6, records_of(waypoints(6))),
-        Records(Status.OK, 7, records_of(waypoints(6))),
-        Records(Status.RANGE, 0, []),
+        Records(ReplyStatus.OK, 0, []),
+        Records(ReplyStatus.OK, 0, records_of(waypoints(3))),
+        Records(ReplyStatus.OK, 6, records_of(waypoints(6))),
+        Records(ReplyStatus.OK, 7, records_of(waypoints(6))),
+        Records(ReplyStatus.RANGE, 0, []),
     ],
 )
 def test_a_reading_that_makes_no_progress_ends(answer: Records) -> None:

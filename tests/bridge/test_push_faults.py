@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 
 from bridge.missions.fc_mission_store import PushFailure
-from bridge.missions.mission_service import Delivery, HeldMission
+from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.refusal import ARMED, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
@@ -53,7 +53,7 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
     result, _ = outcome[0]
     stored = world.stored
     committed = MissionCommand.COMMIT in commands_sent(world)
-    if isinstance(result, Delivery) and result.ack is MissionResult.ACCEPTED:
+    if isinstance(result, DeliveryResult) and result.ack is MissionResult.ACCEPTED:
         assert stored == NEW_RECORDS
         came_to = "ACCEPTED"
     else:

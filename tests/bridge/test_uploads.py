@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from bridge.model.mission_log import Outcome
-from bridge.vehicle.upload_states import Asking, Delivering, Receiving, State
+from bridge.vehicle.upload_states import Asking, Delivering, Receiving, UploadState
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 from simulator.options import Faults, SimOptions, TelemetryProtocol
@@ -39,7 +39,7 @@ def holding(options: SimOptions | None = None, faults: Faults | None = None) -> 
     return world, GroundStation(world)
 
 
-def state(world: World) -> type[State] | None:
+def state(world: World) -> type[UploadState] | None:
     return world.bridge._uploads.state
 
 

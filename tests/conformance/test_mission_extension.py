@@ -16,7 +16,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp import mission as ext
 from protocols.msp.frame import request
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Records, Status, Stored
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Records, ReplyStatus, Staged, Stored
 from protocols.wp_record import WpRecord
 from tests.support.c_core import CCore, PowerCut
 from tests.support.mission_devices import Device, model, simulated_core
@@ -48,17 +48,17 @@ class Companion:
         assert info is not None
         return info
 
-    def progress(self, frame: bytes) -> Progress:
+    def progress(self, frame: bytes) -> Staged:
         reply = self.ask(frame)
         progress = ext.decode_progress(reply)
         assert progress is not None
         assert len(reply) == 7
         return progress
 
-    def begin(self, identity: ListIdentity) -> Progress:
+    def begin(self, identity: ListIdentity) -> Staged:
         return self.progress(ext.encode_begin(identity))
 
-    def chunk(self, records: tuple[WpRecord, ...], first: int, count: int = CHUNK) -> Progress:
+    def chunk(self, records: tuple[WpRecord, ...], first: int, count: int = CHUNK) -> Staged:
         return self.progress(chunk_frame(first, pack_records(records[first : first + count])))
 
     def commit(self, identity: ListIdentity) -> Stored:
@@ -76,19 +76,19 @@ class Companion:
         assert records is not None
         return records
 
-    def radius(self, centimetres: int) -> tuple[Status, int]:
+    def radius(self, centimetres: int) -> tuple[ReplyStatus, int]:
         radius = ext.decode_radius(self.ask(ext.encode_radius(centimetres)))
         assert radius is not None
         return radius.status, radius.wp_radius_cm
 
     def stage(self, records: tuple[WpRecord, ...]) -> None:
-        assert self.begin(identify(records)).status is Status.OK
+        assert self.begin(identify(records)).status is ReplyStatus.OK
         for first in range(0, len(records), CHUNK):
-            assert self.chunk(records, first).status is Status.OK
+            assert self.chunk(records, first).status is ReplyStatus.OK
 
     def push(self, records: tuple[WpRecord, ...]) -> None:
         self.stage(records)
-        assert self.commit(identify(records)) == Stored(Status.OK, identify(records))
+        assert self.commit(identify(records)) == Stored(ReplyStatus.OK, identify(records))
 
     def holds(self, records: tuple[WpRecord, ...]) -> bool:
         return self.device.list == pack_records(records) and self.info().stored == identify(records)
@@ -102,7 +102,7 @@ def chunk_frame(first: int, records: bytes) -> bytes:
 OLD, NEW = mission(4, seed=1), mission(20, seed=2)
 #: In the other slot: what BEGIN has to erase.
 OLDER = mission(CAPACITY, seed=3)
-NOTHING = Progress(Status.OK, 0, 0)
+NOTHING = Staged(ReplyStatus.OK, 0, 0)
 
 
 @pytest.fixture(params=[CCore, model, simulated_core])
@@ -144,7 +144,7 @@ def test_a_full_list_is_pushed_read_back_and_survives_a_reset(fc: Companion) -> 
     read: list[WpRecord] = []
     while len(read) < CAPACITY:
         reply = fc.read(len(read), READ)
-        assert (reply.status, reply.first) == (Status.OK, len(read))
+        assert (reply.status, reply.first) == (ReplyStatus.OK, len(read))
         read += reply.records
     assert tuple(read) == records
     assert fc.info().stored == identify(records)
@@ -159,7 +159,7 @@ def test_count_zero_clears(fc: Companion) -> None:
 
 def test_a_stored_list_is_not_written_again(fc: Companion) -> None:
     writes = fc.info().flash_writes
-    assert fc.begin(identify(OLD)).status is Status.SAME
+    assert fc.begin(identify(OLD)).status is ReplyStatus.SAME
     assert InfoFlag.TRANSFER_OPEN not in fc.info().flags
     assert fc.info().flash_writes == writes
 
@@ -168,13 +168,13 @@ def test_requests_may_be_repeated(fc: Companion) -> None:
     half = identify(NEW[:CHUNK])
     fc.begin(identify(NEW))
     for _ in range(2):
-        assert fc.chunk(NEW, 0) == Progress(Status.OK, CHUNK, half.checksum)
-        assert fc.begin(identify(NEW)) == Progress(Status.OK, CHUNK, half.checksum)
-    assert fc.chunk(NEW, 10, 10) == Progress(Status.OK, CHUNK, half.checksum)
+        assert fc.chunk(NEW, 0) == Staged(ReplyStatus.OK, CHUNK, half.checksum)
+        assert fc.begin(identify(NEW)) == Staged(ReplyStatus.OK, CHUNK, half.checksum)
+    assert fc.chunk(NEW, 10, 10) == Staged(ReplyStatus.OK, CHUNK, half.checksum)
     fc.chunk(NEW, CHUNK)
     for _ in range(2):
-        assert fc.commit(identify(NEW)) == Stored(Status.OK, identify(NEW))
-        assert fc.abort() == bytes((Status.OK,))
+        assert fc.commit(identify(NEW)) == Stored(ReplyStatus.OK, identify(NEW))
+        assert fc.abort() == bytes((ReplyStatus.OK,))
     assert fc.holds(NEW)
 
 
@@ -188,29 +188,29 @@ def test_another_begin_replaces_the_transfer(fc: Companion) -> None:
 def test_a_chunk_too_early_is_out_of_sequence(fc: Companion) -> None:
     fc.begin(identify(NEW))
     fc.chunk(NEW, 0, 3)
-    assert fc.chunk(NEW, 4) == Progress(Status.SEQUENCE, 3, identify(NEW[:3]).checksum)
+    assert fc.chunk(NEW, 4) == Staged(ReplyStatus.SEQUENCE, 3, identify(NEW[:3]).checksum)
 
 
 def test_a_chunk_past_the_announced_count_is_refused(fc: Companion) -> None:
     fc.begin(identify(NEW[:5]))
-    assert fc.chunk(NEW, 0, 6).status is Status.RANGE
+    assert fc.chunk(NEW, 0, 6).status is ReplyStatus.RANGE
     assert fc.info().staged == 0
-    assert fc.chunk(NEW, 0, 5).status is Status.OK
+    assert fc.chunk(NEW, 0, 5).status is ReplyStatus.OK
 
 
 def test_without_a_transfer_nothing_is_taken(fc: Companion) -> None:
-    assert fc.chunk(NEW, 0) == Progress(Status.NO_TRANSFER, 0, 0)
-    assert fc.commit(identify(NEW)) == Stored(Status.NO_TRANSFER, identify(OLD))
+    assert fc.chunk(NEW, 0) == Staged(ReplyStatus.NO_TRANSFER, 0, 0)
+    assert fc.commit(identify(NEW)) == Stored(ReplyStatus.NO_TRANSFER, identify(OLD))
 
 
 def test_more_records_than_there_is_room_for(fc: Companion) -> None:
-    assert fc.begin(ListIdentity(CAPACITY + 1, 1)) == Progress(Status.NO_SPACE, 0, 0)
+    assert fc.begin(ListIdentity(CAPACITY + 1, 1)) == Staged(ReplyStatus.NO_SPACE, 0, 0)
 
 
 def test_commit_of_an_incomplete_list(fc: Companion) -> None:
     fc.begin(identify(NEW))
     fc.chunk(NEW, 0)
-    assert fc.commit(identify(NEW)) == Stored(Status.INCOMPLETE, identify(OLD))
+    assert fc.commit(identify(NEW)) == Stored(ReplyStatus.INCOMPLETE, identify(OLD))
     assert InfoFlag.TRANSFER_OPEN in fc.info().flags
 
 
@@ -219,40 +219,40 @@ def test_commit_of_other_records_than_announced(fc: Companion) -> None:
     fc.begin(wrong)
     fc.chunk(NEW, 0)
     fc.chunk(NEW, CHUNK)
-    assert fc.commit(wrong) == Stored(Status.CHECKSUM, identify(OLD))
-    assert fc.commit(wrong).status is Status.NO_TRANSFER
+    assert fc.commit(wrong) == Stored(ReplyStatus.CHECKSUM, identify(OLD))
+    assert fc.commit(wrong).status is ReplyStatus.NO_TRANSFER
     assert fc.holds(OLD)
 
 
 def test_commit_of_another_list_than_begun(fc: Companion) -> None:
     fc.stage(NEW)
-    assert fc.commit(identify(NEW[:3])).status is Status.CHECKSUM
+    assert fc.commit(identify(NEW[:3])).status is ReplyStatus.CHECKSUM
     assert fc.info().flags == InfoFlag(0)
 
 
 def test_an_unknown_record_command_drops_the_transfer(fc: Companion) -> None:
     fc.begin(identify(NEW))
     bad = pack_records(NEW[:3])[:-1] + b"\x08"
-    assert fc.progress(chunk_frame(0, bad)) == Progress(Status.BAD_RECORD, 0, 0)
-    assert fc.chunk(NEW, 0).status is Status.NO_TRANSFER
+    assert fc.progress(chunk_frame(0, bad)) == Staged(ReplyStatus.BAD_RECORD, 0, 0)
+    assert fc.chunk(NEW, 0).status is ReplyStatus.NO_TRANSFER
 
 
 def test_arming_drops_the_transfer_and_refuses_changes(fc: Companion) -> None:
     fc.stage(NEW)
     fc.device.arm(True)
-    assert fc.begin(identify(NEW)) == Progress(Status.ARMED, 0, 0)
-    assert fc.chunk(NEW, 0) == Progress(Status.ARMED, 0, 0)
-    assert fc.commit(identify(NEW)) == Stored(Status.ARMED, identify(OLD))
-    assert fc.radius(500) == (Status.ARMED, 200)
+    assert fc.begin(identify(NEW)) == Staged(ReplyStatus.ARMED, 0, 0)
+    assert fc.chunk(NEW, 0) == Staged(ReplyStatus.ARMED, 0, 0)
+    assert fc.commit(identify(NEW)) == Stored(ReplyStatus.ARMED, identify(OLD))
+    assert fc.radius(500) == (ReplyStatus.ARMED, 200)
     assert fc.read(0, READ).records == list(OLD)
     fc.device.arm(False)
-    assert fc.commit(identify(NEW)).status is Status.NO_TRANSFER
+    assert fc.commit(identify(NEW)).status is ReplyStatus.NO_TRANSFER
     assert fc.holds(OLD)
 
 
 def test_a_scheduled_write_makes_it_busy(fc: Companion) -> None:
     fc.device.set_busy(True)
-    assert fc.begin(identify(NEW)) == Progress(Status.BUSY, 0, 0)
+    assert fc.begin(identify(NEW)) == Staged(ReplyStatus.BUSY, 0, 0)
     fc.device.set_busy(False)
     fc.push(NEW)
 
@@ -264,23 +264,23 @@ def test_five_seconds_of_silence_drop_the_transfer(fc: Companion) -> None:
     fc.device.advance(5000)
     assert InfoFlag.TRANSFER_OPEN in fc.info().flags
     fc.device.advance(1)
-    assert fc.chunk(NEW, CHUNK).status is Status.NO_TRANSFER
+    assert fc.chunk(NEW, CHUNK).status is ReplyStatus.NO_TRANSFER
 
 
 def test_read_past_the_end(fc: Companion) -> None:
-    assert fc.read(len(OLD), 1) == Records(Status.RANGE, len(OLD), [])
+    assert fc.read(len(OLD), 1) == Records(ReplyStatus.RANGE, len(OLD), [])
     assert fc.read(len(OLD) - 1, READ).records == list(OLD[-1:])
     assert fc.read(0, 255).records == list(OLD)
-    assert fc.read(0, 0).status is Status.BAD_REQUEST
+    assert fc.read(0, 0).status is ReplyStatus.BAD_REQUEST
 
 
 def test_the_radius_is_set_saved_and_bounded(fc: Companion) -> None:
-    assert fc.radius(2001) == (Status.RANGE, 200)
-    assert fc.radius(2000) == (Status.OK, 2000)
+    assert fc.radius(2001) == (ReplyStatus.RANGE, 200)
+    assert fc.radius(2000) == (ReplyStatus.OK, 2000)
     assert InfoFlag.WRITE_PENDING in fc.info().flags
-    assert fc.begin(identify(NEW)).status is Status.BUSY
-    assert fc.radius(100) == (Status.BUSY, 2000)
-    assert fc.radius(2000) == (Status.OK, 2000)
+    assert fc.begin(identify(NEW)).status is ReplyStatus.BUSY
+    assert fc.radius(100) == (ReplyStatus.BUSY, 2000)
+    assert fc.radius(2000) == (ReplyStatus.OK, 2000)
     fc.device.advance(1000)
     fc.device.power_cycle()
     assert fc.info().wp_radius_cm == 2000
@@ -304,7 +304,7 @@ def test_malformed_requests_change_nothing(fc: Companion) -> None:
             if not well_formed[command]:
                 reply = fc.device.request(command, bytes(size))
                 assert reply is not None
-                assert reply[0] == Status.BAD_REQUEST
+                assert reply[0] == ReplyStatus.BAD_REQUEST
                 assert len(reply) == lengths.get(command, 7)
     assert fc.info() == before
 
@@ -314,61 +314,61 @@ def test_other_commands_are_left_to_the_firmware(fc: Companion) -> None:
     assert fc.device.request(197, b"") is None
 
 
-def begin_until_refused(fc: Companion) -> tuple[int, Status]:
+def begin_until_refused(fc: Companion) -> tuple[int, ReplyStatus]:
     """Begin one list after the other, and stage a record of each, so that the next must erase it."""
     for count in range(1000):
         status = fc.begin(ListIdentity(len(NEW), count)).status
-        if status is not Status.OK:
+        if status is not ReplyStatus.OK:
             return count, status
-        assert fc.chunk(NEW, 0, 1).status is Status.OK
+        assert fc.chunk(NEW, 0, 1).status is ReplyStatus.OK
     raise AssertionError("nothing is ever refused")
 
 
 def test_a_blank_slot_costs_no_write(fc: Companion) -> None:
-    assert fc.begin(identify(NEW)).status is Status.OK
+    assert fc.begin(identify(NEW)).status is ReplyStatus.OK
     fc.device.cut_power_at(1)  # the next flash operation
     for records in (OLDER, NEW) * 100:
-        assert fc.begin(identify(records)).status is Status.OK
+        assert fc.begin(identify(records)).status is ReplyStatus.OK
 
 
 def test_flash_writes_are_on_a_budget(fc: Companion) -> None:
     fc.device.power_cycle()
-    assert begin_until_refused(fc) == (64, Status.BUSY)
+    assert begin_until_refused(fc) == (64, ReplyStatus.BUSY)
     assert fc.info().flags == InfoFlag.WRITES_SPENT
-    assert fc.begin(identify(OLD)).status is Status.SAME
-    assert fc.radius(300) == (Status.BUSY, 200)
-    assert fc.radius(200) == (Status.OK, 200)
+    assert fc.begin(identify(OLD)).status is ReplyStatus.SAME
+    assert fc.radius(300) == (ReplyStatus.BUSY, 200)
+    assert fc.radius(200) == (ReplyStatus.OK, 200)
     assert fc.holds(OLD)
     fc.device.advance(299_999)
-    assert begin_until_refused(fc) == (0, Status.BUSY)
+    assert begin_until_refused(fc) == (0, ReplyStatus.BUSY)
     fc.device.advance(1)
     assert fc.info().flags == InfoFlag(0)
     fc.push(NEW)
     assert fc.holds(NEW)
-    assert begin_until_refused(fc) == (0, Status.BUSY)
+    assert begin_until_refused(fc) == (0, ReplyStatus.BUSY)
     fc.device.advance(3 * 300_000)
-    assert fc.radius(300) == (Status.OK, 300)
+    assert fc.radius(300) == (ReplyStatus.OK, 300)
     fc.device.advance(1000)
-    assert begin_until_refused(fc) == (2, Status.BUSY)
+    assert begin_until_refused(fc) == (2, ReplyStatus.BUSY)
     fc.device.advance(1000 * 300_000)
-    assert begin_until_refused(fc) == (64, Status.BUSY)
+    assert begin_until_refused(fc) == (64, ReplyStatus.BUSY)
     fc.device.power_cycle()
-    assert begin_until_refused(fc) == (64, Status.BUSY)
+    assert begin_until_refused(fc) == (64, ReplyStatus.BUSY)
 
 
-def begin_new(fc: Companion) -> Status:
+def begin_new(fc: Companion) -> ReplyStatus:
     return fc.begin(identify(NEW)).status
 
 
-def first_chunk(fc: Companion) -> Status:
+def first_chunk(fc: Companion) -> ReplyStatus:
     return fc.chunk(NEW, 0).status
 
 
-def commit_new(fc: Companion) -> Status:
+def commit_new(fc: Companion) -> ReplyStatus:
     return fc.commit(identify(NEW)).status
 
 
-STAGES: dict[Callable[[Companion], Status], Callable[[Companion], object]] = {
+STAGES: dict[Callable[[Companion], ReplyStatus], Callable[[Companion], object]] = {
     begin_new: lambda fc: None,
     first_chunk: begin_new,
     commit_new: lambda fc: fc.stage(NEW),
@@ -376,10 +376,10 @@ STAGES: dict[Callable[[Companion], Status], Callable[[Companion], object]] = {
 
 
 @pytest.mark.parametrize("act", STAGES)
-def test_failing_flash_leaves_the_old_list(fc: Companion, act: Callable[[Companion], Status]) -> None:
+def test_failing_flash_leaves_the_old_list(fc: Companion, act: Callable[[Companion], ReplyStatus]) -> None:
     STAGES[act](fc)
     fc.device.fail_at(1)
-    assert act(fc) is Status.FLASH
+    assert act(fc) is ReplyStatus.FLASH
     assert fc.holds(OLD)
     assert fc.info().flags == InfoFlag(0)
     fc.push(NEW)
@@ -387,7 +387,7 @@ def test_failing_flash_leaves_the_old_list(fc: Companion, act: Callable[[Compani
 
 
 @pytest.mark.parametrize("act", STAGES)
-def test_a_power_cut_leaves_the_old_list(fc: Companion, act: Callable[[Companion], Status]) -> None:
+def test_a_power_cut_leaves_the_old_list(fc: Companion, act: Callable[[Companion], ReplyStatus]) -> None:
     STAGES[act](fc)
     fc.device.cut_power_at(1)
     with pytest.raises(PowerCut):

@@ -4,10 +4,10 @@
 import pytest
 
 from service.fleet.conditions import matching, parse_condition
-from service.fleet.vehicle import Vehicle
+from service.fleet.vehicle import FleetVehicle
 
-KITE = Vehicle("kite", "1", answers=True, armed=True, battery_v=11.1, mode="AUTO")
-OWL = Vehicle("owl", "2", answers=False)
+KITE = FleetVehicle("kite", "1", answers=True, armed=True, battery_v=11.1, mode="AUTO")
+OWL = FleetVehicle("owl", "2", answers=False)
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ OWL = Vehicle("owl", "2", answers=False)
         ("bridges=1", [KITE, OWL]),
     ],
 )
-def test_conditions(text: str, found: list[Vehicle]) -> None:
+def test_conditions(text: str, found: list[FleetVehicle]) -> None:
     assert matching([KITE, OWL], [parse_condition(text)]) == found
 
 

@@ -6,18 +6,18 @@ from typing import Any
 
 from rich.console import Console
 
-from service.fleet.vehicle import Vehicle
+from service.fleet.vehicle import FleetVehicle
 from service.fleet.watch import Watch
-from service.fleet.watch_screen import Row, screen
+from service.fleet.watch_screen import ScreenRow, screen
 
 
-def vehicle(number: int, **known: Any) -> Vehicle:
+def vehicle(number: int, **known: Any) -> FleetVehicle:
     usual: dict[str, Any] = {"answers": True, "protocol": "MSP", "armed": False, "mission_count": 146}
     name = f"a-vehicle-with-a-rather-long-name-{number}"
-    return Vehicle(name, str(number), **(usual | {"mission_checksum": "0123abcd", "battery_v": 12.3} | known))
+    return FleetVehicle(name, str(number), **(usual | {"mission_checksum": "0123abcd", "battery_v": 12.3} | known))
 
 
-def lines(rows: list[Row], top: int) -> list[str]:
+def lines(rows: list[ScreenRow], top: int) -> list[str]:
     console = Console(width=80, height=24, highlight=False)
     with console.capture() as capture:
         console.print(screen(rows, top, 24 - 5, is_connected=True))
@@ -25,7 +25,7 @@ def lines(rows: list[Row], top: int) -> list[str]:
 
 
 def test_a_large_fleet_fits_a_small_terminal() -> None:
-    rows = [Row(vehicle(number), 0.5) for number in range(1000)]
+    rows = [ScreenRow(vehicle(number), 0.5) for number in range(1000)]
     shown = lines(rows, 0)
     assert len(shown) == 23
     assert max(len(line) for line in shown) <= 80
@@ -36,11 +36,11 @@ def test_a_large_fleet_fits_a_small_terminal() -> None:
 
 def test_problems_are_named() -> None:
     rows = [
-        Row(vehicle(1, bridges=2), 0.1),
-        Row(vehicle(2, answers=False), None),
-        Row(vehicle(3), 99.0),
-        Row(vehicle(4, protocol="searching"), 0.1),
-        Row(vehicle(5), 0.1),
+        ScreenRow(vehicle(1, bridges=2), 0.1),
+        ScreenRow(vehicle(2, answers=False), None),
+        ScreenRow(vehicle(3), 99.0),
+        ScreenRow(vehicle(4, protocol="searching"), 0.1),
+        ScreenRow(vehicle(5), 0.1),
     ]
     assert [bool(row.problem) for row in rows] == [True] * 4 + [False]
     text = "\n".join(lines(rows, 0))

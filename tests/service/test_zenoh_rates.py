@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.model.vehicle_groups import Attitude, Group, Status
-from service.settings.zenoh import Profile, ZenohSettingsError, check_rates
+from service.settings.zenoh import ZenohProfile, ZenohSettingsError, check_rates
 from service.zenoh_link.rates import SampleRates
 
 GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)
@@ -26,28 +26,28 @@ def times_of(gaps_s: list[float]) -> list[float]:
 @given(GAPS_S, st.sampled_from([0.2, 1.0, 4.0, 10.0]))
 def test_no_more_than_the_limit_goes_out(gaps_s: list[float], limit_hz: float) -> None:
     times = times_of(gaps_s)
-    sent = sent_at(SampleRates(Profile.FULL, {"attitude": limit_hz}), times)
+    sent = sent_at(SampleRates(ZenohProfile.FULL, {"attitude": limit_hz}), times)
     assert sent[0] == times[0]
     assert len(sent) <= 2 + (times[-1] - times[0]) * limit_hz
 
 
 def test_a_limit_is_reached_from_a_rate_that_it_does_not_divide() -> None:
-    sent = sent_at(SampleRates(Profile.FULL, {"attitude": 4.0}), [number / 10 for number in range(1000)])
+    sent = sent_at(SampleRates(ZenohProfile.FULL, {"attitude": 4.0}), [number / 10 for number in range(1000)])
     assert 395 <= len(sent) <= 401
 
 
 @given(GAPS_S)
 def test_the_full_profile_limits_nothing(gaps_s: list[float]) -> None:
     times = times_of(gaps_s)
-    assert sent_at(SampleRates(Profile.FULL, {}), times) == times
+    assert sent_at(SampleRates(ZenohProfile.FULL, {}), times) == times
 
 
 def test_a_rate_of_0_sends_nothing() -> None:
-    assert sent_at(SampleRates(Profile.METERED, {"attitude": 0.0}), [1.0, 20.0, 400.0]) == []
+    assert sent_at(SampleRates(ZenohProfile.METERED, {"attitude": 0.0}), [1.0, 20.0, 400.0]) == []
 
 
 def test_arming_does_not_wait_on_a_metered_link() -> None:
-    rates = SampleRates(Profile.METERED, {})
+    rates = SampleRates(ZenohProfile.METERED, {})
     assert rates.admits(Group.STATUS, Status(armed=False, mode="ACRO", cycle_time_us=3000), 0.0)
     assert not rates.admits(Group.STATUS, Status(armed=False, mode="ACRO", cycle_time_us=3050), 1.0)
     assert rates.held_back == {Group.STATUS}
@@ -59,7 +59,7 @@ def test_arming_does_not_wait_on_a_metered_link() -> None:
 
 
 def test_rare_groups_go_out_together() -> None:
-    rates = SampleRates(Profile.METERED, {})
+    rates = SampleRates(ZenohProfile.METERED, {})
     for group in (Group.ATTITUDE, Group.POSITION):
         assert rates.admits(group, Attitude(1.0), 3.0)
     assert not any(rates.admits(group, Attitude(2.0), 7.0) for group in (Group.ATTITUDE, Group.POSITION))
@@ -68,14 +68,14 @@ def test_rare_groups_go_out_together() -> None:
 
 
 def test_a_request_raises_a_rate_for_a_while() -> None:
-    rates = SampleRates(Profile.METERED, {})
+    rates = SampleRates(ZenohProfile.METERED, {})
     seconds = [float(number) for number in range(61)]
     assert len(sent_at(rates, seconds)) == 13
     rates.request("attitude", 1.0, until=130.0)
     assert rates.describe(100.0)["attitude"] == 1.0
     assert len(sent_at(rates, [100 + each for each in seconds])) == 30 + 7
 
-    rates = SampleRates(Profile.METERED, {})
+    rates = SampleRates(ZenohProfile.METERED, {})
     rates.request("attitude", 1.0, until=130.0)
     assert rates.describe(131.0)["attitude"] == 0.2
     rates.request("attitude", 0.01, until=300.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from service.setup.change import Machine, Run, Step, WriteFile
-from service.setup.steps import SETTINGS_FILE, Answers, missing_steps
+from service.setup.steps import SETTINGS_FILE, SetupChoices, missing_steps
 from tests.support.faulty_machine import FaultyMachine
 from tests.support.programs import run_naze_bridge
 
@@ -67,7 +67,7 @@ def model(request: pytest.FixtureRequest) -> str:
 
 def test_a_fresh_card(tmp_path: Path, model: str) -> None:
     pi = FreshPi(tmp_path, model)
-    answers = Answers(hotspot=("naze field", "long-enough"), country="DE", name="naze", key="secret words")
+    answers = SetupChoices(hotspot=("naze field", "long-enough"), country="DE", name="naze", key="secret words")
     steps = missing_steps(pi, answers)
     pi.carry_out(steps)
     _, _, line = MODELS[model]
@@ -94,9 +94,9 @@ def test_a_fresh_card(tmp_path: Path, model: str) -> None:
 
 def test_a_second_run_keeps_the_key_and_the_hotspot(tmp_path: Path, model: str) -> None:
     pi = FreshPi(tmp_path, model)
-    pi.carry_out(missing_steps(pi, Answers(key="secret words")))
-    (step,) = missing_steps(pi, Answers(page=False))[:1]
-    pi.carry_out(missing_steps(pi, Answers(page=False)))
+    pi.carry_out(missing_steps(pi, SetupChoices(key="secret words")))
+    (step,) = missing_steps(pi, SetupChoices(page=False))[:1]
+    pi.carry_out(missing_steps(pi, SetupChoices(page=False)))
     assert step.purpose == "settings: fc = auto, status page off"
     settings = tomllib.loads(pi.read(SETTINGS_FILE))
     assert "web" not in settings
@@ -110,7 +110,7 @@ def test_a_getty_that_is_enabled_is_disabled(tmp_path: Path) -> None:
     wants = pi.path("/etc/systemd/system/getty.target.wants")
     wants.mkdir(parents=True)
     (wants / "serial-getty@ttyS0.service").symlink_to("x")
-    (console, *_) = missing_steps(pi, Answers())
+    (console, *_) = missing_steps(pi, SetupChoices())
     assert not console.needs_reboot
     pi.carry_out([console])
     assert pi.ran == ["systemctl disable --now serial-getty@ttyS0.service"]
@@ -128,7 +128,7 @@ def test_a_getty_that_is_enabled_is_disabled(tmp_path: Path) -> None:
 def test_the_last_word_of_config_txt_counts(tmp_path: Path, given: str, is_on: bool) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.write(CONFIG, given)
-    purposes = [step.purpose for step in missing_steps(pi, Answers())]
+    purposes = [step.purpose for step in missing_steps(pi, SetupChoices())]
     assert ("switch the UART on the header on" not in purposes) is is_on
 
 
@@ -137,7 +137,7 @@ def test_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
     pi.path("/proc/device-tree/model").unlink()
     pi.path("/run/systemd/system/.keep").unlink()
     pi.path("/run/systemd/system").rmdir()
-    steps = missing_steps(pi, Answers(name="naze", hotspot=("naze", "long-enough")))
+    steps = missing_steps(pi, SetupChoices(name="naze", hotspot=("naze", "long-enough")))
     commands = [change.command for step in steps for change in step.changes if isinstance(change, Run)]
     assert commands == [("systemctl", "enable", "naze-bridge")]
     (uart,) = [change for step in steps for change in step.changes if change.describe().endswith("config.txt")]
@@ -148,10 +148,10 @@ def test_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
 def test_what_was_heard_on_usb_is_not_called_naze(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.write("/var/lib/naze-bridge/ports.json", '{"others": {"usb 1-1.3 10c4:ea60 0001": "a SiK telemetry radio"}}')
-    pi.carry_out(missing_steps(pi, Answers()))
+    pi.carry_out(missing_steps(pi, SetupChoices()))
     rules = pi.read("/etc/udev/rules.d/59-naze-bridge-others.rules")
     assert 'KERNELS=="1-1.3", ATTRS{idVendor}=="10c4", ATTRS{idProduct}=="ea60"' in rules
-    assert missing_steps(pi, Answers()) == []
+    assert missing_steps(pi, SetupChoices()) == []
 
 
 def test_the_command_shows_what_it_would_do(tmp_path: Path, model: str) -> None:

@@ -17,8 +17,8 @@ from protocols.msp.mission import (
     Info,
     InfoFlag,
     MissionCommand,
-    Progress,
-    Status,
+    ReplyStatus,
+    Staged,
     Stored,
     decode_info,
     decode_radius,
@@ -98,7 +98,7 @@ def test_without_the_extension_its_commands_are_unknown() -> None:
 def test_a_pushed_list_comes_back_identical(records: list[WpRecord]) -> None:
     bench = Bench()
     if records:
-        assert bench.push(records) == Stored(Status.OK, identify(records))
+        assert bench.push(records) == Stored(ReplyStatus.OK, identify(records))
     assert bench.pull() == records
     assert bench.naze.stored == pack_records(records)
     assert bench.naze.counters.hazard_runs == 0
@@ -129,7 +129,7 @@ def test_the_newer_of_two_lists_counts_after_boot() -> None:
 def test_an_identical_list_is_not_written_again() -> None:
     bench, records = Bench(), mission(12)
     bench.push(records)
-    assert bench.progress(encode_begin(identify(records))) == Progress(Status.SAME, 0, 0)
+    assert bench.progress(encode_begin(identify(records))) == Staged(ReplyStatus.SAME, 0, 0)
     assert not info(bench).flags
     assert bench.naze.counters.flash_writes == 1
 
@@ -137,9 +137,9 @@ def test_an_identical_list_is_not_written_again() -> None:
 def test_an_empty_list_clears() -> None:
     bench = Bench()
     bench.push(mission(3))
-    assert bench.push([]) == Stored(Status.OK, NOTHING)
+    assert bench.push([]) == Stored(ReplyStatus.OK, NOTHING)
     assert bench.pull() == []
-    assert bench.progress(encode_begin(NOTHING)).status is Status.SAME
+    assert bench.progress(encode_begin(NOTHING)).status is ReplyStatus.SAME
 
 
 def test_begin_stalls_for_the_erase_and_commit_does_not() -> None:
@@ -180,7 +180,7 @@ def test_a_window_of_two_chunks_fills_the_line() -> None:
         answer = bench.next_frame()
         assert answer is not None
         following, outstanding = int.from_bytes(answer.payload[1:3], "little"), outstanding - 1
-    assert bench.stored(encode_commit(identify(records))).status is Status.OK
+    assert bench.stored(encode_commit(identify(records))).status is ReplyStatus.OK
     assert 1.0 < (bench.now - start) / (146 * 16 / LINE_RATE) < 1.12
     assert bench.naze.counters.rx_overflows == 0
 
@@ -192,9 +192,9 @@ def test_begin_of_the_same_list_goes_on_and_of_another_starts_anew() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
     standing = bench.progress(encode_chunk(records, 0, 15).frame)
-    assert standing == Progress(Status.OK, 15, identify(records[:15]).checksum)
+    assert standing == Staged(ReplyStatus.OK, 15, identify(records[:15]).checksum)
     assert bench.progress(encode_begin(identify(records))) == standing
-    assert bench.progress(encode_begin(identify(mission(20, 1)))) == Progress(Status.OK, 0, 0)
+    assert bench.progress(encode_begin(identify(mission(20, 1)))) == Staged(ReplyStatus.OK, 0, 0)
 
 
 def test_a_repeated_chunk_stores_nothing_and_tells_where_the_transfer_stands() -> None:
@@ -209,16 +209,16 @@ def test_a_chunk_beyond_the_next_is_a_gap() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
     bench.progress(encode_chunk(records, 0, 3).frame)
-    expected = Progress(Status.SEQUENCE, 3, identify(records[:3]).checksum)
+    expected = Staged(ReplyStatus.SEQUENCE, 3, identify(records[:3]).checksum)
     assert bench.progress(encode_chunk(records, 5, 3).frame) == expected
 
 
 def test_a_repeated_commit_and_abort_are_well() -> None:
     bench, records = Bench(), mission(4)
     bench.push(records)
-    assert bench.stored(encode_commit(identify(records))) == Stored(Status.OK, identify(records))
+    assert bench.stored(encode_commit(identify(records))) == Stored(ReplyStatus.OK, identify(records))
     for _ in range(2):
-        assert bench.payload(ABORT_REQUEST) == bytes((Status.OK,))
+        assert bench.payload(ABORT_REQUEST) == bytes((ReplyStatus.OK,))
     assert bench.naze.counters.flash_writes == 1
 
 
@@ -227,34 +227,34 @@ def test_a_repeated_commit_and_abort_are_well() -> None:
 
 def test_chunk_and_commit_need_a_transfer() -> None:
     bench, records = Bench(), mission(4)
-    assert bench.progress(encode_chunk(records, 0, 4).frame) == Progress(Status.NO_TRANSFER, 0, 0)
-    assert bench.stored(encode_commit(identify(records))) == Stored(Status.NO_TRANSFER, NOTHING)
+    assert bench.progress(encode_chunk(records, 0, 4).frame) == Staged(ReplyStatus.NO_TRANSFER, 0, 0)
+    assert bench.stored(encode_commit(identify(records))) == Stored(ReplyStatus.NO_TRANSFER, NOTHING)
 
 
 def test_five_seconds_of_silence_end_a_transfer() -> None:
     bench, records = Bench(), mission(4)
     bench.progress(encode_begin(identify(records)))
     bench.run(4.8)
-    assert bench.progress(encode_chunk(records, 0, 1).frame).status is Status.OK
+    assert bench.progress(encode_chunk(records, 0, 1).frame).status is ReplyStatus.OK
     for flags in (InfoFlag.TRANSFER_OPEN, InfoFlag.TRANSFER_OPEN, InfoFlag(0)):
         bench.run(1.8)
         assert info(bench).flags == flags
-    assert bench.progress(encode_chunk(records, 1, 1).frame).status is Status.NO_TRANSFER
+    assert bench.progress(encode_chunk(records, 1, 1).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_more_than_fits_is_refused() -> None:
     bench = Bench(SimOptions(capacity=5))
-    assert bench.progress(encode_begin(ListIdentity(6, 1))).status is Status.NO_SPACE
-    assert bench.push(mission(5)).status is Status.OK
+    assert bench.progress(encode_begin(ListIdentity(6, 1))).status is ReplyStatus.NO_SPACE
+    assert bench.push(mission(5)).status is ReplyStatus.OK
 
 
 def test_commit_of_an_incomplete_list_keeps_the_transfer() -> None:
     bench, records = Bench(), mission(7)
     bench.progress(encode_begin(identify(records)))
     bench.progress(encode_chunk(records, 0, 3).frame)
-    assert bench.stored(encode_commit(identify(records))) == Stored(Status.INCOMPLETE, NOTHING)
-    assert bench.progress(encode_chunk(records, 3, 4).frame).status is Status.OK
-    assert bench.stored(encode_commit(identify(records))).status is Status.OK
+    assert bench.stored(encode_commit(identify(records))) == Stored(ReplyStatus.INCOMPLETE, NOTHING)
+    assert bench.progress(encode_chunk(records, 3, 4).frame).status is ReplyStatus.OK
+    assert bench.stored(encode_commit(identify(records))).status is ReplyStatus.OK
 
 
 def test_a_list_of_another_checksum_is_not_committed() -> None:
@@ -264,16 +264,16 @@ def test_a_list_of_another_checksum_is_not_committed() -> None:
     announced = ListIdentity(4, identify(records).checksum ^ 1)
     bench.progress(encode_begin(announced))
     bench.progress(encode_chunk(records, 0, 4).frame)
-    assert bench.stored(encode_commit(announced)) == Stored(Status.CHECKSUM, identify(mission(3)))
-    assert bench.progress(encode_chunk(records, 0, 4).frame).status is Status.NO_TRANSFER
+    assert bench.stored(encode_commit(announced)) == Stored(ReplyStatus.CHECKSUM, identify(mission(3)))
+    assert bench.progress(encode_chunk(records, 0, 4).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_a_record_of_an_unknown_command_drops_the_transfer() -> None:
     bench = Bench()
     records = [*mission(3), WpRecord(1, 2, 3, 0, 0, 2, 0, 8)]
     bench.progress(encode_begin(identify(records)))
-    assert bench.progress(encode_chunk(records, 0, 4).frame) == Progress(Status.BAD_RECORD, 0, 0)
-    assert bench.progress(encode_chunk(records, 0, 3).frame).status is Status.NO_TRANSFER
+    assert bench.progress(encode_chunk(records, 0, 4).frame) == Staged(ReplyStatus.BAD_RECORD, 0, 0)
+    assert bench.progress(encode_chunk(records, 0, 3).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_flash_that_fails_drops_the_transfer_and_keeps_the_list() -> None:
@@ -291,10 +291,10 @@ def test_flash_that_fails_drops_the_transfer_and_keeps_the_list() -> None:
             bench.stage(records)
             bench.naze.faults.flash_failures = 1
             status = bench.stored(encode_commit(identify(records))).status
-        assert status is Status.FLASH
+        assert status is ReplyStatus.FLASH
         assert not info(bench).flags
         assert bench.pull() == mission(2)
-        assert bench.push(records).status is Status.OK
+        assert bench.push(records).status is ReplyStatus.OK
 
 
 def test_arming_drops_the_transfer_and_refuses_writers_but_not_readers() -> None:
@@ -304,14 +304,14 @@ def test_arming_drops_the_transfer_and_refuses_writers_but_not_readers() -> None
     bench.naze.faults.armed = True
     bench.run(0.01)
     assert info(bench).flags == InfoFlag.ARMED
-    assert bench.progress(encode_begin(identify(mission(4, 1)))).status is Status.ARMED
-    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is Status.ARMED
-    assert bench.stored(encode_commit(identify(records))).status is Status.ARMED
-    assert bench.payload(encode_radius(300)) == struct.pack("<BH", Status.ARMED, 200)
+    assert bench.progress(encode_begin(identify(mission(4, 1)))).status is ReplyStatus.ARMED
+    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is ReplyStatus.ARMED
+    assert bench.stored(encode_commit(identify(records))).status is ReplyStatus.ARMED
+    assert bench.payload(encode_radius(300)) == struct.pack("<BH", ReplyStatus.ARMED, 200)
     assert bench.pull() == records
     bench.naze.faults.armed = False
     bench.run(0.01)
-    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is Status.NO_TRANSFER
+    assert bench.progress(encode_chunk(mission(4, 1), 0, 4).frame).status is ReplyStatus.NO_TRANSFER
 
 
 def test_a_short_arming_drops_the_transfer_too() -> None:
@@ -320,7 +320,7 @@ def test_a_short_arming_drops_the_transfer_too() -> None:
     for armed in (True, False):
         bench.naze.faults.armed = armed
         bench.run(0.01)
-    assert bench.progress(encode_chunk(mission(4), 0, 4).frame).status is Status.NO_TRANSFER
+    assert bench.progress(encode_chunk(mission(4), 0, 4).frame).status is ReplyStatus.NO_TRANSFER
 
 
 @pytest.mark.parametrize("busy", [False, True])
@@ -328,7 +328,7 @@ def test_a_busy_board_says_so(busy: bool) -> None:
     bench = Bench(faults=Faults(busy=busy))
     assert bool(info(bench).flags & InfoFlag.WRITE_PENDING) is busy
     status = bench.progress(encode_begin(identify(mission(1)))).status
-    assert status is (Status.BUSY if busy else Status.OK)
+    assert status is (ReplyStatus.BUSY if busy else ReplyStatus.OK)
 
 
 @pytest.mark.parametrize("frame", [
@@ -346,13 +346,13 @@ def test_a_busy_board_says_so(busy: bool) -> None:
     raw(MissionCommand.RADIUS, bytes(2)),
 ])  # fmt: skip
 def test_what_is_not_of_the_form_is_a_bad_request(frame: bytes) -> None:
-    assert Bench().payload(frame)[0] == Status.BAD_REQUEST
+    assert Bench().payload(frame)[0] == ReplyStatus.BAD_REQUEST
 
 
 def test_a_chunk_of_more_records_than_the_board_takes_is_a_bad_request() -> None:
     bench, records = Bench(SimOptions(chunk_records=15)), mission(20)
     small = Bench(SimOptions(chunk_records=4))
-    for board, status in ((bench, Status.OK), (small, None)):
+    for board, status in ((bench, ReplyStatus.OK), (small, None)):
         board.progress(encode_begin(identify(records)))
         answer = board.ask(encode_chunk(records, 0, 10).frame, timeout=0.3)
         assert (answer and answer.payload[0]) == status
@@ -363,8 +363,8 @@ def test_reading_past_the_end_is_out_of_range() -> None:
     bench.push(mission(4))
     answer = decode_records(bench.payload(encode_read(2, 6)))
     assert answer is not None
-    assert (answer.status, answer.first, list(answer.records)) == (Status.OK, 2, mission(4)[2:])
-    assert bench.payload(encode_read(4, 1)) == struct.pack("<BH", Status.RANGE, 4)
+    assert (answer.status, answer.first, list(answer.records)) == (ReplyStatus.OK, 2, mission(4)[2:])
+    assert bench.payload(encode_read(4, 1)) == struct.pack("<BH", ReplyStatus.RANGE, 4)
 
 
 # -- gps_wp_radius -------------------------------------------------------------------------------------------
@@ -374,7 +374,7 @@ def test_a_radius_is_written_in_the_next_loop_which_takes_a_while() -> None:
     bench = Bench()
     radius = decode_radius(bench.payload(encode_radius(350)))
     assert radius is not None
-    assert (radius.status, radius.wp_radius_cm) == (Status.OK, 350)
+    assert (radius.status, radius.wp_radius_cm) == (ReplyStatus.OK, 350)
     begun = bench.now
     assert not info(bench).flags
     assert 0.15 < bench.now - begun < 0.25
@@ -397,22 +397,22 @@ def test_a_radius_that_was_not_yet_written_goes_with_the_power() -> None:
     bench.payload(encode_radius(350))
     bench.run(0.9)
     assert info(bench).flags == InfoFlag.WRITE_PENDING
-    assert bench.payload(encode_radius(360))[0] == Status.BUSY
-    assert bench.progress(encode_begin(identify(mission(1)))).status is Status.BUSY
+    assert bench.payload(encode_radius(360))[0] == ReplyStatus.BUSY
+    assert bench.progress(encode_begin(identify(mission(1)))).status is ReplyStatus.BUSY
     bench.naze.power_off(bench.now)
     bench.naze.power_on(bench.now)
     bench.run(BOOT_SECONDS + 0.1)
     assert info(bench).wp_radius_cm == 200
 
 
-@pytest.mark.parametrize(("radius", "status"), [(0, Status.OK), (2000, Status.OK), (2001, Status.RANGE)])
-def test_a_radius_above_20_m_is_out_of_range(radius: int, status: Status) -> None:
+@pytest.mark.parametrize(("radius", "status"), [(0, ReplyStatus.OK), (2000, ReplyStatus.OK), (2001, ReplyStatus.RANGE)])
+def test_a_radius_above_20_m_is_out_of_range(radius: int, status: ReplyStatus) -> None:
     assert Bench().payload(encode_radius(radius))[0] == status
 
 
 def test_the_same_radius_is_not_written_again() -> None:
     bench = Bench()
-    assert bench.payload(encode_radius(200))[0] == Status.OK
+    assert bench.payload(encode_radius(200))[0] == ReplyStatus.OK
     assert not info(bench).flags
 
 
@@ -443,7 +443,7 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
         bench.naze.power_on(bench.now)
         bench.run(BOOT_SECONDS + 0.1)
         outcomes.append(bench.pull())
-        assert bench.push(new).status is Status.OK
+        assert bench.push(new).status is ReplyStatus.OK
         assert bench.pull() == new
     # Three pages that are not blank, twenty records, the header, its seal: without it the new list does not count.
     assert outcomes == [mission(old) if old else []] * operations

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from protocols.mission_record import identify
 from protocols.msp.frame import MspFrame, MspParser
 from protocols.msp.mission import (
-    Progress,
-    Status,
+    ReplyStatus,
+    Staged,
     Stored,
     decode_progress,
     decode_records,
@@ -65,7 +65,7 @@ class WireBench:
         assert answer is not None
         return answer.payload
 
-    def progress(self, frame: bytes) -> Progress:
+    def progress(self, frame: bytes) -> Staged:
         progress = decode_progress(self.payload(frame))
         assert progress is not None
         return progress
@@ -79,7 +79,7 @@ class WireBench:
         """BEGIN and all CHUNKs, one at a time."""
         progress = self.progress(encode_begin(identify(records)))
         while progress.next < len(records):
-            assert progress.status is Status.OK
+            assert progress.status is ReplyStatus.OK
             progress = self.progress(encode_chunk(records, progress.next, 15).frame)
 
     def push(self, records: Sequence[WpRecord]) -> Stored:
@@ -93,9 +93,9 @@ class WireBench:
         while True:
             answer = decode_records(self.payload(encode_read(len(records), 6)))
             assert answer is not None
-            if answer.status is Status.RANGE:
+            if answer.status is ReplyStatus.RANGE:
                 return records
-            assert (answer.status, answer.first) == (Status.OK, len(records))
+            assert (answer.status, answer.first) == (ReplyStatus.OK, len(records))
             records += answer.records
 
     def _collect(self) -> None:

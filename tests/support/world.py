@@ -26,14 +26,14 @@ from bridge.fc.autosense import SPEEDS
 from bridge.fc.profile import Profile
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.mavlink import Mavlink
-from bridge.fc.states.msp import Msp
+from bridge.fc.states.msp import Polling
 from bridge.gcs.ground import FrameListener
 from bridge.gcs.guard import LinkAccess
 from bridge.gcs.pass_through import MAX_DATAGRAM_SIZE
 from bridge.gcs.station import Peer
 from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.events import Level
-from bridge.model.mission_log import ArrivedMission, Conclusion, Outcome, PendingMission
+from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_record import identify
@@ -65,7 +65,7 @@ class MemoryStore:
     """Answers store effects after `delay_s`; `failing`: as a full disk does."""
 
     def __init__(self) -> None:
-        self.missions: list[tuple[ArrivedMission, Conclusion | None]] = []
+        self.missions: list[tuple[ArrivedMission, Conclude | None]] = []
         self.delay_s = 0.0
         self.failing = False
 
@@ -76,10 +76,10 @@ class MemoryStore:
                     return None
                 self.missions.append((mission, None))
                 return len(self.missions)
-            case Conclude(number, conclusion):
+            case Conclude(number):
                 if self.failing:
                     return None
-                self.missions[number - 1] = (self.missions[number - 1][0], conclusion)
+                self.missions[number - 1] = (self.missions[number - 1][0], effect)
                 return True
             case Recall(identity):
                 for mission, ended in reversed(self.missions):
@@ -233,7 +233,7 @@ class World:
 
     @property
     def is_found(self) -> bool:
-        return isinstance(self.bridge.session.state, Msp | Mavlink)
+        return isinstance(self.bridge.session.state, Polling | Mavlink)
 
     @property
     def stored(self) -> tuple[WpRecord, ...]:

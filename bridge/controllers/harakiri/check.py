@@ -13,7 +13,7 @@ from bridge.controllers.harakiri.rules import (
     USUAL_CAPACITY,
     USUAL_WP_RADIUS_CM,
     CommandRule,
-    Place,
+    InList,
     command_rules,
 )
 from bridge.missions.list_check import (
@@ -26,7 +26,7 @@ from bridge.missions.list_check import (
     refuse_position,
 )
 from bridge.missions.value_range import UNUSED
-from bridge.model.finding import CLEARED, DROPPED, Finding, News, Rejection, reject
+from bridge.model.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.wp_record import WpCommand, WpRecord
@@ -70,7 +70,7 @@ class HarakiriCheck(ListCheck):
         self._records: list[WpRecord] = []
         self._roi_commands: dict[int, int] = {}
 
-    def _judge(self, item: MissionItem) -> Rejection | None:
+    def _judge(self, item: MissionItem) -> RejectingFinding | None:
         rule = self._rules.get(item.command)
         rejection = self._refuse(item, rule)
         if rejection is not None or rule is None or self._drops(item, rule):
@@ -95,7 +95,7 @@ class HarakiriCheck(ListCheck):
             self._roi_commands,
         )
 
-    def _refuse(self, item: MissionItem, rule: CommandRule | None) -> Rejection | None:
+    def _refuse(self, item: MissionItem, rule: CommandRule | None) -> RejectingFinding | None:
         """The rejection of the list because of this item, if any."""
         if item.seq == 0 and item.command != Command.NAV_WAYPOINT:
             return reject(MissionResult.INVALID, item, "command", "must be a WAYPOINT")
@@ -111,15 +111,15 @@ class HarakiriCheck(ListCheck):
     def _misplaced(self, seq: int, rule: CommandRule) -> str | None:
         is_last = seq == self._count - 1
         match rule.place:
-            case Place.ITEM_1 if seq != 1:
+            case InList.ITEM_1 if seq != 1:
                 return f"{rule.name} must be item 1"
-            case Place.LAST if not is_last:
+            case InList.LAST if not is_last:
                 return f"{rule.name} must be last"
-            case Place.NOT_LAST if is_last:
+            case InList.NOT_LAST if is_last:
                 return f"{rule.name} cannot be last"
         return None
 
-    def _refuse_home(self, home: MissionItem) -> Rejection | None:
+    def _refuse_home(self, home: MissionItem) -> RejectingFinding | None:
         if not math.isfinite(home.alt_m):
             return reject(MissionResult.INVALID_PARAM7, home, "alt_m", "Alt is not a number")
         if (missing := missing_coordinate(home)) and self._fallback_home is None:
@@ -192,10 +192,10 @@ class HarakiriCheck(ListCheck):
         is_raised = rule.height is CRUISE and (not math.isfinite(item.alt_m) or math.trunc(item.alt_m) == 0)
         return News.WARNING if item.seq and is_raised else News.NOTICE
 
-    def _refuse_kept_list(self) -> Rejection | None:
+    def _refuse_kept_list(self) -> RejectingFinding | None:
         """Apply the rules for `last` and `alone` to the kept list; dropping items does not change first and last."""
         last, last_rule = self._kept[-1]
-        if last_rule.place is Place.NOT_LAST:
+        if last_rule.place is InList.NOT_LAST:
             return reject(MissionResult.INVALID, last, "command", f"{last_rule.name} is last of the items kept")
         commands = [kept for kept in self._kept[1:] if kept[1].record is not WpCommand.SETROI]
         if len(commands) == 1 and not commands[0][1].alone:

@@ -23,7 +23,7 @@ from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, Progress, Status, Stored
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, ReplyStatus, Staged, Stored
 from protocols.wp_record import RECORD_SIZE, WpRecord
 
 _SHORT_REPLY_SIZE = 7
@@ -45,13 +45,13 @@ _MAX_SILENCE = 5
 
 #: The failure reported if this status ends the last attempt; any other becomes "the line is bad".
 _FAILURES = {
-    Status.ARMED: PushFailure.ARMED,
-    Status.BUSY: PushFailure.BUSY,
-    Status.NO_SPACE: PushFailure.NO_SPACE,
-    Status.RANGE: PushFailure.REFUSED,
-    Status.BAD_REQUEST: PushFailure.REFUSED,
-    Status.BAD_RECORD: PushFailure.REFUSED,
-    Status.FLASH: PushFailure.FLASH,
+    ReplyStatus.ARMED: PushFailure.ARMED,
+    ReplyStatus.BUSY: PushFailure.BUSY,
+    ReplyStatus.NO_SPACE: PushFailure.NO_SPACE,
+    ReplyStatus.RANGE: PushFailure.REFUSED,
+    ReplyStatus.BAD_REQUEST: PushFailure.REFUSED,
+    ReplyStatus.BAD_RECORD: PushFailure.REFUSED,
+    ReplyStatus.FLASH: PushFailure.FLASH,
 }
 
 
@@ -109,8 +109,8 @@ class HarakiriMissions(OneMission):
             for _ in range(_MAX_BEGINS):
                 try:
                     begun = yield from self._begin(wanted)
-                    self._may_be_stored = begun.status is Status.SAME
-                    if begun.status is Status.SAME:
+                    self._may_be_stored = begun.status is ReplyStatus.SAME
+                    if begun.status is ReplyStatus.SAME:
                         unchanged = yield from self._is_stored(records)
                         if unchanged:
                             return PushResult(None, unchanged=True)
@@ -165,7 +165,7 @@ class HarakiriMissions(OneMission):
             answer = None if reply is None else ext.decode_radius(reply.payload)
             if answer is None:
                 return None
-            if answer.status is not Status.BUSY or waited_s >= _BUSY_TIMEOUT_S:
+            if answer.status is not ReplyStatus.BUSY or waited_s >= _BUSY_TIMEOUT_S:
                 break
             yield from pause(_BUSY_INTERVAL_S)
             waited_s += _BUSY_INTERVAL_S
@@ -180,14 +180,14 @@ class HarakiriMissions(OneMission):
         reply = yield from ask_surely(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
         return None if reply is None else ext.decode_info(reply.payload)
 
-    def _begin(self, wanted: ListIdentity) -> Conversation[Progress]:
+    def _begin(self, wanted: ListIdentity) -> Conversation[Staged]:
         waited_s = 0.0
         while True:
             reply = yield from ask(ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, exclusive=True)
             answer = None if reply is None else ext.decode_progress(reply.payload)
             if answer is None:
                 raise _GiveUp(PushFailure.NO_ANSWER)
-            if answer.status is Status.BUSY:
+            if answer.status is ReplyStatus.BUSY:
                 if waited_s >= _BUSY_TIMEOUT_S:
                     info = yield from self._read_info()
                     is_spent = info is not None and InfoFlag.WRITES_SPENT in info.flags
@@ -195,11 +195,11 @@ class HarakiriMissions(OneMission):
                 yield from pause(_BUSY_INTERVAL_S)
                 waited_s += _BUSY_INTERVAL_S
                 continue
-            if answer.status not in (Status.OK, Status.SAME):
+            if answer.status not in (ReplyStatus.OK, ReplyStatus.SAME):
                 raise _again(answer.status)
             return answer
 
-    def _transfer(self, records: Sequence[WpRecord], begun: Progress, progress: PushProgress) -> Conversation[None]:
+    def _transfer(self, records: Sequence[WpRecord], begun: Staged, progress: PushProgress) -> Conversation[None]:
         """Keep the window full and send COMMIT right behind the last chunk: the line never waits for a reply.
 
         After a loss, continue at the first record that the flight controller lacks. It answers INCOMPLETE to a COMMIT
@@ -227,23 +227,23 @@ class HarakiriMissions(OneMission):
             reply = yield from receive(MissionCommand.CHUNK, MissionCommand.COMMIT)
             answer = None if reply is None else _decode_answer(reply)
             behind = 0
-            if isinstance(answer, Progress):
-                if answer.status not in (Status.OK, Status.SEQUENCE):
+            if isinstance(answer, Staged):
+                if answer.status not in (ReplyStatus.OK, ReplyStatus.SEQUENCE):
                     raise _again(answer.status)
                 confirmed = self._confirmed(records, answer)
                 if confirmed > acked:
                     acked = confirmed
                     stale = vain = 0
                     progress(acked)
-                if answer.status is Status.OK:
+                if answer.status is ReplyStatus.OK:
                     in_flight = in_flight[1:]
                     continue
                 if stale:
                     stale -= 1
                     continue
                 behind = max(sum(first > confirmed for first in in_flight) - 1, 0)
-            elif isinstance(answer, Stored) and answer.status is not Status.INCOMPLETE:
-                if answer.status is not Status.OK:
+            elif isinstance(answer, Stored) and answer.status is not ReplyStatus.INCOMPLETE:
+                if answer.status is not ReplyStatus.OK:
                     raise _again(answer.status)
                 if answer.stored != wanted:
                     raise _Retry(PushFailure.FLASH)
@@ -298,7 +298,7 @@ class HarakiriMissions(OneMission):
                 waiting = [first for first in missing if first not in parts]
                 continue
             in_flight = max(in_flight - 1, 0)
-            if answer.status is not Status.OK:
+            if answer.status is not ReplyStatus.OK:
                 return None
             # Damage that the XOR missed may look like another place.
             if answer.first in missing and len(answer.records) == min(step, total - answer.first):
@@ -306,19 +306,19 @@ class HarakiriMissions(OneMission):
                 parts[answer.first] = answer.records
         return tuple(record for first in missing for record in parts[first])
 
-    def _confirmed(self, records: Sequence[WpRecord], answer: Progress) -> int:
+    def _confirmed(self, records: Sequence[WpRecord], answer: Staged) -> int:
         """The number of correct records on the flight controller; restarts if it has other ones."""
         if answer.next > len(records) or identify(records[: answer.next]).checksum != answer.checksum:
             raise _Retry(PushFailure.NO_ANSWER)
         return answer.next
 
 
-def _decode_answer(reply: MspFrame) -> Progress | Stored | None:
+def _decode_answer(reply: MspFrame) -> Staged | Stored | None:
     """Read the reply to a CHUNK or COMMIT."""
     decode = ext.decode_stored if reply.command == MissionCommand.COMMIT else ext.decode_progress
     return decode(reply.payload)
 
 
-def _again(status: Status) -> _Retry:
+def _again(status: ReplyStatus) -> _Retry:
     """Retry after any refusal: on a bad line one in a hundred is a damaged reply that the XOR missed."""
     return _Retry(_FAILURES.get(status, PushFailure.NO_ANSWER))

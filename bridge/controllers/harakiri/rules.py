@@ -30,7 +30,7 @@ TAKEOFF_MAX_M = 15
 _MAX_RADIUS_M = 255
 
 
-class Place(Enum):
+class InList(Enum):
     """The allowed places of a command, in the list as received and as kept."""
 
     ANY = auto()
@@ -61,7 +61,7 @@ class CommandRule:
     p4: Range
     position: bool
     height: Range
-    place: Place = Place.ANY
+    place: InList = InList.ANY
     alone: bool = True
 
     @property
@@ -87,13 +87,13 @@ def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, Command
     rows = (
         #           record                      p1       p2      p4           position height  place           alone
         CommandRule(WpCommand.WAYPOINT,         BRAKE,   radius, NOSE_ON_ROI, True,    CRUISE),
-        CommandRule(WpCommand.LOITER_UNLIM,     UNUSED,  radius, NOSE_ON_ROI, True,    CRUISE, Place.LAST),
+        CommandRule(WpCommand.LOITER_UNLIM,     UNUSED,  radius, NOSE_ON_ROI, True,    CRUISE, InList.LAST),
         CommandRule(WpCommand.LOITER_TURNS,     TURNS,   radius, UNUSED,      True,    CRUISE),
         CommandRule(WpCommand.LOITER_TIME,      SECONDS, radius, NOSE_ON_ROI, True,    CRUISE),
-        CommandRule(WpCommand.RETURN_TO_LAUNCH, UNUSED,  UNUSED, UNUSED,      False,   CRUISE, Place.ANY,      False),
-        CommandRule(WpCommand.LAND,             UNUSED,  UNUSED, UNUSED,      False,   UNUSED, Place.LAST,     False),
-        CommandRule(WpCommand.TAKEOFF,          UNUSED,  UNUSED, UNUSED,      False,   climb,  Place.ITEM_1,   False),
-        CommandRule(WpCommand.SETROI,           UNUSED,  UNUSED, UNUSED,      True,    UNUSED, Place.NOT_LAST, False),
+        CommandRule(WpCommand.RETURN_TO_LAUNCH, UNUSED,  UNUSED, UNUSED,      False,   CRUISE, InList.ANY,      False),
+        CommandRule(WpCommand.LAND,             UNUSED,  UNUSED, UNUSED,      False,   UNUSED, InList.LAST,     False),
+        CommandRule(WpCommand.TAKEOFF,          UNUSED,  UNUSED, UNUSED,      False,   climb,  InList.ITEM_1,   False),
+        CommandRule(WpCommand.SETROI,           UNUSED,  UNUSED, UNUSED,      True,    UNUSED, InList.NOT_LAST, False),
     )
     # fmt: on
     rules: dict[int, CommandRule] = {MAV_COMMANDS[row.record]: row for row in rows}

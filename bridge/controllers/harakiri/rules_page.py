@@ -8,7 +8,7 @@ from bridge.controllers.harakiri.rules import (
     TAKEOFF_MAX_M,
     USUAL_WP_RADIUS_CM,
     CommandRule,
-    Place,
+    InList,
     command_rules,
 )
 from bridge.missions.value_range import UNUSED, Range
@@ -16,10 +16,10 @@ from protocols.mavlink.command_name import command_name
 from protocols.mission_item import Command
 
 _PLACES = {
-    Place.ANY: "any",
-    Place.ITEM_1: "only item 1",
-    Place.LAST: "only last",
-    Place.NOT_LAST: "not last",
+    InList.ANY: "any",
+    InList.ITEM_1: "only item 1",
+    InList.LAST: "only last",
+    InList.NOT_LAST: "not last",
 }
 
 

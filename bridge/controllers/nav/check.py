@@ -17,7 +17,7 @@ from bridge.controllers.nav.rules import (
     NAV_RULES,
     REPEATS,
     ROI_COMMANDS,
-    Height,
+    AltitudeUse,
     NavProfile,
     NavRule,
 )
@@ -33,7 +33,7 @@ from bridge.missions.list_check import (
     refuse_position,
 )
 from bridge.missions.value_range import UNUSED
-from bridge.model.finding import DROPPED, Finding, News, Rejection, reject, reject_list
+from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single
 from protocols.mission_item import Command, MissionItem, MissionResult
@@ -83,14 +83,14 @@ class NavCheck(ListCheck):
         self._jumps = Jumps(back_only=profile.jumps_back_only)
         self._sent_as: dict[int, int] = {}
         self._speed = LegSpeed()
-        self._special: dict[int, Callable[[MissionItem], Rejection | None]] = {
+        self._special: dict[int, Callable[[MissionItem], RejectingFinding | None]] = {
             Command.CONDITION_YAW: self._take_heading,
             Command.DO_SET_ROI_NONE: self._take_roi_none,
             Command.DO_JUMP: self._take_jump,
             Command.DO_CHANGE_SPEED: self._take_speed,
         }
 
-    def _judge(self, item: MissionItem) -> Rejection | None:
+    def _judge(self, item: MissionItem) -> RejectingFinding | None:
         rule = NAV_RULES.get(item.command)
         self._jumps.places.append(len(self._records))
         if item.seq == 0:
@@ -107,7 +107,7 @@ class NavCheck(ListCheck):
             return reject(MissionResult.NO_SPACE, item, "command", f"more than the {self._profile.capacity} that fit")
         return rejection
 
-    def _take_home(self, home: MissionItem) -> Rejection | None:
+    def _take_home(self, home: MissionItem) -> RejectingFinding | None:
         if home.command != Command.NAV_WAYPOINT:
             return reject(MissionResult.INVALID, home, "command", "must be a WAYPOINT")
         if rejection := refuse_frame(home, needs_position=True):
@@ -118,12 +118,12 @@ class NavCheck(ListCheck):
             self._home = home_item((home.lat_e7, home.lon_e7), alt_m)
         return None
 
-    def _take(self, item: MissionItem, rule: NavRule) -> Rejection | None:
+    def _take(self, item: MissionItem, rule: NavRule) -> RejectingFinding | None:
         """Keep one item as a record; every value that cannot be stored becomes a finding."""
         if rule.position and (rejection := refuse_position(item)):
             return rejection
         if not math.isfinite(item.alt_m):
-            if rule.height is Height.FLOWN:
+            if rule.height is AltitudeUse.FLOWN:
                 return self._drop(item, "alt_m", given(item.alt_m), "Alt is not a number")
             item = replace(item, alt_m=0.0)
         if item.command == Command.NAV_LAND:
@@ -137,7 +137,7 @@ class NavCheck(ListCheck):
             return rejection
         p1 = self._hold(item) if rule.p1 is HOLD else self._fit(item, "p1", rule.p1)
         # MAVLink gives these no meaning for an RTL or a ROI, so nothing is lost.
-        news = News.NOTICE if rule.height in (Height.FLOWN, Height.APPROACH) else News.NONE
+        news = News.NOTICE if rule.height in (AltitudeUse.FLOWN, AltitudeUse.APPROACH) else News.NONE
         for name in ("p2", "p3", "p4"):
             self._fit(item, name, UNUSED, news)
         if not rule.position:
@@ -179,7 +179,7 @@ class NavCheck(ListCheck):
             self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "it flies no circles", News.WARNING)
         return NavRecord(NavAction.WAYPOINT, *place, alt_cm, speed, 0, datum)
 
-    def _take_heading(self, item: MissionItem) -> Rejection | None:
+    def _take_heading(self, item: MissionItem) -> RejectingFinding | None:
         """CONDITION_YAW becomes SET_HEAD: an absolute heading, turned to at the flight controller's own rate."""
         if math.isfinite(item.p4) and item.p4 != 0:
             return self._drop(item, "p4", item.p4, "it turns to no relative heading")
@@ -196,13 +196,13 @@ class NavCheck(ListCheck):
         self._keep(item, NavRecord(NavAction.SET_HEAD, p1=heading))
         return None
 
-    def _take_roi_none(self, item: MissionItem) -> Rejection | None:
+    def _take_roi_none(self, item: MissionItem) -> RejectingFinding | None:
         """DO_SET_ROI_NONE becomes SET_HEAD -1, which ends a region of interest and a heading alike."""
         self._unused(item, "p1", "p2", "p3", "p4")
         self._keep(item, NavRecord(NavAction.SET_HEAD, p1=-1))
         return None
 
-    def _take_jump(self, item: MissionItem) -> Rejection | None:
+    def _take_jump(self, item: MissionItem) -> RejectingFinding | None:
         """Reserve a record; its target is known once all items have arrived."""
         if not (math.isfinite(item.p1) and item.p1 == math.trunc(item.p1) and 1 <= item.p1 < self._count):
             return reject(MissionResult.INVALID_PARAM1, item, "p1", "there is no such item to jump to")
@@ -213,7 +213,7 @@ class NavCheck(ListCheck):
         self._keep(item, NavRecord(NavAction.JUMP, p2=repeats))
         return None
 
-    def _take_speed(self, item: MissionItem) -> Rejection | None:
+    def _take_speed(self, item: MissionItem) -> RejectingFinding | None:
         """DO_CHANGE_SPEED is the speed of the legs that follow."""
         if not self._profile.leg_speed:
             return self._drop(item, "command", item.command, "its legs have no speeds")
@@ -227,7 +227,7 @@ class NavCheck(ListCheck):
         self._unused(item, "p4")
         return None
 
-    def _refuse_kept_list(self) -> Rejection | None:
+    def _refuse_kept_list(self) -> RejectingFinding | None:
         if rejection := self._refuse_without_legs():
             return rejection
         if rejection := self._jumps.aim(self._records, self._note):
@@ -240,7 +240,7 @@ class NavCheck(ListCheck):
         self._cut(flown_size(self._records), "never flown: the RTL before it ends the mission")
         return self._refuse_without_legs() or self._refuse_as_flown()
 
-    def _refuse_without_legs(self) -> Rejection | None:
+    def _refuse_without_legs(self) -> RejectingFinding | None:
         if any(record.action in LEGS for record in self._records):
             return None
         return reject_list(MissionResult.INVALID, self._count, "no waypoint is left to fly to")
@@ -253,7 +253,7 @@ class NavCheck(ListCheck):
             self._sent_as.pop(place, None)
         del self._records[size:], self._sent[size:]
 
-    def _refuse_as_flown(self) -> Rejection | None:
+    def _refuse_as_flown(self) -> RejectingFinding | None:
         """Reject a list that is flown differently than it reads, and warn about such legs."""
         if self._profile.jumps_back_only and (place := jump_within_jump(self._records)) is not None:
             why = "a jump within another's loop never ends"
@@ -300,7 +300,7 @@ class NavCheck(ListCheck):
 
     def _drop(
         self, item: MissionItem, name: str, was: float | None, why: str, news: News = News.NOTICE
-    ) -> Rejection | None:
+    ) -> RejectingFinding | None:
         """Drop one item without rejecting the list."""
         self._jumps.dropped.add(item.seq)
         self._note(item, name, was, DROPPED, why, news)
@@ -308,19 +308,19 @@ class NavCheck(ListCheck):
 
     def _height(self, item: MissionItem, rule: NavRule) -> tuple[int, int]:
         """Centimetres, and the bit for their reference level."""
-        if rule.height is Height.RTH and not self._profile.rth_height:
+        if rule.height is AltitudeUse.RTH and not self._profile.rth_height:
             self._fit(item, "alt_m", UNUSED)
             return 0, 0
         alt_cm = _centimetres(item.alt_m)
         if not is_single(item.alt_m, alt_cm / 100):
             self._note(item, "alt_m", item.alt_m, alt_cm / 100, "whole cm, at most 32767 m")
-        if rule.height is Height.RTH:
+        if rule.height is AltitudeUse.RTH:
             if alt_cm < 0:
                 self._note(item, "alt_m", item.alt_m, 0, "the flight controller's own height", News.WARNING)
             return max(alt_cm, 0), 0
         above_sea = item.frame in SEA_LEVEL_FRAMES
         counts_from_sea = above_sea and self._profile.sea_level
-        if rule.height is not Height.POINT:
+        if rule.height is not AltitudeUse.POINT:
             alt_cm = self._flown_height(item, alt_cm, above_sea=counts_from_sea)
         if counts_from_sea:
             return alt_cm, 1

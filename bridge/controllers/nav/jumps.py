@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from bridge.model.finding import Note, Rejection, reject
+from bridge.model.finding import Note, RejectingFinding, reject
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import LEGS, NavRecord
 
@@ -24,7 +24,7 @@ class Jumps:
     dropped: set[int] = field(default_factory=set)
     wanted: list[tuple[int, MissionItem]] = field(default_factory=list)
 
-    def aim(self, records: list[NavRecord], note: Note) -> Rejection | None:
+    def aim(self, records: list[NavRecord], note: Note) -> RejectingFinding | None:
         """Set the target of each JUMP in `records`; rejects one that the flight controller would not fly."""
         for place, item in self.wanted:
             wanted = int(item.p1)

@@ -83,7 +83,7 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
     )
 
 
-class Height(Enum):
+class AltitudeUse(Enum):
     """The meaning of a command's altitude."""
 
     FLOWN = auto()
@@ -106,18 +106,18 @@ class NavRule:
     name: str
     p1: Range
     position: bool
-    height: Height
+    height: AltitudeUse
 
 
-_ROI = NavRule("ROI", UNUSED, True, Height.POINT)
+_ROI = NavRule("ROI", UNUSED, True, AltitudeUse.POINT)
 #: Commands that become one record with only these fields. nav/check.py handles the others:
 #: CONDITION_YAW, DO_SET_ROI_NONE, DO_JUMP, DO_CHANGE_SPEED.
 NAV_RULES: Mapping[int, NavRule] = {
-    Command.NAV_WAYPOINT: NavRule("WAYPOINT", HOLD, True, Height.FLOWN),
-    Command.NAV_LOITER_UNLIM: NavRule("LOITER_UNLIM", UNUSED, True, Height.FLOWN),
-    Command.NAV_LOITER_TURNS: NavRule("LOITER_TURNS", UNUSED, True, Height.FLOWN),
-    Command.NAV_LOITER_TIME: NavRule("LOITER_TIME", HOLD, True, Height.FLOWN),
-    Command.NAV_RETURN_TO_LAUNCH: NavRule("RTL", LANDS, False, Height.RTH),
-    Command.NAV_LAND: NavRule("LAND", UNUSED, True, Height.APPROACH),
+    Command.NAV_WAYPOINT: NavRule("WAYPOINT", HOLD, True, AltitudeUse.FLOWN),
+    Command.NAV_LOITER_UNLIM: NavRule("LOITER_UNLIM", UNUSED, True, AltitudeUse.FLOWN),
+    Command.NAV_LOITER_TURNS: NavRule("LOITER_TURNS", UNUSED, True, AltitudeUse.FLOWN),
+    Command.NAV_LOITER_TIME: NavRule("LOITER_TIME", HOLD, True, AltitudeUse.FLOWN),
+    Command.NAV_RETURN_TO_LAUNCH: NavRule("RTL", LANDS, False, AltitudeUse.RTH),
+    Command.NAV_LAND: NavRule("LAND", UNUSED, True, AltitudeUse.APPROACH),
     **dict.fromkeys(ROI_COMMANDS, _ROI),
 }

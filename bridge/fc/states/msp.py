@@ -165,7 +165,7 @@ class Identifying(MspLine):
         return self._give_up_at if began is None else max(began, self.link.last_heard_at)
 
 
-class Msp(MspLine):
+class Polling(MspLine):
     """The flight controller is known and polled over MSP."""
 
     name = "MSP"
