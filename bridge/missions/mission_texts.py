@@ -21,7 +21,7 @@ def summary(sent: int, verdict: Verdict[Any]) -> str | None:
         return warnings[-1].text()
     dropped = sum(finding.becomes == DROPPED for finding in warnings)
     relative = sum(finding.field == "frame" and finding.seq != 0 for finding in warnings)
-    raised = sum(finding.field == "alt_m" and finding.becomes != DROPPED for finding in warnings)
+    raised = sum(finding.field == "alt_m" and finding.becomes not in (DROPPED, finding.was) for finding in warnings)
     home = sum(finding.seq == 0 for finding in warnings)
     differing = len(warnings) - dropped - relative - raised - home
     counts = {"dropped": dropped, "heights relative": relative, "raised from 0": raised, "flown differently": differing}

@@ -7,6 +7,8 @@ from dataclasses import replace
 import pytest
 
 from bridge.controllers.harakiri.check import HarakiriRules
+from bridge.controllers.nav.check import NavRules
+from bridge.controllers.nav.rules import inav_profile
 from bridge.missions.list_check import check_list
 from bridge.missions.mission_texts import finding_lines, summary
 from bridge.model.finding import DROPPED, REJECTED, Finding, News
@@ -127,3 +129,8 @@ def test_a_list_without_a_home_says_what_became_of_its_first_item() -> None:
     verdict = check_list([item(WAYPOINT, frame=6), item(WAYPOINT)], HarakiriRules())
     assert [each.text() for each in verdict.findings] == ["Home: first item became home, not flown to"]
     assert summary(2, verdict) == "2 of 2 stored: look at home"
+
+
+def test_a_leg_below_home_is_not_counted_as_raised() -> None:
+    verdict = check_list(mission(item(WAYPOINT, alt_m=-5.0), item(WAYPOINT, alt_m=0.0)), NavRules(inav_profile()))
+    assert summary(3, verdict) == "3 of 3 stored: 1 raised from 0, 1 flown differently"
