@@ -262,7 +262,7 @@ class Vehicle:
         self._cells = max(self._cells, reading.cells or least_cells(reading.voltage_v))
         return replace(reading, cells=self._cells, remaining_percent=remaining_percent(reading.voltage_v, self._cells))
 
-    def hear_home(self, lat_e7: int, lon_e7: int) -> None:
+    def hear_home(self, lat_e7: int, lon_e7: int, altitude_m: float | None = None) -> None:
         """Take the flight controller's own home, degrees * 1e7. It has none while these are 0."""
         if not (lat_e7 and lon_e7):
             return
@@ -270,6 +270,8 @@ class Vehicle:
         if self.home is None or (self.home.lat_e7, self.home.lon_e7) != (lat_e7, lon_e7):
             self.home = Home(lat_e7, lon_e7, None if self.home is None else self.home.altitude_m)
             self._place_home(has_armed=False)
+        if altitude_m is not None:
+            self.home = replace(self.home, altitude_m=altitude_m)
 
     def last(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, however old."""

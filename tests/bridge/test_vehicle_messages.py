@@ -288,6 +288,21 @@ def test_home_in_flight_is_lower_than_the_craft() -> None:
     assert all(math.isnan(value) for value in (*home.q, home.approach_x))
 
 
+def test_inavs_home_has_its_altitude_in_centimetres() -> None:
+    home = struct.pack("<BBiiihhhB", 0, 4, 453830000, 84730000, 13147, 0, 0, 0, 0xA5)
+    mission_record = struct.pack("<BBiiihhhB", 1, 1, 453838000, 84733000, 2000, 0, 0, 0, 0xA5)
+    height = struct.pack("<ihi", 1012, 0, 0)
+    state = told(Vehicle(), INAV, STATUS=status(flags=1), RAW_GPS=gps(speed=0), ALTITUDE=height, WP=home)
+    told(state, INAV, WP=mission_record)
+    assert made(make.home_position(at(state))).altitude == 131_470
+    assert made(make.global_position_int(at(state))).alt == 141_590
+
+
+def test_an_inav_without_a_voltage_says_none() -> None:
+    analog = struct.pack("<BHHIIIIBH", 3 << 4, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert make.battery_status(at(told(Vehicle(), INAV, INAV_ANALOG=analog))) is None
+
+
 def test_the_way_home_only_while_there_is_a_home() -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), RAW_GPS=gps())
     assert make.home_distance(at(state)) is make.home_direction(at(state)) is None

@@ -16,6 +16,7 @@ from protocols.msp.inav import (
     decode_inav_analog,
     decode_inav_status,
 )
+from protocols.msp.nav import decode_wp
 from protocols.msp.telemetry import decode_analog
 
 INAV_POLLS = (
@@ -41,7 +42,7 @@ def _inav_analog(vehicle: Vehicle, payload: bytes, _controller: FlightController
     told = decode_inav_analog(payload)
     if told is None:
         return
-    if told.cells:
+    if told.cells and told.battery_cv:
         volts, amperes = told.battery_cv / 100, told.current_ca / 100
         vehicle.hear(Power(now, Source.MSP, volts, amperes, told.drawn_mah, told.cells, told.percent))
     else:
@@ -68,9 +69,18 @@ def _airspeed(vehicle: Vehicle, payload: bytes, _controller: FlightController, n
         vehicle.hear(Airspeed(now, Source.MSP, speed_cms / 100))
 
 
+def _home(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
+    """MSP_WP 0. Its altitude is in cm; RAW_GPS has whole metres."""
+    answer = decode_wp(payload)
+    if answer is not None and answer[0] == 0:
+        home = answer[1]
+        vehicle.hear_home(home.lat_e7, home.lon_e7, home.alt_cm / 100)
+
+
 INAV_DECODERS: Mapping[int, Decoder] = {
     Msp.INAV_STATUS: _inav_status,
     Msp.INAV_ANALOG: _inav_analog,
     Msp.INAV_AIR_SPEED: _airspeed,
     Msp.ANALOG: _analog,
+    Msp.WP: _home,
 }
