@@ -11,17 +11,10 @@ from protocols.mission_item import MissionResult
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.fake_controllers import DeafWhileArmed
 from tests.support.world import GroundStation, World
 
 READABLE = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600]
-
-
-class DeafWhileArmed(SimulatedNaze):
-    """FrSky with the receiver's wire cut while armed: nothing is answered."""
-
-    def receive(self, data: bytes, now: float) -> None:
-        if not self.armed:
-            super().receive(data, now)
 
 
 def heartbeat_gaps(station: GroundStation) -> list[float]:

@@ -9,12 +9,21 @@ from math import inf
 
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, MspParser
+from simulator.naze import SimulatedNaze
 
 HARAKIRI_CAPABILITY = 0x80000000
 
 
 def ident(version: int, capability: int) -> bytes:
     return struct.pack("<BBBI", version, 3, 0, capability)
+
+
+class DeafWhileArmed(SimulatedNaze):
+    """FrSky with the receiver's wire cut while armed: nothing is answered."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        if not self.armed:
+            super().receive(data, now)
 
 
 class QuietLine:

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bug in any state of the line costs a new search, not the flight.
+
+What the daemon does with an exception (log it, `Bridge.restart`) is in tests/e2e/test_daemon_log.py.
+"""
+
+import pytest
+
+from bridge.fc.session import TRANSITIONS
+from bridge.fc.states.base import Closed, State
+from bridge.fc.states.cli import Cli
+from bridge.fc.states.frsky import Frsky
+from bridge.fc.states.mavlink import Mavlink
+from bridge.fc.states.searching import Searching
+from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.fake_controllers import DeafWhileArmed
+from tests.support.world import World
+
+ARMED_IN = {Mavlink: TelemetryProtocol.MAVLINK, Frsky: TelemetryProtocol.FRSKY_9600}
+
+
+class BugError(Exception):
+    """One in the bridge itself."""
+
+
+def world_of(state: type[State]) -> World:
+    faults = Faults()
+    board = DeafWhileArmed(SimOptions(tele_prot=ARMED_IN.get(state, TelemetryProtocol.MSP)), faults)
+    world = World(faults=faults, peer=board)
+    if state in ARMED_IN:
+        world.wait_ready()
+        world.faults.armed = True
+    elif state is Cli:
+        world.wait_ready()
+        world.naze.receive(b"\r\r\r", world.now)
+    return world
+
+
+@pytest.mark.parametrize(
+    "state", [state for state in TRANSITIONS if state is not Closed], ids=lambda state: state.__name__
+)
+def test_the_line_is_searched_again(state: type[State]) -> None:
+    world = world_of(state)
+    world.wait_until(lambda w: type(w.bridge.session.state) is state, 30)
+    broken = world.bridge.session.state
+
+    def bug(*_args: object) -> None:
+        raise BugError
+
+    broken.receive = broken.tick = bug  # type: ignore[assignment,method-assign]
+    with pytest.raises(BugError):
+        world.run(30)
+    world.bridge.restart("internal error", world.now)
+    assert isinstance(world.bridge.session.state, Searching)
+    world.wait_until(lambda w: w.bridge.session.state is not broken and type(w.bridge.session.state) is state, 30)
