@@ -14,6 +14,8 @@ from tests.support.programs import until
 from tests.support.zenoh_router import ZENOHD
 
 _PLUGIN = "libzenoh_plugin_storage_manager.so"
+#: In the admin space of the storage's process.
+_STATUS = "@/*/router/status/plugins/storage_manager/storages/fleet"
 
 
 def client(endpoint: str) -> zenoh.Session:
@@ -28,7 +30,7 @@ def storage(folder: Path, endpoint: str) -> Iterator[zenoh.Session]:
     """Run a storage behind a router; yields a session that can look into it."""
     with client(endpoint) as looking:
         if ZENOHD is not None and Path(ZENOHD).with_name(_PLUGIN).exists():
-            with _zenohd(folder, endpoint):
+            with _zenohd(folder, endpoint, looking):
                 yield looking
         else:
             with client(endpoint) as session, _like_a_storage(session):
@@ -36,7 +38,7 @@ def storage(folder: Path, endpoint: str) -> Iterator[zenoh.Session]:
 
 
 @contextmanager
-def _zenohd(folder: Path, endpoint: str) -> Iterator[None]:
+def _zenohd(folder: Path, endpoint: str, looking: zenoh.Session) -> Iterator[None]:
     assert ZENOHD is not None
     config = folder / "storage.json5"
     storages = {"fleet": {"key_expr": "fleet/**", "volume": "memory", "complete": True}}
@@ -55,7 +57,7 @@ def _zenohd(folder: Path, endpoint: str) -> Iterator[None]:
     with (folder / "storage.log").open("wb") as log:
         process = subprocess.Popen([ZENOHD, "-c", str(config)], stdout=log, stderr=log)
     try:
-        until(lambda: b"tarted storage" in (folder / "storage.log").read_bytes() or process.poll(), "the storage")
+        until(lambda: list(looking.get(_STATUS)) or process.poll(), "the storage")
         assert process.poll() is None, (folder / "storage.log").read_text()
         yield
     finally:
