@@ -19,8 +19,8 @@ from service.fleet.vehicle import FleetVehicle
 from service.fleet.watch import Watch
 
 _REFRESH_S = 0.5
-#: The slowest profile sends the state every 15 s.
-SILENT_S = 40.0
+#: The slowest profile sends the state every 30 s; one may be lost.
+SILENT_S = 70.0
 #: Lines without a vehicle: counts, column titles and rule, the last line, and an empty one.
 _OTHER_LINES = 5
 _LINKED = ("MSP", "MAVLink")

@@ -127,7 +127,7 @@ KEYS = (
     Key(
         "zenoh.profile",
         Choice([each.value for each in ZenohProfile], ZenohProfile),
-        "Data volume: full sends each sample; metered sends a group every 5 s, but changes such as arming at once.",
+        "Data volume: full sends each sample; metered a group every 5 s, or 30 s if unchanged, but arming at once.",
         f'"{ZenohProfile.FULL.value}"',
     ),
     Key(

@@ -5,15 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.model.vehicle_groups import Attitude, Group, Status
+from bridge.model import vehicle_groups
+from bridge.model.vehicle_groups import Attitude, Battery, Group, Position, Rc, Status
 from service.settings.zenoh import ZenohProfile, ZenohSettingsError, check_rates
 from service.zenoh_link.rates import SampleRates
 
 GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)
 
 
-def sent_at(rates: SampleRates, times: list[float], group: Group = Group.ATTITUDE) -> list[float]:
-    return [now for now in times if rates.admits(group, Attitude(1.0), now, gathered=True)]
+def sent_at(rates: SampleRates, times: list[float]) -> list[float]:
+    """When a craft that rolls on and on is reported."""
+    return [now for now in times if rates.admits(Group.ATTITUDE, Attitude(now * 10), now, gathered=True)]
 
 
 def times_of(gaps_s: list[float]) -> list[float]:
@@ -60,11 +62,43 @@ def test_arming_does_not_wait_on_a_metered_link() -> None:
 
 def test_rare_groups_go_out_together() -> None:
     rates = SampleRates(ZenohProfile.METERED, {})
-    for group in (Group.ATTITUDE, Group.POSITION):
-        assert rates.admits(group, Attitude(1.0), 3.0)
-    assert not any(rates.admits(group, Attitude(2.0), 7.0) for group in (Group.ATTITUDE, Group.POSITION))
-    assert rates.held_back == {Group.ATTITUDE, Group.POSITION}
-    assert all(rates.admits(group, Attitude(2.0), 7.1, gathered=True) for group in (Group.ATTITUDE, Group.POSITION))
+    flying = {Group.ATTITUDE: Attitude(1.0), Group.POSITION: Position(height_m=1.0)}
+    later = {Group.ATTITUDE: Attitude(9.0), Group.POSITION: Position(height_m=9.0)}
+    assert all(rates.admits(group, sample, 3.0) for group, sample in flying.items())
+    assert not any(rates.admits(group, sample, 7.0) for group, sample in later.items())
+    assert rates.held_back == set(later)
+    assert all(rates.admits(group, sample, 7.1, gathered=True) for group, sample in later.items())
+
+
+@pytest.mark.parametrize(
+    ("group", "first", "nearly_the_same", "different"),
+    [
+        (Group.ATTITUDE, Attitude(1.0, 0.0, None), Attitude(1.5, -0.5, None, age_s=3.0), Attitude(4.0, 0.0, None)),
+        (Group.ATTITUDE, Attitude(1.0, 0.0, 9.0), Attitude(1.0, 0.0, 10.0), Attitude(1.0, 0.0, None)),
+        (Group.POSITION, Position(45.0, 8.0), Position(45.00001, 8.0), Position(45.00004, 8.0)),
+        (Group.RC, Rc((1500, 1000)), Rc((1510, 1000)), Rc((1500, 1800))),
+        (Group.RC, Rc((1500, 1000)), Rc((1510, 1000)), Rc((1500,))),
+        (Group.STATUS, Status(sensors=("gps",)), Status(sensors=("gps",), cycle_time_us=9), Status(sensors=())),
+        (Group.BATTERY, Battery(11.1), Battery(11.2), Battery(10.8)),
+    ],
+)
+def test_a_metered_link_carries_changes(
+    group: Group, first: object, nearly_the_same: object, different: object
+) -> None:
+    rates = SampleRates(ZenohProfile.METERED, {})
+    assert rates.admits(group, first, 30.0)
+    same = [now for now in range(31, 80) if rates.admits(group, nearly_the_same, now, gathered=True)]
+    assert same == [60]
+    assert [now for now in range(80, 90) if rates.admits(group, different, now, gathered=True)] == [80]
+
+
+def test_every_field_that_counts_exists() -> None:
+    """A field that was renamed would count no more."""
+    for group in Group:
+        sample = getattr(vehicle_groups, group.value.capitalize())(**({"state": "MSP"} if group is Group.LINK else {}))
+        rates = SampleRates(ZenohProfile.METERED, {})
+        assert rates.admits(group, sample, 0.0)
+        assert not rates.admits(group, sample, 5.0, gathered=True)
 
 
 def test_a_request_raises_a_rate_for_a_while() -> None:
