@@ -121,7 +121,7 @@ class VehicleReporter:
         now = self._last(Orientation)
         if now is None:
             return Attitude()
-        heading_deg = _rounded(now.heading_deg) if now.is_north_known else None
+        heading_deg = _direction(now.heading_deg) if now.is_north_known else None
         return Attitude(_rounded(now.roll_deg), _rounded(now.pitch_deg), heading_deg, self._age_s(now))
 
     def _position(self) -> Position:
@@ -137,7 +137,7 @@ class VehicleReporter:
             home_lat_deg=None if home is None else home.lat_e7 / 1e7,
             home_lon_deg=None if home is None else home.lon_e7 / 1e7,
             home_distance_m=None if home is None or here is None else round(distance_m(here, home), 1),
-            home_direction_deg=None if home is None or here is None else round(bearing_deg(here, home), 1) % 360,
+            home_direction_deg=None if home is None or here is None else _direction(bearing_deg(here, home)),
             age_s=self._age_s(here or height),
         )
 
@@ -145,7 +145,7 @@ class VehicleReporter:
         now = self._last(GpsFix)
         if now is None:
             return Gps()
-        course_deg = _rounded(now.course_deg)
+        course_deg = _direction(now.course_deg)
         return Gps(_FIXES[now.fix], now.satellites, now.hdop, now.ground_speed_m_s, course_deg, self._age_s(now))
 
     def _battery(self) -> Battery:
@@ -189,6 +189,11 @@ class VehicleReporter:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 2)
+
+
+def _direction(value: float | None) -> float | None:
+    """0 up to 360, also after rounding."""
+    return None if value is None else round(value, 2) % 360
 
 
 @cache

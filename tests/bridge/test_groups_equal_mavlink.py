@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whatever the vehicle is, each published group says the same as the MAVLink messages made from it.
+
+Both are compared as a receiver has them: messages packed into a frame, groups as JSON and as CBOR. A value that is null
+in one is unknown in the other, and what MAVLink leaves out as stale has an age that says so.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from bridge.model.flight_mode import FlightMode
+from bridge.model.vehicle import (
+    STALE_S,
+    Fix,
+    FlightState,
+    GlobalPosition,
+    GpsFix,
+    Health,
+    Height,
+    Orientation,
+    Power,
+    Reading,
+    Signal,
+    Source,
+    Sticks,
+    Vehicle,
+)
+from bridge.model.vehicle_groups import Group
+from bridge.vehicle import vehicle_messages as make
+from bridge.vehicle.telemetry_table import Maker
+from bridge.vehicle.vehicle_report import VehicleReporter
+from protocols.msp.telemetry import Sensor
+from service.settings.zenoh import PayloadEncoding
+from service.zenoh_link.keys import TELEMETRY
+from service.zenoh_link.payload import Payloads, decoded, plain
+from tests.support.world import World
+
+NOW = 100.0
+U16 = 0xFFFF
+ROUNDED = 0.0051
+
+
+def number(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high)
+
+
+def heard(kind: type[Reading], **values: st.SearchStrategy[Any]) -> st.SearchStrategy[Reading | None]:
+    ages = st.sampled_from([0.0, 0.3, STALE_S - 0.01, STALE_S + 0.2, 90.0])
+    return st.none() | st.builds(kind, heard_at=ages.map(lambda age: NOW - age), source=st.just(Source.MSP), **values)
+
+
+VELOCITY = st.tuples(number(-90, 90), number(-90, 90)) | st.just((None, None))
+POSITIONS = st.builds(
+    lambda place, velocity: place and GlobalPosition(*place, *velocity),
+    st.none()
+    | st.tuples(
+        st.sampled_from([NOW, NOW - 0.5, NOW - 60]),
+        st.just(Source.MSP),
+        st.integers(-850000000, 850000000),
+        st.integers(-1800000000, 1799999999),
+        number(-400, 8000),
+    ),
+    VELOCITY,
+)
+READINGS = st.tuples(
+    heard(
+        Orientation,
+        roll_deg=number(-180, 180),
+        pitch_deg=number(-90, 90),
+        heading_deg=number(0, 359.999),
+        is_north_known=st.booleans(),
+        rates_deg_s=st.none() | st.tuples(*[number(-2000, 2000)] * 3),
+    ),
+    heard(
+        GpsFix,
+        fix=st.sampled_from(Fix),
+        satellites=st.none() | st.integers(0, 40),
+        ground_speed_m_s=st.none() | number(0, 600),
+        course_deg=st.none() | number(0, 359.999),
+        hdop=st.none() | number(0, 99),
+    ),
+    POSITIONS,
+    heard(Height, height_m=number(-500, 5000), climb_m_s=number(-100, 100)),
+    heard(
+        Power,
+        voltage_v=st.none() | number(0.1, 60),
+        current_a=st.none() | number(0, 300),
+        drawn_mah=st.none() | st.integers(0, 30000),
+    ),
+    heard(Sticks, channels_us=st.lists(st.integers(800, 2200), min_size=4, max_size=18).map(tuple)),
+    heard(Signal, strength=number(0, 1)),
+    heard(FlightState, armed=st.none() | st.booleans(), mode=st.sampled_from(FlightMode)),
+    heard(
+        Health,
+        sensors=st.integers(0, 31).map(Sensor),
+        cycle_time_us=st.none() | st.integers(0, 65535),
+        i2c_errors=st.none() | st.integers(0, 65535),
+    ),
+)
+HOMES = st.none() | st.tuples(st.integers(1, 850000000), st.integers(1, 1799999999))
+
+
+@dataclass(frozen=True)
+class Told:
+    """A vehicle as subscribers and as ground stations get it."""
+
+    vehicle: Vehicle
+    report: VehicleReporter
+    encoding: PayloadEncoding
+
+    def group(self, group: Group) -> Any:
+        key, payloads = TELEMETRY[group], Payloads(self.encoding)
+        body = payloads.head(key) | plain(self.report.group(group))
+        return decoded(payloads.encode(key, body), str(payloads.encoding(key)))
+
+    def message(self, maker: Maker) -> Any:
+        """As received; None if it is not sent."""
+        made = maker(make.Moment(self.vehicle, NOW, boot_ms=1))
+        if made is None:
+            return None
+        codec = m.MAVLink(None, srcSystem=1, srcComponent=1)
+        return m.MAVLink(None).decode(bytearray(made.pack(codec)))
+
+    def is_fresh(self, group: Any) -> bool:
+        """As the schemas have it: "above 1.5 it is stale"."""
+        return group["age_s"] is not None and group["age_s"] <= 1.5
+
+
+def near(value: float | None, other: float, within: float) -> bool:
+    return value is not None and abs(value - other) <= within
+
+
+def near_on_circle(value: float, other: float, within: float) -> bool:
+    return abs((value - other + 180) % 360 - 180) <= within
+
+
+@given(READINGS, HOMES, st.sampled_from(PayloadEncoding))
+def test_groups_and_messages(
+    readings: tuple[Reading | None, ...], home: tuple[int, int] | None, encoding: PayloadEncoding
+) -> None:
+    bridge = World(powered=False, plugged=False).bridge
+    vehicle = bridge.session.vehicle
+    for reading in readings:
+        if reading is not None:
+            vehicle.hear(reading)
+    if home is not None:
+        vehicle.hear_home(*home)
+    bridge.report.now = NOW
+    told = Told(vehicle, bridge.report, encoding)
+    attitude_is_true(told)
+    position_is_true(told)
+    home_is_true(told)
+    gps_is_true(told)
+    battery_is_true(told)
+    rc_is_true(told)
+    status_is_true(told)
+
+
+def attitude_is_true(told: Told) -> None:
+    group, sent = told.group(Group.ATTITUDE), told.message(make.attitude)
+    assert (sent is not None) == told.is_fresh(group)
+    if sent is None:
+        return
+    assert near(group["roll_deg"], math.degrees(sent.roll), ROUNDED)
+    assert near(group["pitch_deg"], math.degrees(sent.pitch), ROUNDED)
+    if group["heading_deg"] is not None:
+        assert 0 <= group["heading_deg"] < 360
+        assert near_on_circle(group["heading_deg"], math.degrees(sent.yaw), ROUNDED)
+    where = told.message(make.global_position_int)
+    if where is not None:
+        assert (where.hdg == U16) == (group["heading_deg"] is None)
+        assert where.hdg == U16 or near_on_circle(group["heading_deg"], where.hdg / 100, 0.011)
+
+
+def position_is_true(told: Told) -> None:
+    group, sent = told.group(Group.POSITION), told.message(make.global_position_int)
+    raw = told.message(make.gps_raw_int)
+    if raw is not None and raw.lat:
+        assert group["altitude_m"] is not None
+        assert near(group["altitude_m"], raw.alt / 1000, 0.001)
+    if sent is None:
+        return
+    assert (group["lat_deg"], group["lon_deg"]) == (sent.lat / 1e7, sent.lon / 1e7)
+    assert near(group["height_m"], sent.relative_alt / 1000, ROUNDED + 0.001)
+    assert near(group["climb_m_s"], -sent.vz / 100, 0.011)
+    assert near(group["north_m_s"], sent.vx / 100, 0.011)
+    assert near(group["east_m_s"], sent.vy / 100, 0.011)
+    assert told.is_fresh(group)
+
+
+def home_is_true(told: Told) -> None:
+    group = told.group(Group.POSITION)
+    sent = told.message(make.home_position)
+    if sent is not None:
+        assert (group["home_lat_deg"], group["home_lon_deg"]) == (sent.latitude / 1e7, sent.longitude / 1e7)
+    distance, direction = told.message(make.home_distance), told.message(make.home_direction)
+    assert (distance is None) == (direction is None)
+    if distance is not None and direction is not None:
+        assert near(group["home_distance_m"], distance.value, 0.051 + 1e-6 * distance.value)
+        assert 0 <= group["home_direction_deg"] < 360
+        assert near_on_circle(group["home_direction_deg"], direction.value, ROUNDED)
+    elif group["home_distance_m"] is not None:
+        assert not told.is_fresh(group)
+
+
+def gps_is_true(told: Told) -> None:
+    group, sent = told.group(Group.GPS), told.message(make.gps_raw_int)
+    assert (sent is not None) == told.is_fresh(group)
+    if sent is None:
+        return
+    assert group["fix"] == {1: "none", 2: "2D", 3: "3D"}[sent.fix_type]
+    assert group["satellites"] == (None if sent.satellites_visible == 255 else sent.satellites_visible)
+    for name, value, parts in (("hdop", sent.eph, 100), ("ground_speed_m_s", sent.vel, 100)):
+        assert (group[name] is None) == (value == U16)
+        assert value == U16 or near(group[name], value / parts, 0.0051 + 0.005)
+    assert (group["course_deg"] is None) == (sent.cog == U16)
+    if sent.cog != U16:
+        assert 0 <= group["course_deg"] < 360
+        assert near_on_circle(group["course_deg"], sent.cog / 100, 0.011)
+
+
+def battery_is_true(told: Told) -> None:
+    group, sent = told.group(Group.BATTERY), told.message(make.battery_status)
+    assert (sent is not None) == (told.is_fresh(group) and group["voltage_v"] is not None)
+    if sent is None:
+        return
+    assert near(group["voltage_v"], sent.voltages[0] / 1000, 0.0005)
+    assert (group["current_a"] is None) == (sent.current_battery == -1)
+    assert group["current_a"] is None or near(group["current_a"], sent.current_battery / 100, 0.005)
+    assert group["drawn_mah"] == (None if sent.current_consumed == -1 else sent.current_consumed)
+    assert group["remaining_percent"] == (None if sent.battery_remaining == -1 else sent.battery_remaining)
+
+
+def rc_is_true(told: Told) -> None:
+    group, sent = told.group(Group.RC), told.message(make.rc_channels)
+    assert (sent is not None) == told.is_fresh(group)
+    if sent is None:
+        return
+    assert group["channels_us"] == [getattr(sent, f"chan{channel + 1}_raw") for channel in range(sent.chancount)]
+    if sent.rssi != 255:
+        assert near(group["rssi_percent"], sent.rssi / 254 * 100, 0.5)
+
+
+def status_is_true(told: Told) -> None:
+    group, sent = told.group(Group.STATUS), told.message(lambda at: make.heartbeat(at.vehicle, is_lost=False))
+    assert bool(group["armed"]) == bool(sent.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
+    if group["mode"] is not None:
+        mode = {"STABILIZE": 0, "ACRO": 1, "ALT_HOLD": 2, "AUTO": 3, "LOITER": 5, "RTL": 6}[group["mode"]]
+        assert sent.custom_mode == mode
+    health = told.message(make.sys_status)
+    assert (health is None) == (group["sensors"] is None)
+    if health is not None:
+        bits = {"accelerometer": 2, "barometer": 8, "compass": 4, "gps": 32, "sonar": 256}
+        shown = {name for name, bit in bits.items() if health.onboard_control_sensors_present & bit}
+        assert set(group["sensors"]) == shown
+        assert (group["i2c_errors"] or 0) == health.errors_comm
+    for name, maker in (("cycle_time_us", make.cycle_time), ("i2c_errors", make.i2c_errors)):
+        named = told.message(maker)
+        assert named is None or group[name] == named.value
