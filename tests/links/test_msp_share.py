@@ -2,6 +2,7 @@
 """`[[share]]`: another program speaks MSP through the bridge, beside telemetry and missions."""
 
 import asyncio
+import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -15,6 +16,7 @@ from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc, parse_gcs
 from service.settings.share import ShareSettings, parse_share
+from tests.support.programs import free_port
 
 PATIENCE_S = 20.0
 IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250
@@ -38,33 +40,30 @@ class Program:
         return replies
 
 
-def free_port() -> int:
-    import socket
-
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @asynccontextmanager
-async def shared(*, write: bool = False, state: Path | None = None) -> AsyncIterator[tuple[Daemon, Program]]:
-    port = free_port()
-    share = ShareSettings(parse_gcs(f"tcpin:127.0.0.1:{port}"), write)
-    daemon = Daemon(Settings(SimulatedFc(), share=[share], state_dir=state))
+async def sharing(address: str, *, write: bool = False) -> AsyncIterator[Daemon]:
+    daemon = Daemon(Settings(SimulatedFc(), share=[ShareSettings(parse_gcs(address), write)]))
     task = asyncio.create_task(daemon.run())
     try:
         async with asyncio.timeout(PATIENCE_S):
             bridge = daemon.bridge
             while bridge.session.vehicle.armed is None or bridge.runner.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
+        yield daemon
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+
+
+@asynccontextmanager
+async def shared(*, write: bool = False) -> AsyncIterator[tuple[Daemon, Program]]:
+    port = free_port(socket.SOCK_STREAM)
+    async with sharing(f"tcpin:127.0.0.1:{port}", write=write) as daemon:
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         yield daemon, Program(reader, writer)
         writer.close()
         with suppress(ConnectionError):
             await writer.wait_closed()
-    finally:
-        task.cancel()
-        await asyncio.wait([task])
 
 
 @pytest.mark.parametrize("is_v2", [False, True])
@@ -122,6 +121,31 @@ async def test_a_mission_transfer_is_not_disturbed() -> None:
             assert reply.direction is Direction.ERROR
             assert list(daemon.share_refused) == ["a mission transfer is running"]
             assert (await pushing)["ack"] == "MAV_MISSION_ACCEPTED"
+
+
+async def test_over_udp_each_program_gets_its_own_replies() -> None:
+    loop = asyncio.get_running_loop()
+    port = free_port()
+
+    async def ask(program: socket.socket, request: bytes) -> MspFrame:
+        await loop.sock_sendto(program, request, ("127.0.0.1", port))
+        async with asyncio.timeout(PATIENCE_S):
+            (reply,) = MspParser().feed(await loop.sock_recv(program, 4096))
+        return reply
+
+    question, change = (
+        MspFrame(Direction.REQUEST, command, payload).encode()
+        for command, payload in ((IDENT, b""), (SET_PID, bytes(30)))
+    )
+    async with sharing(f"udpin:127.0.0.1:{port}") as daemon:
+        with socket.socket(type=socket.SOCK_DGRAM) as first, socket.socket(type=socket.SOCK_DGRAM) as second:
+            for program in first, second:
+                program.setblocking(False)
+            await loop.sock_sendto(first, question[:-2], ("127.0.0.1", port))  # cut short, so it is dropped
+            answered, refused = await asyncio.gather(ask(first, question), ask(second, change))
+    assert (answered.direction, answered.payload[0]) == (Direction.REPLY, 211)
+    assert (refused.direction, refused.command) == (Direction.ERROR, SET_PID)
+    assert len(daemon.share_refused) == 1
 
 
 async def test_noise_is_not_carried() -> None:
