@@ -81,6 +81,7 @@ fuzz: $(VENV)/.test-ready
 
 deb: $(VENV)/.demo-ready
 	$(BIN)/python -m deb.build $(ARCH)
+	! command -v lintian >/dev/null || lintian --allow-root --fail-on error,warning $(or $(ARCH:%=dist/*_%.deb),dist/*.deb)
 
 deb-trial image-check: ARCH = $(shell dpkg --print-architecture)
 deb-trial: deb

@@ -17,6 +17,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 from deb.tree import lay_out
@@ -27,7 +28,7 @@ _WORK = _PROJECT / "build" / "deb"
 _DIST = _PROJECT / "dist"
 _PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
 #: Debian 12 (and Raspberry Pi OS of 2023), Ubuntu 24.04, Debian 13.
-_PYTHONS = ("3.11", "3.12", "3.13")
+PYTHONS = ("3.11", "3.12", "3.13")
 #: Debian's name of an architecture -> the name in wheels.
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "armv7l"}
 _NOT_FOR_ARMHF = ("cbor2", "pymavlink")
@@ -37,7 +38,7 @@ _WHEELS_OF = {"amd64": ("x86_64",), "arm64": ("aarch64",), "armhf": ("armv7l", "
 _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
 
 
-def build(architecture: str) -> Path:
+def build(architecture: str, pythons: Sequence[str] = PYTHONS) -> Path:
     """Build the package; returns its path."""
     work = _WORK / architecture
     shutil.rmtree(work, ignore_errors=True)
@@ -45,23 +46,28 @@ def build(architecture: str) -> Path:
     project = tomllib.loads((_PROJECT / "pyproject.toml").read_text())["project"]
     _run(*_PIP, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", wheels, _PROJECT)
     libraries = {}
-    for python in _PYTHONS:
-        target = ["--only-binary=:all:", "--python-version", python]
-        for lock, machine in _locks(architecture, work):
-            platforms = _platforms(machine)
-            hashed = ("--require-hashes", "--no-deps", "--requirement", lock)
-            _run(*_PIP, "download", *hashed, *target, *platforms, "--dest", wheels)
-        target += [word for machine in _WHEELS_OF[architecture] for word in _platforms(machine)]
+    for python in pythons:
+        fetch(architecture, python, wheels)
+        target = [word for machine in _WHEELS_OF[architecture] for word in _target(python, machine)]
         # Only from the wheels, whose hashes were just checked; build tools are left out.
         libraries[python] = work / python
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
-        _run(*_PIP, "install", *from_wheels, *target, f"{project['name']}=={project['version']}")
+        requirement = f"{project['name']}=={project['version']}"
+        _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *target, requirement)
     root = work / "root"
     lay_out(root, libraries, _PROJECT, project["version"], architecture)
     _DIST.mkdir(exist_ok=True)
     package = _DIST / f"naze-bridge_{project['version']}_{architecture}.deb"
-    _run("dpkg-deb", "--root-owner-group", "-Zzstd", "-z9", "--build", root, package)
+    _run("dpkg-deb", "--root-owner-group", "-Zxz", "--build", root, package)
     return package
+
+
+def fetch(architecture: str, python: str, wheels: Path) -> None:
+    """Download the wheels for one Python to the folder `wheels`; their hashes are checked."""
+    wheels.mkdir(parents=True, exist_ok=True)
+    for lock, machine in _locks(architecture, wheels.parent):
+        hashed = ("--require-hashes", "--no-deps", "--requirement", lock)
+        _run(*_PIP, "download", *hashed, *_target(python, machine), "--dest", wheels)
 
 
 def _locks(architecture: str, work: Path) -> list[tuple[Path, str]]:
@@ -78,8 +84,9 @@ def _locks(architecture: str, work: Path) -> list[tuple[Path, str]]:
     return [(usual, "armv7l"), (_HERE / "armhf.lock", "armv7l"), (of_arm64, "aarch64")]
 
 
-def _platforms(machine: str) -> list[str]:
-    return [word for libc in _GLIBC for word in ("--platform", f"{libc}_{machine}")]
+def _target(python: str, machine: str) -> list[str]:
+    platforms = [word for libc in _GLIBC for word in ("--platform", f"{libc}_{machine}")]
+    return ["--only-binary=:all:", "--python-version", python, *platforms]
 
 
 def _run(*command: str | Path) -> None:

@@ -33,7 +33,7 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     environment = root / _LIB
     (environment / "bin").mkdir(parents=True)
     (environment / "pyvenv.cfg").write_text("home = /usr/bin\ninclude-system-site-packages = false\n")
-    (environment / "bin" / "python3").symlink_to("/usr/bin/python3")
+    (environment / "bin" / "python3").symlink_to("../../../bin/python3")
     shutil.copy(_HERE / "naze-bridge", environment / "bin")
     sites = []
     for python, folder in libraries.items():
@@ -49,7 +49,7 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     _copy(project / "systemd/config.toml", root / "etc/naze-bridge")
     (root / "etc/naze-bridge/conf.d").mkdir()
     documents = root / "usr/share/doc/naze-bridge"
-    _copy(project / "LICENSE", documents, "copyright")
+    _copy(_HERE / "copyright", documents)
     # As in the repository, so that the pages' links work.
     shutil.copytree(project / "docs", documents / "docs")
     for page in _PAGES:

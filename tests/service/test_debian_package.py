@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Debian package: what is in it, and its life on a machine without a network, from the first file to the purge."""
+"""The Debian package: its contents, and its life on a machine without a network, from installation to purge.
+
+It is built once, for this machine and two Pythons, because pip takes its time. `make deb` builds it for all.
+"""
 
 import os
 import re
@@ -7,20 +10,30 @@ import struct
 import subprocess
 import tarfile
 from collections.abc import Iterator
-from functools import cache
 from io import BytesIO
 from pathlib import Path
 
 import pytest
 
-from deb.build import build
+from deb.build import PYTHONS, build, fetch
 from tests.support.bare_root import BareRoot
+
+#: pip and dpkg take a minute, several on a busy machine.
+pytestmark = pytest.mark.timeout(600)
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _MISSION = _REPOSITORY / "examples" / "naze-field.waypoints"
+_SCHEMA = "storage/schema/0001_missions.sql"
 _ELF_MACHINES = {"amd64": 62, "arm64": 183, "armhf": 40}
 #: `dpkg --print-architecture` of this machine must be one of them.
 _HOST = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
+_ASK_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
+#: The bare root's own, and another.
+_OWN = subprocess.run(
+    ["/usr/bin/python3", "-c", _ASK_VERSION], capture_output=True, text=True, check=True
+).stdout.strip()
+_PYTHONS = (_OWN, next(python for python in PYTHONS if python != _OWN))
+_WHEEL_MACHINES = {"arm64": ("aarch64",), "armhf": ("armv7l", "aarch64")}
 #: Starts the daemon in the background as the unit does, with the folders that systemd would make.
 _START = """
 mkdir -p /var/lib/naze-bridge /run/naze-bridge
@@ -33,17 +46,13 @@ cat /run/log; exit 1
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
 
 
-_built = cache(build)
-
-
-@pytest.fixture(params=_ELF_MACHINES)
-def package(request: pytest.FixtureRequest) -> tuple[str, Path]:
-    return request.param, _built(request.param)
+@pytest.fixture(scope="module")
+def package() -> Path:
+    return build(_HOST, _PYTHONS)
 
 
 @pytest.fixture
-def root(tmp_path: Path) -> Iterator[BareRoot]:
-    package = _built(_HOST)
+def root(package: Path, tmp_path: Path) -> Iterator[BareRoot]:
     with BareRoot(tmp_path) as root:
         root.put(package, "/root/naze-bridge.deb")
         yield root
@@ -58,10 +67,10 @@ def _archive(package: Path) -> tarfile.TarFile:
     return tarfile.open(fileobj=BytesIO(data))
 
 
-def test_what_is_in_it(package: tuple[str, Path]) -> None:
-    architecture, path = package
-    files = files_of(path)
+def test_what_is_in_it(package: Path) -> None:
+    files = files_of(package)
     for expected in (
+        *(f"/usr/lib/naze-bridge/lib/python{python}/site-packages/{_SCHEMA}" for python in _PYTHONS),
         "/usr/bin/naze-bridge",
         "/usr/lib/systemd/system/naze-bridge.service",
         "/usr/lib/udev/rules.d/60-naze-bridge.rules",
@@ -69,22 +78,18 @@ def test_what_is_in_it(package: tuple[str, Path]) -> None:
         "/etc/naze-bridge/config.toml",
         "/usr/share/doc/naze-bridge/copyright",
         "/usr/share/doc/naze-bridge/changelog.gz",
-        "/usr/lib/naze-bridge/lib/python3.11/site-packages/storage/schema/0001_missions.sql",
-        "/usr/lib/naze-bridge/lib/python3.12/site-packages/storage/schema/0001_missions.sql",
         "/usr/share/man/man1/naze-bridge.1.gz",
         "/usr/share/bash-completion/completions/naze-bridge",
-        "/usr/lib/naze-bridge/lib/python3.13/site-packages/storage/schema/0001_missions.sql",
     ):
         assert expected in files
     assert {(member.uid, member.gid) for member in files.values()} == {(0, 0)}
     assert not [name for name, member in files.items() if member.mode & 0o022 and not member.issym()]
-    described = subprocess.run(["dpkg-deb", "--field", path], capture_output=True, text=True, check=True).stdout
-    assert f"Architecture: {architecture}\n" in described
+    described = subprocess.run(["dpkg-deb", "--field", package], capture_output=True, text=True, check=True).stdout
+    assert f"Architecture: {_HOST}\n" in described
 
 
-def test_its_libraries_are_for_its_machine_and_for_both_pythons(package: tuple[str, Path]) -> None:
-    architecture, path = package
-    with _archive(path) as archive:
+def test_its_libraries_are_for_its_machine_and_for_both_pythons(package: Path) -> None:
+    with _archive(package) as archive:
         # A file that both Pythons share is a hard link, which has no content of its own.
         libraries = [each for each in archive if each.name.endswith(".so") and each.isfile() and not each.islnk()]
         machines = set()
@@ -92,15 +97,22 @@ def test_its_libraries_are_for_its_machine_and_for_both_pythons(package: tuple[s
             content = archive.extractfile(member)
             assert content is not None
             machines.add(struct.unpack_from("<H", content.read(20), 18)[0])
-    assert machines == {_ELF_MACHINES[architecture]}
-    for python in ("cpython-311", "cpython-312", "cpython-313"):
-        assert [each for each in libraries if python in each.name]
+    assert machines == {_ELF_MACHINES[_HOST]}
+    for python in _PYTHONS:
+        assert [each for each in libraries if f"cpython-{python.replace('.', '')}" in each.name]
 
 
-def test_its_pages_link_only_to_what_is_there(package: tuple[str, Path]) -> None:
-    _, path = package
-    files = files_of(path)
-    with _archive(path) as archive:
+@pytest.mark.parametrize("architecture", _WHEEL_MACHINES)
+@pytest.mark.parametrize("python", [PYTHONS[0], PYTHONS[-1]])
+def test_every_library_has_a_pinned_wheel(architecture: str, python: str, tmp_path: Path) -> None:
+    fetch(architecture, python, tmp_path / "wheels")
+    machines = ("any", *_WHEEL_MACHINES[architecture])
+    assert [wheel for wheel in (tmp_path / "wheels").iterdir() if not wheel.stem.endswith(machines)] == []
+
+
+def test_its_pages_link_only_to_what_is_there(package: Path) -> None:
+    files = files_of(package)
+    with _archive(package) as archive:
         for member in archive:
             if not member.name.startswith("./usr/share/doc/naze-bridge/") or not member.name.endswith(".md"):
                 continue
@@ -111,9 +123,8 @@ def test_its_pages_link_only_to_what_is_there(package: tuple[str, Path]) -> None
                 assert target in files or f"{target}/" in files, f"{member.name}: {link}"
 
 
-def test_no_trace_of_the_machine_that_built_it(package: tuple[str, Path]) -> None:
-    _, path = package
-    with _archive(path) as archive:
+def test_no_trace_of_the_machine_that_built_it(package: Path) -> None:
+    with _archive(package) as archive:
         for member in archive:
             content = archive.extractfile(member) if member.isfile() else None
             assert content is None or str(_REPOSITORY).encode() not in content.read(), member.name
@@ -129,6 +140,9 @@ def test_in_a_bare_root_it_is_installed_used_upgraded_removed_and_purged(root: B
     root.run("sed -i 's/^#fc = .*/fc = \"sim:\"/' /etc/naze-bridge/config.toml")
     root.put(_MISSION, "/root/naze-field.waypoints")
 
+    printed = root.run("naze-bridge demo --once")
+    assert "the flight controller holds 13, read back from it and compared" in printed
+
     root.run(_START)
     assert "ACCEPTED" in root.run("naze-bridge push /root/naze-field.waypoints")
     assert "VERIFIED" in root.run("naze-bridge missions list")
@@ -141,10 +155,6 @@ def test_in_a_bare_root_it_is_installed_used_upgraded_removed_and_purged(root: B
     root.run("dpkg --remove naze-bridge")
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
     root.run("ls /usr/lib/naze-bridge", status=2)
-    root.run("dpkg --install /root/naze-bridge.deb")
-    root.run(_START)
-    assert "VERIFIED" in root.run("naze-bridge missions list")
-    root.run(_STOP)
 
     root.run("mkdir /var/lib/private; mv /var/lib/naze-bridge /var/lib/private/")
     said = root.run("dpkg --purge naze-bridge")
@@ -152,9 +162,3 @@ def test_in_a_bare_root_it_is_installed_used_upgraded_removed_and_purged(root: B
     assert "missions.db" in root.run("ls /var/lib/private/naze-bridge")
     left = root.run("find /etc /usr /var /opt -xdev -name '*naze-bridge*' -not -path '/var/lib/private/*'")
     assert left == ""
-
-
-def test_in_a_bare_root_the_demonstration_runs(root: BareRoot) -> None:
-    root.run("dpkg --install /root/naze-bridge.deb")
-    printed = root.run("naze-bridge demo --once")
-    assert "the flight controller holds 13, read back from it and compared" in printed

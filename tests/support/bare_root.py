@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-_PATIENCE_S = 100
+_PATIENCE_S = 300
 #: On a tmpfs of its own, because an overlay cannot lie on an overlay. /run is empty: no systemd runs here.
 _MAKE = """
 set -e
