@@ -181,7 +181,8 @@ KEYS = (
     Key(
         "web.token_file",
         FileName(in_config_folder=True),
-        "File with the token for writing from the page, created if it is missing. By default web-token in state_dir.",
+        "File with the token for writing missions and fetching logs, created if it is missing. By default web-token in"
+        " state_dir.",
         example='"/etc/naze-bridge/web-token"',
     ),
 )
