@@ -29,7 +29,7 @@ class DroneKit:
         self.heard: set[str] = set()
         self.home: tuple[float, float, float] | None = None
         self.commands: list[Message] = []
-        self._expected = 0
+        self.expected = 0
         self._is_loaded = True
         self._uploaded: list[bool] | None = None
         self._beat()
@@ -85,7 +85,7 @@ class DroneKit:
                 self._parameter_names[message.param_index] = message.param_id
                 self.parameters[message.param_id] = message.param_value
             case "MISSION_COUNT" if not self._is_loaded:
-                self.commands, self._expected = [], message.count
+                self.commands, self.expected = [], message.count
                 self._station.send(m.MAVLink_mission_request_message(1, 1, 0))
             case "MISSION_ITEM" if not self._is_loaded:
                 self._take_item(message)
@@ -99,7 +99,7 @@ class DroneKit:
         if item.seq != len(self.commands):
             return
         self.commands.append(item)
-        if item.seq + 1 < self._expected:
+        if item.seq + 1 < self.expected:
             self._station.send(m.MAVLink_mission_request_message(1, 1, item.seq + 1))
         else:
             self._is_loaded = True
@@ -116,7 +116,7 @@ def test_an_empty_board_has_a_home_to_which_a_mission_is_added() -> None:
     vehicle.connect()
     assert vehicle.parameters["SYSID_THISMAV"] == 1
     vehicle.download()
-    assert len(vehicle.commands) == 1
+    assert (vehicle.expected, len(vehicle.commands)) == (1, 1)
     assert vehicle.home is not None
     assert [round(degrees * 1e5) for degrees in vehicle.home[:2]] == [FIELD_LAT_E7 // 100, FIELD_LON_E7 // 100]
     lat, lon, _ = vehicle.home
