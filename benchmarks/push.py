@@ -79,7 +79,7 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     dialect = daemon.bridge.missions.dialect
     assert dialect is not None
     begun_at: list[float] = []
-    done: asyncio.Future[tuple[PushResult[WpRecord] | LinkLost, float]] = loop.create_future()
+    done: asyncio.Future[tuple[PushResult | LinkLost, float]] = loop.create_future()
     push = _noting_first_chunk(dialect.push(records, lambda _: None), lambda: begun_at.append(loop.time()))
     daemon.bridge.runner.start(push, lambda result, _: done.set_result((result, loop.time())), loop.time())
     daemon.flush()
@@ -89,9 +89,7 @@ async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     return ended_at - begun_at[0]
 
 
-def _noting_first_chunk(
-    push: Conversation[PushResult[WpRecord]], note: Callable[[], None]
-) -> Conversation[PushResult[WpRecord]]:
+def _noting_first_chunk(push: Conversation[PushResult], note: Callable[[], None]) -> Conversation[PushResult]:
     """Pass the conversation through, and call `note` at its first CHUNK."""
     noted = False
     effect = next(push)
@@ -103,5 +101,5 @@ def _noting_first_chunk(
         try:
             effect = push.send(answer)
         except StopIteration as stop:
-            result: PushResult[WpRecord] = stop.value
+            result: PushResult = stop.value
             return result

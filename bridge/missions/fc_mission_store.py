@@ -8,7 +8,7 @@ A dialect is one kind of flight controller: its rules, and how a list is written
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Generic, Protocol
+from typing import Any, Protocol
 
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
@@ -60,15 +60,11 @@ LIST_IS_GONE = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class PushResult(Generic[RecordT]):
-    """`failure` is None if the list was verified. `unchanged`: the same list was already there.
-
-    `held`: the list as the flight controller stores it, if it cannot hold the records exactly.
-    """
+class PushResult:
+    """`failure` is None if the list was verified. `unchanged`: the same list was already there."""
 
     failure: PushFailure | None
     unchanged: bool = False
-    held: tuple[RecordT, ...] | None = None
 
 
 #: Called with the number of records written so far.
@@ -85,7 +81,7 @@ class FcMissionStore(Protocol[RecordT]):
     def report(self) -> Conversation[StoreReport | None]:
         """Ask the flight controller; None if it does not answer."""
 
-    def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult[RecordT]]:
+    def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list and verify it. The empty list clears."""
 
     def pull(self) -> Conversation[tuple[RecordT, ...] | None]:

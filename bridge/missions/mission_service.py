@@ -222,8 +222,7 @@ class MissionService:
         before = None if self.held is None else self.held.identity
         result = yield from self._push(dialect, arrived, progress)
         if result.failure is PushFailure.UNCERTAIN:
-            wanted = identify(verdict.records if result.held is None else result.held)
-            self._pending.append(PendingMission(number, wanted, before))
+            self._pending.append(PendingMission(number, identify(verdict.records), before))
             self._is_settled, self.held = False, None
             return DeliveryResult(MissionResult.DENIED, result.failure.value, number)
         if result.failure is not None:
@@ -238,14 +237,7 @@ class MissionService:
                     result.failure.value,
                 )
             )
-        if result.held is None:
-            self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
-        else:
-            self.held = HeldMission(
-                identify(result.held),
-                result.held,
-                dialect.items(result.held, verdict.sent_as),
-            )
+        self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
         lossy = summary(len(arrived.items), verdict)
         if lossy is not None:
             text = lossy
@@ -259,8 +251,6 @@ class MissionService:
         change = (
             "" if result.unchanged else "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
         )
-        if result.held is not None and result.held != verdict.records:
-            text += ", places within 0.4 m"
         delivery = yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text)
         if result.unchanged:
             return replace(delivery, is_lossy=lossy is not None)
@@ -268,7 +258,7 @@ class MissionService:
 
     def _push(
         self, dialect: AnyFcMissionStore, arrived: ArrivedMission, progress: Callable[[int], None]
-    ) -> Conversation[PushResult[Any]]:
+    ) -> Conversation[PushResult]:
         records = arrived.verdict.records
 
         def written(count: int) -> None:

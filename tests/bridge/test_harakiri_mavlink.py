@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Missions for a Harakiri that answers nothing but MAVLink, by its own mission messages."""
 
+import re
 import struct
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.harakiri.mavlink_missions import as_stored
+from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.missions.list_check import check_list
+from bridge.model.mission_log import ArrivedMission, Outcome
 from protocols.mission_item import Command, MissionItem, MissionResult
-from protocols.wp_record import WpRecord
+from simulator.mission_slots import flash_size
+from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import Download, Upload, waypoints
 from tests.support.world import GroundStation, World
@@ -19,11 +24,15 @@ from tests.support.world import GroundStation, World
 A = MissionResult
 
 
-def mavlink_only(faults: Faults | None = None, seed: int = 0) -> tuple[World, GroundStation]:
+def mavlink_only(
+    faults: Faults | None = None, seed: int = 0, flash: memoryview | None = None, pending: ArrivedMission | None = None
+) -> tuple[World, GroundStation]:
     """A Harakiri without the extension that does not answer MSP, found by its MAVLink."""
     faults = faults or Faults()
     faults.extension = faults.msp = False
-    world = World(SimOptions(seed=seed), faults, speeds=(115200,), seed=seed)
+    board = SimulatedNaze(SimOptions(seed=seed), faults, flash)
+    world = World(peer=board, faults=faults, speeds=(115200,), seed=seed)
+    world.store.missions += [] if pending is None else [(pending, None)]
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
     world.wait_until(lambda w: w.bridge.session.vehicle.armed is False and not w.bridge.runner.is_busy, 8)
     return world, GroundStation(world)
@@ -42,9 +51,14 @@ def mixed() -> list[MissionItem]:
     return items
 
 
-def held(items: list[MissionItem]) -> tuple[WpRecord, ...]:
-    """What it can hold of a list: coordinates go through single precision."""
-    return tuple(as_stored(record) for record in check_list(items, HarakiriRules()).records)
+#: The rules where coordinates go through single precision.
+RULES = HarakiriRules(is_single_precision=True)
+
+
+def holds(world: World, items: list[MissionItem]) -> bool:
+    """True if the board's list reads as the rules make it of these items."""
+    read = [replace(each, lat_e7=readable_e7(each.lat_e7), lon_e7=readable_e7(each.lon_e7)) for each in world.stored]
+    return tuple(read) == check_list(items, RULES).records
 
 
 def near(one: int | None, other: int | None) -> bool:
@@ -55,14 +69,14 @@ def near(one: int | None, other: int | None) -> bool:
 def test_a_list_is_written_read_back_and_accepted(items: list[MissionItem]) -> None:
     world, station = mavlink_only()
     assert Upload(station, items).run() is A.ACCEPTED
-    assert world.stored == held(items)
+    assert holds(world, items)
     read = Download(station).run()
     assert read is not None
     for sent, got in zip(check_list(items, HarakiriRules()).items, read, strict=True):
         assert near(sent.lat_e7, got.lat_e7)
         assert near(sent.lon_e7, got.lon_e7)
         assert replace(got, lat_e7=sent.lat_e7, lon_e7=sent.lon_e7) == sent
-    assert any("0.4 m" in text for text in station.texts())
+    assert any(re.fullmatch(r"Places moved by up to 0\.[1-4] m \(single precision\)", text) for text in station.texts())
     world.assert_line_was_clean()
 
 
@@ -75,9 +89,8 @@ def test_a_list_that_was_there_is_read() -> None:
     world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 8)
     read = Download(station).run()
     assert read is not None
-    assert [item.command for item in read] == [
-        Command.NAV_ROI if item.command == Command.DO_SET_ROI else item.command for item in mixed()
-    ]
+    # A region of interest, too, as it was sent: the list is known again.
+    assert [item.command for item in read] == [item.command for item in mixed()]
 
 
 def test_clearing() -> None:
@@ -96,7 +109,7 @@ def test_armed_is_denied() -> None:
     world.faults.armed = True
     world.run(4)
     assert Upload(station, waypoints(6)).run() is A.DENIED
-    assert world.stored == held(waypoints(5))
+    assert holds(world, waypoints(5))
 
 
 @pytest.mark.parametrize("hazard", [0x0D, 0x23, 0x52])
@@ -108,7 +121,7 @@ def test_a_list_that_would_set_off_a_trap_is_refused(hazard: int) -> None:
     items[3] = replace(items[3], lat_e7=round(degrees * 1e7))
     assert Upload(station, items).run() is A.DENIED
     assert any("trap" in text for text in station.texts())
-    assert world.stored == held(waypoints(5))
+    assert holds(world, waypoints(5))
     world.assert_line_was_clean()
 
 
@@ -135,9 +148,9 @@ def test_a_bad_line_costs_time_and_never_the_truth(rate: float) -> None:
         outcomes.add(result)
         world.run(3)
         if result is A.ACCEPTED:
-            assert world.stored == held(waypoints(30, 1))
+            assert holds(world, waypoints(30, 1))
         elif not any("Link lost while writing" in text for text in station.texts()):
-            assert world.stored == held(waypoints(5))
+            assert holds(world, waypoints(5))
     assert A.ACCEPTED in outcomes
 
 
@@ -147,3 +160,24 @@ def test_an_unpatched_harakiri_that_answers_msp_is_told_what_it_lacks() -> None:
     world.wait_until(lambda w: w.kind is harakiri.UNPATCHED, 8)
     station = GroundStation(world)
     assert Upload(station, waypoints(5)).run() is A.UNSUPPORTED
+
+
+@given(st.integers(-1_800_000_000, 1_800_000_000) | st.integers(-1000, 1000))
+def test_a_place_that_was_read_is_written_as_it_was_read(value_e7: int) -> None:
+    readable = readable_e7(value_e7)
+    assert readable_e7(readable) == readable
+    degrees = abs(value_e7) / 1e7
+    assert abs(readable - value_e7) <= (38 if degrees < 64 else 128)
+
+
+@pytest.mark.parametrize(("is_there", "outcome"), [(True, Outcome.VERIFIED), (False, Outcome.FAILED)])
+def test_a_mission_that_a_killed_daemon_left_pending_is_settled_in_mavlink_mode_too(
+    is_there: bool, outcome: Outcome
+) -> None:
+    flash = memoryview(bytearray(b"\xff") * flash_size(SimOptions()))
+    _, station = mavlink_only(flash=flash)
+    assert Upload(station, waypoints(12, seed=0 if is_there else 1)).run() is A.ACCEPTED
+    verdict = check_list(waypoints(12), RULES)
+    world, station = mavlink_only(flash=flash, pending=ArrivedMission("udp", tuple(waypoints(12)), verdict))
+    world.wait_until(lambda w: w.store.outcomes() != [None], 20)
+    assert world.store.outcomes() == [outcome]

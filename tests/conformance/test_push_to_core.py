@@ -96,7 +96,7 @@ class Line:
             self._step()
         raise AssertionError("the conversation does not end")
 
-    def push(self, records: tuple[WpRecord, ...]) -> PushResult[WpRecord]:
+    def push(self, records: tuple[WpRecord, ...]) -> PushResult:
         result = self.run(self._missions.push(records, lambda _: None))
         assert isinstance(result, PushResult)
         return result

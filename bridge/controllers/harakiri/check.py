@@ -16,6 +16,7 @@ from bridge.controllers.harakiri.rules import (
     InList,
     command_rules,
 )
+from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -31,17 +32,21 @@ from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.wp_record import WpCommand, WpRecord
 
+_METRES_PER_E7 = 0.0111
+
 
 @dataclass(frozen=True, slots=True)
 class HarakiriRules:
     """The inputs of the rules from the flight controller and the settings.
 
     capacity: records, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: the highest take-off.
+    is_single_precision: the list is written over its MAVLink, which moves places a little.
     """
 
     capacity: int = USUAL_CAPACITY
     wp_radius_cm: int = USUAL_WP_RADIUS_CM
     takeoff_max_m: int = TAKEOFF_MAX_M
+    is_single_precision: bool = False
 
     @property
     def max_items(self) -> int:
@@ -64,6 +69,8 @@ class HarakiriCheck(ListCheck):
     def __init__(self, rules: HarakiriRules, count: int, fallback_home: tuple[int, int] | None = None) -> None:
         super().__init__(count)
         self._rules = command_rules(rules.wp_radius_cm, rules.takeoff_max_m)
+        self._is_single_precision = rules.is_single_precision
+        self._moved_e7 = 0
         self._fallback_home = fallback_home if fallback_home and all(fallback_home) else None
         self._roi_known = False
         self._kept: list[tuple[MissionItem, CommandRule]] = []  # items as sent, home included
@@ -86,6 +93,9 @@ class HarakiriCheck(ListCheck):
         if len(self._records) == 1:
             cleared = Finding(None, "count", self._count, CLEARED, "no command left", news=News.WARNING)
             return Verdict(Result.CLEARED, MissionResult.ACCEPTED, findings=(*findings, cleared))
+        if self._moved_e7:
+            moved = f"Places moved by up to {self._moved_e7 * _METRES_PER_E7:.1f} m (single precision)"
+            findings = (*findings, Finding(None, "position", None, None, moved))
         return Verdict(
             Result.ACCEPTED,
             MissionResult.ACCEPTED,
@@ -168,7 +178,7 @@ class HarakiriCheck(ListCheck):
         p4 = self._fit(item, "p4", NO_ROI_KNOWN if no_nose else rule.p4)
         if not rule.position:
             self._no_position(item)
-        lat_e7, lon_e7 = (item.lat_e7 or 0, item.lon_e7 or 0) if rule.position else (0, 0)
+        lat_e7, lon_e7 = self._place(item) if rule.position else (0, 0)
         height_m = self._fit(item, "alt_m", rule.height, self._height_news(item, rule))
         has_turns = rule.record is WpCommand.LOITER_TURNS
         if rule.record is WpCommand.SETROI:
@@ -187,6 +197,15 @@ class HarakiriCheck(ListCheck):
                 command=int(rule.record),
             )
         )
+
+    def _place(self, item: MissionItem) -> tuple[int, int]:
+        """The coordinates as they will read back."""
+        sent = item.lat_e7 or 0, item.lon_e7 or 0
+        if not self._is_single_precision:
+            return sent
+        lat_e7, lon_e7 = map(readable_e7, sent)
+        self._moved_e7 = max(self._moved_e7, abs(lat_e7 - sent[0]), abs(lon_e7 - sent[1]))
+        return lat_e7, lon_e7
 
     def _height_news(self, item: MissionItem, rule: CommandRule) -> News:
         is_raised = rule.height is CRUISE and (not math.isfinite(item.alt_m) or math.trunc(item.alt_m) == 0)

@@ -6,20 +6,19 @@ It takes only MISSION_ITEM, with coordinates in single precision, one item at a 
 list: so after a failure the bridge sends an item that is out of sequence. `bridge.line.mavlink_sender` avoids the traps
 of its serial port; an item that cannot be sent safely rejects the list.
 
-A written list is read back, item by item. Single precision holds a coordinate to 0.4 m.
+A written list is read back, item by item. The rules make places of which single precision loses nothing more.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.records import items_from_records
 from bridge.controllers.harakiri.rules import MAV_COMMANDS
+from bridge.controllers.harakiri.single_precision import degrees_read_e7, degrees_to_send
 from bridge.line.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
 from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from bridge.model.vehicle import Vehicle
-from protocols.float32 import neighbours, single
 from protocols.mavlink.codec import MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
@@ -38,7 +37,6 @@ _WRITTEN_AFTER_S = 1.6
 _REQUEST, _ACK = m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK
 _COUNT, _ITEM = m.MAVLINK_MSG_ID_MISSION_COUNT, m.MAVLINK_MSG_ID_MISSION_ITEM
 _NO_SEQ = 0xFFFF
-_E7 = single(1e7)
 _COMMANDS = {int(command): number for number, command in MAV_COMMANDS.items()}
 #: The failure reported if this ends the last attempt; any other becomes "the line is bad".
 _FAILURES = {
@@ -62,9 +60,8 @@ class HarakiriMavlinkMissions(OneMission):
 
     def __init__(self, vehicle: Vehicle, rules: HarakiriRules) -> None:
         self._vehicle = vehicle
-        self._rules = rules
+        self._rules = replace(rules, is_single_precision=True)
         self._decoder = MavlinkDecoder()
-        self._known: tuple[WpRecord, ...] | None = None
 
     @property
     def wp_radius_cm(self) -> None:
@@ -78,13 +75,12 @@ class HarakiriMavlinkMissions(OneMission):
             return None
         return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules, None)
 
-    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult[WpRecord]]:
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list and read it back."""
         if self._vehicle.armed is not False:
             # The firmware does not check this: it would accept a list, or lose its own, in flight.
             return PushResult(PushFailure.ARMED)
-        wanted = tuple(as_stored(record) for record in records)
-        items = [_message(seq, item) for seq, item in enumerate(items_from_records(wanted))] or _NOTHING
+        items = [_message(seq, item) for seq, item in enumerate(items_from_records(records))] or _NOTHING
         failure = PushFailure.NO_ANSWER
         try:
             for _ in range(_MAX_BEGINS):
@@ -94,27 +90,32 @@ class HarakiriMavlinkMissions(OneMission):
                     except Stopped:
                         raise _Failed(PushFailure.STOPPED, is_final=True) from None
                     yield from pause(_WRITTEN_AFTER_S)
-                    held = yield from self._read(wanted)
-                    if held != wanted:
-                        return PushResult(PushFailure.UNCERTAIN, held=wanted)
-                    self._known = wanted
-                    return PushResult(None, held=wanted)
+                    held = yield from self.pull()
+                    return PushResult(None if held == records else PushFailure.UNCERTAIN)
                 except _Failed as failed:
                     failure = failed.failure
                     restored = yield from self._restore()
                     if not restored:
-                        return PushResult(PushFailure.UNCERTAIN, held=wanted)
+                        return PushResult(PushFailure.UNCERTAIN)
                     if failed.is_final:
                         break
                     if failure is PushFailure.BUSY:
                         yield from pause(_WRITTEN_AFTER_S)
         except LinkLost:
             failure = PushFailure.UNCERTAIN
-        return PushResult(failure, held=wanted)
+        return PushResult(failure)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read its list."""
-        return (yield from self._read(self._known or ()))
+        """Read its list. An empty one gets no answer at all."""
+        for _ in range(_MAX_BEGINS):
+            count = yield from self._question(m.MAVLink_mission_request_list_message(*_TARGET), _COUNT)
+            if count is None:
+                continue
+            items = yield from self._read_items(self._field(count, "count"))
+            if items is not None:
+                return tuple(map(_record, items))
+        # No answer means an empty store; a lost line would have ended the conversation.
+        return () if count is None else None
 
     def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         """A list as a ground station reads it."""
@@ -178,21 +179,6 @@ class HarakiriMavlinkMissions(OneMission):
                 return True
         return False
 
-    def _read(self, likely: tuple[WpRecord, ...]) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read the list; returns `likely` if it reads as that one would. An empty list gets no answer at all."""
-        for _ in range(_MAX_BEGINS):
-            count = yield from self._question(m.MAVLink_mission_request_list_message(*_TARGET), _COUNT)
-            if count is None:
-                continue
-            items = yield from self._read_items(self._field(count, "count"))
-            if items is None:
-                continue
-            if items == [_as_read(seq, item) for seq, item in enumerate(items_from_records(likely))]:
-                return likely
-            return tuple(_record(item) for item in items)
-        # No answer means an empty store; a lost line would have ended the conversation.
-        return () if count is None else None
-
     def _read_items(self, count: int) -> Conversation[list[MissionItem] | None]:
         items: list[MissionItem] = []
         for seq in range(count):
@@ -202,7 +188,7 @@ class HarakiriMavlinkMissions(OneMission):
             if decoded is None:
                 return None
             params = (decoded.param1, decoded.param2, decoded.param3, decoded.param4)
-            lat_e7, lon_e7 = _as_int(decoded.x), _as_int(decoded.y)
+            lat_e7, lon_e7 = degrees_read_e7(decoded.x), degrees_read_e7(decoded.y)
             items.append(MissionItem(seq, decoded.command, decoded.frame, *params, lat_e7, lon_e7, decoded.z))
         return items
 
@@ -227,35 +213,12 @@ class HarakiriMavlinkMissions(OneMission):
         return _NO_SEQ if message is None else int(getattr(message, name))
 
 
-def as_stored(record: WpRecord) -> WpRecord:
-    """The record that Harakiri stores after receiving it in single precision."""
-    return replace(record, lat_e7=_as_int(_single_e7(record.lat_e7)), lon_e7=_as_int(_single_e7(record.lon_e7)))
-
-
-def _as_int(degrees: float) -> int:
-    """As the firmware does: (int32_t)(x * 1.0e7f)."""
-    return math.trunc(single(degrees * _E7))
-
-
-def _single_e7(value_e7: int) -> float:
-    """The degrees in single precision that the firmware stores closest to `value_e7`."""
-    if value_e7 == 0:
-        return 0.0
-    return min(neighbours(single(value_e7 / 1e7)), key=lambda degrees: abs(_as_int(degrees) - value_e7))
-
-
 def _message(seq: int, item: MissionItem) -> Message:
     """Make MISSION_ITEM. Harakiri reads neither frame nor autocontinue."""
     params = (item.p1, item.p2, 0.0, item.p4)
-    place = (_single_e7(item.lat_e7 or 0), _single_e7(item.lon_e7 or 0), item.alt_m)
+    place = (degrees_to_send(item.lat_e7 or 0), degrees_to_send(item.lon_e7 or 0), item.alt_m)
     command = Command.NAV_ROI if item.command not in _COMMANDS else item.command
     return m.MAVLink_mission_item_message(*_TARGET, seq, Frame.GLOBAL_RELATIVE_ALT, command, 0, 1, *params, *place)
-
-
-def _as_read(seq: int, item: MissionItem) -> MissionItem:
-    """A stored item as it is read back."""
-    lat_e7, lon_e7 = (_as_int(single(single(value or 0) / _E7)) for value in (item.lat_e7, item.lon_e7))
-    return replace(item, seq=seq, frame=int(Frame.GLOBAL_RELATIVE_ALT), lat_e7=lat_e7, lon_e7=lon_e7)
 
 
 def _record(item: MissionItem) -> WpRecord:

@@ -99,7 +99,7 @@ class HarakiriMissions(OneMission):
         rules = HarakiriRules(info.capacity, info.wp_radius_cm, self._takeoff_max_m)
         return StoreReport(state, rules, info.stored)
 
-    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult[WpRecord]]:
+    def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list: BEGIN, CHUNKs in a window, COMMIT; verified by the checksum over the flash."""
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER

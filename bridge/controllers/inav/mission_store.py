@@ -55,7 +55,7 @@ class InavMissions(NavMissions):
         """The last of the others, as many as do not fit."""
         return erased(self._others, self._profile.capacity - len(records or NOTHING))
 
-    def push(self, records: Mission, progress: PushProgress) -> Conversation[PushResult[NavRecord]]:
+    def push(self, records: Mission, progress: PushProgress) -> Conversation[PushResult]:
         """Write the list, with the other missions behind it, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:

@@ -107,7 +107,7 @@ class NavMissions(OneMission, ABC):
         """The seq of the item for record `number`; 0: none."""
         return item_seqs(records)[number - 1] if 1 <= number <= len(records) else 0
 
-    def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult[NavRecord]]:
+    def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list and verify it; after a failure restore the old list, if known."""
         before, self._known = self._known, None
         # The result if the link is lost now.
