@@ -7,11 +7,11 @@ later one is answered. The timeout follows the measured round trip, as in TCP: 7
 loss.
 """
 
+from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
 
 from bridge.line.conversation import Send
-from bridge.line.round_trips import RoundTrips
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
@@ -55,6 +55,8 @@ RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Sent only for the order of its reply, so no other code may use it. Harakiri answers with an error frame; a board that
 #: ignores unknown commands is never identified.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
+#: Upper ends of the classes of round trips, seconds: a reply takes 2 ms over TCP, 10 ms at 115200 baud, 300 ms at 2400.
+BOUNDS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 
 @dataclass(slots=True)
@@ -291,3 +293,19 @@ class MspLink:
             measured = max(now - answered.sent_at, 0.0)
             self.round_trips.add(measured)
             self._round_trip_s += (measured - self._round_trip_s) / 8
+
+
+class RoundTrips:
+    """A histogram of the times to a reply.
+
+    `counts`: one per bound, and a last one for longer times. `sum_s`: the total, seconds.
+    """
+
+    def __init__(self) -> None:
+        self.counts = [0] * (len(BOUNDS_S) + 1)
+        self.sum_s = 0.0
+
+    def add(self, elapsed_s: float) -> None:
+        """Count one."""
+        self.counts[bisect_left(BOUNDS_S, elapsed_s)] += 1
+        self.sum_s += elapsed_s

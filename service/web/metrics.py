@@ -13,7 +13,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 
 from bridge.fc.session import TRANSITIONS
-from bridge.line.round_trips import BOUNDS_S, RoundTrips
+from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission

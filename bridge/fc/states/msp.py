@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MSP is answered: the board is being identified, and then polled."""
 
+from collections.abc import Sequence
 from math import inf
 
 from bridge.fc.autosense import Found, Spoken
-from bridge.fc.identify import identify_msp
+from bridge.fc.interview import Interview, NoAnswer
 from bridge.fc.msp_telemetry import hear_msp
-from bridge.fc.profile import FlightController
+from bridge.fc.profile import FlightController, Profile
 from bridge.fc.states.base import State
 from bridge.fc.states.events import CliFound, Event, Identified, Lost, MavlinkFound, MspFound
-from bridge.fc.states.foreign import ForeignBytes
 from bridge.fc.states.port import Port
-from bridge.line.conversation import LinkLost
+from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import MspLink
 from bridge.line.pending_replies import PendingReplies
 from protocols.frsky import FRSKY_SPEED
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.heartbeat import is_disarmed_heartbeat
 from protocols.msp.echo import EchoWatch
 from protocols.msp.frame import MspFrame
 
@@ -42,7 +44,7 @@ class MspLine(State):
         super().__init__(port, found.speed)
         self.link = link
         self.found = found
-        self._foreign = ForeignBytes()
+        self._foreign = _ForeignBytes()
         self._echo = EchoWatch()
 
     @property
@@ -136,7 +138,7 @@ class Identifying(MspLine):
         self._end: Event | None = None
         self._give_up_at = now + _IDENTIFY_TIMEOUT_S
         port.runner.link_up(self.link)
-        self._task = port.runner.start(identify_msp(port.profiles), self._identified, now)
+        self._task = port.runner.start(_identify(port.profiles), self._identified, now)
 
     def _identified(self, who: FlightController | LinkLost | None, _now: float) -> None:
         if isinstance(who, FlightController):
@@ -198,7 +200,7 @@ class Polling(MspLine):
             self.port.polls.ask(self.link, now, beside_missions=self.port.runner.needs_line)
             if now >= self._check_at and not self.port.runner.is_busy:
                 self._check_at = inf
-                self.port.runner.start(identify_msp(self.port.profiles), self._checked, now)
+                self.port.runner.start(_identify(self.port.profiles), self._checked, now)
         return event
 
     def deadline(self) -> float:
@@ -217,3 +219,41 @@ class Polling(MspLine):
             return
         self._check_interval_s = min(self._check_interval_s * 2, _LAST_CHECK_S)
         self._check_at = now + self._check_interval_s
+
+
+class _ForeignBytes:
+    """Bytes on an MSP line that are not MSP, since the last reply."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self.mavlink: MavlinkFrame | None = None
+        self._skipped_before = 0
+        self._splitter = MavlinkSplitter()
+
+    def note(self, data: bytes, link: MspLink, *, is_msp: bool) -> None:
+        """Examine received bytes."""
+        skipped, self._skipped_before = link.skipped_bytes - self._skipped_before, link.skipped_bytes
+        if is_msp:
+            if self.size:
+                self.size, self.mavlink, self._splitter = 0, None, MavlinkSplitter()
+            return
+        self.size += skipped
+        if skipped:
+            for frame in self._splitter.feed(data):
+                # A disarmed Harakiri that hears no request sends heartbeats, and still answers MSP.
+                if not is_disarmed_heartbeat(frame):
+                    self.mavlink = frame
+
+
+def _identify(profiles: Sequence[Profile]) -> Conversation[FlightController | None]:
+    """Interview the board; None if a question stayed unanswered or no profile recognised it."""
+    board = Interview()
+    try:
+        for profile in profiles:
+            if profile.recognise is not None:
+                controller = yield from profile.recognise(board)
+                if controller is not None:
+                    return controller
+    except NoAnswer:
+        pass
+    return None
