@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-Lists arrive side by side, so that a slow ground station does not hold up the others, and are written one at a time.
-Mission Planner loses packets of its own and takes any
-ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed in docs/ground-stations.md.
+Uploads run one at a time, in the order of their MISSION_COUNT, unless lists arrive so slowly or so many at once that
+the others would be locked out: then they arrive side by side, and are only written one at a time. Mission Planner loses
+packets of its own and takes any ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed
+in docs/ground-stations.md.
 """
 
 from collections.abc import Callable
@@ -52,6 +53,12 @@ _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "This upload is not
 _REMINDERS_S = (2.0, 4.0)
 #: The limit of uploads at a time. Of more, the one with the slowest progress ends.
 _MOST_UPLOADS = 64
+#: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
+#: out the others. A pause ends that.
+_ALONE_S = 4.0
+_PAUSE_S = 3.0
+#: Nor does it if more than this many are running or waiting.
+_MOST_IN_TURN = 4
 #: The flight controller is not asked more often if it can take a list; one reply serves all uploads that wait for it.
 _ASK_INTERVAL_S = 0.2
 
@@ -80,6 +87,8 @@ class MissionUploads:
         self._reminders: list[tuple[float, Station, str]] = []
         self._is_asking = False
         self._may_ask_at = 0.0
+        #: Since when lists have been arriving without a pause, and when the last upload ended.
+        self._arriving_since = self._last_end = -inf
 
     @property
     def state(self) -> type[UploadState] | None:
@@ -119,7 +128,7 @@ class MissionUploads:
         self._follow(station, now)
         present = self._of(station)
         if present is not None and not isinstance(present.state, Delivering):
-            self._forget(present)
+            self._forget(present, now)
         elif present is not None and present.count == 0:
             return
         self._begin(station, 0, now)
@@ -147,7 +156,7 @@ class MissionUploads:
             state.announced_again = False
             if item.seq == 0:
                 # Two lists must never be mixed: the previous one is discarded.
-                self._forget(upload)
+                self._forget(upload, now)
                 self._begin(station, upload.count, now)
                 return
         taken = state.take(item, now)
@@ -214,9 +223,11 @@ class MissionUploads:
 
     def next_deadline(self) -> float:
         """The time of the next `tick`."""
-        if self._missions.occupied() is not OCCUPIED and self._in(Waiting, Complete):
+        arriving, waiting = self._in(Asking, Receiving), self._in(Waiting)
+        if self._missions.occupied() is not OCCUPIED and (self._in(Complete) or (waiting and not arriving)):
             return 0.0
         times = [self._may_ask_at] if self._in(Asking) and not self._is_asking else []
+        times += [self._arriving_since + _ALONE_S] if waiting and arriving else []
         times += [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
         return min(times, default=inf)
 
@@ -227,8 +238,7 @@ class MissionUploads:
         self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
         for older in self._uploads:
             older.is_superseded |= older.station == station
-        state = Waiting(now) if count else Complete(now, (), CLEARED_LIST)
-        upload = _Upload(station, count, self._context.incidents.begin("upload"), state)
+        upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(now))
         self._uploads.append(upload)
         refusal = self._missions.armed_refusal()
         if refusal is None and not self._post.allows(station, Cost.BOARD):
@@ -241,22 +251,29 @@ class MissionUploads:
         self._begin_next(now)
 
     def _begin_next(self, now: float) -> None:
-        """Continue the uploads that wait for another list to be written."""
+        """Continue the uploads whose turn has come."""
         for upload in self._in(Waiting, Complete):
             if upload not in self._in(Waiting, Complete):
                 # The end of one before it has continued this one.
                 continue
-            is_complete = isinstance(upload.state, Complete)
-            refusal = self._missions.acquire(upload) if is_complete else self._missions.occupied()
-            if refusal is OCCUPIED:
-                return
-            self._handle(upload, Turn() if refusal is None else Ended(refusal), now)
+            if isinstance(upload.state, Complete):
+                refusal = self._missions.acquire(upload)
+            else:
+                refusal = OCCUPIED if self._must_wait(now) else self._missions.occupied()
+            if refusal is not OCCUPIED:
+                self._handle(upload, Turn() if refusal is None else Ended(refusal), now)
+
+    def _must_wait(self, now: float) -> bool:
+        """True if the list of another upload is arriving as it should."""
+        if not self._in(Asking, Receiving, Complete):
+            return False
+        return now < self._arriving_since + _ALONE_S and len(self._uploads) <= _MOST_IN_TURN
 
     def _handle(self, upload: _Upload, event: Event, now: float) -> None:
         """Change the state by the table."""
         before = upload.state
         if TRANSITIONS[type(before)][type(event)] is None:
-            self._forget(upload)
+            self._forget(upload, now)
         match event:
             case Turn() if isinstance(before, Complete):
                 if before.verdict.result is Result.REJECTED or self._post.allows(upload.station, Cost.FLASH):
@@ -264,9 +281,13 @@ class MissionUploads:
                     self._deliver(upload, before.received, before.verdict, now)
                 else:
                     self._handle(upload, Ended(Refusal(MissionResult.DENIED, TOO_MANY_WRITES)), now)
-            case Turn():
+            case Turn() if upload.count:
+                if not self._in(Asking, Receiving) and now >= self._last_end + _PAUSE_S:
+                    self._arriving_since = now
                 upload.state = Asking(now)
                 self._ask(now)
+            case Turn():
+                self._handle(upload, Judged((), CLEARED_LIST), now)
             case Ready(check):
                 upload.state = state = Receiving(now, upload.count, check)
                 self._note("mission.upload_started", upload, count=upload.count)
@@ -282,7 +303,8 @@ class MissionUploads:
             if upload in self._uploads:
                 self._handle(upload, Ended(refusal), now)
 
-    def _forget(self, upload: _Upload) -> None:
+    def _forget(self, upload: _Upload, now: float) -> None:
+        self._last_end = now
         self._uploads.remove(upload)
         self._missions.release(upload)
 
@@ -300,7 +322,7 @@ class MissionUploads:
             upload.count = count
             return True
         if count != upload.count or isinstance(state, Complete):
-            self._forget(upload)
+            self._forget(upload, now)
             return False
         if isinstance(state, Receiving):
             state.announced_again = bool(state.items)

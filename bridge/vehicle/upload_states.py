@@ -22,7 +22,7 @@ class Event:
 
 
 class Turn(Event):
-    """No list is being written."""
+    """The other transfers have ended, or do not count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ class UploadState(ABC):
 
 
 class Waiting(UploadState):
-    """Another list is being written. Mission Planner repeats its MISSION_COUNT for 2.8 s."""
+    """Another transfer runs. Mission Planner repeats its MISSION_COUNT for 2.8 s."""
 
     seconds = 2.5
     timeout = OCCUPIED
@@ -186,9 +186,9 @@ class Delivering(UploadState):
     timeout = Refusal(MissionResult.DENIED, "Still writing the mission: wait for the result")
 
 
-#: State -> event -> next state, None at the end; any other event in a state is a bug. A clear begins as Complete.
+#: State -> event -> next state, None at the end; any other event in a state is a bug. A clear asks for nothing first.
 TRANSITIONS: Mapping[type[UploadState], Mapping[type[Event], type[UploadState] | None]] = {
-    Waiting: {Turn: Asking, Ended: None},
+    Waiting: {Turn: Asking, Judged: Complete, Ended: None},
     Asking: {Ready: Receiving, Ended: None},
     Receiving: {Judged: Complete, Ended: None},
     Complete: {Turn: Delivering, Ended: None},

@@ -232,14 +232,13 @@ def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> Non
 
 
 def test_two_that_press_write_together_both_succeed() -> None:
-    """Both lists arrive side by side; the one that is whole last is written last."""
+    """The second one's MISSION_COUNT is repeated for 2.8 s, and answered when its turn has come."""
     world, station = holding()
     second = GroundStation(world, "second", sysid=254, air=Air(delay_s=0.002))
     station.air = Air(delay_s=0.002)
-    uploads = [Upload(station, waypoints(100)), Upload(second, waypoints(30, 1))]
-    world.wait_until(lambda _: all(upload.result is not None for upload in uploads), 10)
-    assert [upload.result for upload in uploads] == [A.ACCEPTED, A.ACCEPTED]
-    assert world.stored == records_of(waypoints(100))
+    uploads = [Upload(station, waypoints(100)), Upload(second, waypoints(30, 1), repeat_s=0.7, tries=4)]
+    assert [upload.run() for upload in uploads] == [A.ACCEPTED, A.ACCEPTED]
+    assert world.stored == records_of(waypoints(30, 1))
     assert [upload.requested for upload in uploads] == [list(range(100)), list(range(30))]
 
 
@@ -248,9 +247,13 @@ def test_a_slow_ground_station_holds_up_no_other() -> None:
     receiving(world, slow, waypoints(4, 1), 0)
     for seq in range(4):
         world.after(4.9 * (seq + 1), lambda seq=seq: slow.send(item_message(seq, waypoints(4, 1)[seq])))  # type: ignore[misc]
+    world.run(2)
+    # The first of these waits for its turn until the slow list has been arriving for 4 s.
     for number in range(3):
         plan = waypoints(30, number)
-        assert Upload(GroundStation(world, f"{number}"), plan).run() is A.ACCEPTED
+        assert (
+            Upload(GroundStation(world, f"{number}", sysid=number + 1), plan, repeat_s=0.7, tries=4).run() is A.ACCEPTED
+        )
         assert world.stored == records_of(plan)
     world.run(20)
     assert acks(slow) == [A.ACCEPTED]
@@ -282,6 +285,23 @@ def hanging_push(world: World) -> None:
 
 def test_a_ground_station_whose_turn_does_not_come_is_denied() -> None:
     world, station = holding()
+    second = GroundStation(world, "second", sysid=254)
+    receiving(world, station, waypoints(50), 10)
+    for seq in range(10, 40):
+        world.after((seq - 9) * 0.1, lambda seq=seq: station.send(item_message(seq, waypoints(50)[seq])))  # type: ignore[misc]
+    for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
+        second.send(message)
+    world.run(2.4)
+    assert second.said("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
+    world.run(0.2)
+    assert acks(second) == [A.DENIED]
+    assert second.texts() == ["Another mission transfer is running"]
+    assert "Another mission transfer is running" not in station.texts()
+    assert state(world) is Receiving
+
+
+def test_a_ground_station_is_denied_while_the_command_line_writes() -> None:
+    world, station = holding()
     hanging_push(world)
     for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
         station.send(message)
@@ -310,13 +330,17 @@ def test_a_list_whose_turn_to_be_written_does_not_come_is_denied() -> None:
 @pytest.mark.parametrize("message", [count_message(0), ack_message(A.OPERATION_CANCELLED)])
 def test_a_ground_station_that_waits_may_cancel(message: Message) -> None:
     world, station = holding()
-    hanging_push(world)
-    station.send(count_message(5))
-    station.send(message)
+    second = GroundStation(world, "second", sysid=254)
+    receiving(world, station, waypoints(8), 3)
+    second.send(count_message(5))
+    second.send(message)
     world.run(0.1)
-    assert acks(station) == [A.OPERATION_CANCELLED]
-    world.run(5)
-    assert world.stored == records_of(waypoints(3))
+    assert acks(second) == [A.OPERATION_CANCELLED]
+    for seq in range(3, 8):
+        station.send(item_message(seq, waypoints(8)[seq]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(waypoints(8))
 
 
 def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
