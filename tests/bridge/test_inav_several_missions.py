@@ -257,6 +257,25 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
     assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
 
 
+def test_a_list_that_another_client_is_writing_is_told_once_it_is_complete() -> None:
+    bench = Bench(9)
+    before = len(bench.station.texts())
+    mission = bench.board._firmware._mission  # type: ignore[union-attr]
+    for number in range(1, 31):
+        mission.write(number, waypoint(number, flag=FLAG_LAST if number == 30 else 0))
+        bench.world.run(0.1)
+    bench.world.run(2)
+    told = " ".join(bench.station.texts()[before:])
+    assert told == "Mission on the flight controller changed: 30 records"
+
+
+def test_a_list_that_another_client_left_unfinished_is_told() -> None:
+    bench = Bench(9)
+    bench.board._firmware._mission.write(1, waypoint(1))  # type: ignore[union-attr]
+    bench.world.run(2)
+    assert "Mission on the flight controller changed: 0 records" in bench.told()
+
+
 def test_a_multiwii_is_not_read_in_flight() -> None:
     """Its reply to a read would be the record that it flies."""
     board, world, station = board_with("multiwii")

@@ -45,6 +45,8 @@ class InavMissions(NavMissions):
     _before_loaded = 0
     #: GETINFO's reply and the selected mission, as of the last read or write.
     _seen: tuple[NavInfo, int] | None = None
+    #: The same, as of the last check for changes.
+    _last_look: tuple[NavInfo, int] | None = None
 
     @property
     def others(self) -> tuple[Mission, ...]:
@@ -82,8 +84,17 @@ class InavMissions(NavMissions):
         return None
 
     def is_current(self) -> Conversation[bool]:
-        """Read GETINFO and the selected mission: the sticks or another client may have changed either."""
-        seen = yield from self._look()
+        """Read GETINFO, the selected mission and some records: the sticks or another client may have changed them.
+
+        A list that is incomplete, with another size each time, is still being written: what becomes of it shows later.
+        """
+        seen, before = (yield from self._look()), self._last_look
+        self._last_look = seen
+        if seen is not None and not seen[0].is_valid and seen != before:
+            return True
+        return (yield from self._is_unchanged(seen))
+
+    def _is_unchanged(self, seen: tuple[NavInfo, int] | None) -> Conversation[bool]:
         if seen is None or seen != self._seen:
             return seen is None
         before = 0 if self._vehicle.armed else self._before_loaded
@@ -153,7 +164,7 @@ class InavMissions(NavMissions):
         self._seen = yield from self._look()
 
     def _confirm(self, before: Mission | None) -> Conversation[Mission | None]:
-        if (yield from self.is_current()):
+        if (yield from self._is_unchanged((yield from self._look()))):
             return before
         # Another client has written or loaded a list since: its other missions must be kept, too.
         yield from self.pull()
@@ -174,7 +185,7 @@ class InavMissions(NavMissions):
         """Make it LOAD the saved missions: the old list, unless another client wrote one without saving it."""
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0, tries=1)
-            return bool(before) and (yield from self.is_current())
+            return bool(before) and (yield from self._is_unchanged((yield from self._look())))
         return False
 
     def _info_after_save(self) -> Conversation[NavInfo | None]:
