@@ -10,7 +10,7 @@
 #   make pictures       retake the docs' pictures of the status page
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts)
 #   make soak           run the daemon through all kinds of events for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
-#   make fuzz           feed the bridge random input, 20,000 examples of up to 20 inputs per interface (EXAMPLES=500000)
+#   make fuzz           10,400,000 random inputs over UDP, TCP and UART and in files: hours (EXAMPLES=500: a 26th of them)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13)
@@ -77,7 +77,7 @@ soak: $(VENV)/.test-ready
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
 
 fuzz: $(VENV)/.test-ready
-	FUZZ_EXAMPLES=$(or $(EXAMPLES),20000) $(BIN)/python -m pytest tests/bridge/test_fuzz.py --timeout 0 --numprocesses $(JOBS) $(ARGS)
+	FUZZ_EXAMPLES=$(or $(EXAMPLES),13000) $(BIN)/python -m pytest tests/bridge/test_fuzz.py --timeout 0 --numprocesses $(JOBS) $(ARGS)
 
 deb: $(VENV)/.demo-ready
 	$(BIN)/python -m deb.build $(ARCH)

@@ -1,88 +1,123 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Anything over UDP, the UART and in files: nothing raises.
+"""Anything over UDP, TCP, the UART and in files: nothing raises.
 
-`make fuzz` draws more of it. What failed is kept in .hypothesis/fuzz and drawn first the next time.
+`make fuzz` draws more of it. The seeds of what failed are kept in .hypothesis/fuzz and drawn first the next time.
 """
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
-from hypothesis import HealthCheck, given, settings
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from hypothesis.database import DirectoryBasedExampleDatabase
 
-from protocols.mavlink.codec import FrameWriter, Packed
-from protocols.mavlink.dialect import CRC_EXTRA
+from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_file import MissionFileError, read_mission_file
-from protocols.msp.frame import Direction, MspFrame
+from protocols.tlog import read_tlog, tlog_record
+from protocols.uart_capture import read_capture
+from storage.mission_store import StoreError, open_store
+from tests.support.fuzz_inputs import FuzzInputs
+from tests.support.sample_missions import mission
 from tests.support.world import GroundStation, World
 
-EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "150"))
+REPOSITORY = Path(__file__).parents[2]
+EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "15"))
 #: In one example, so that what one input leaves behind meets the next.
-AT_ONCE = 20
-_fuzz = settings(
-    max_examples=EXAMPLES,
-    database=DirectoryBasedExampleDatabase(".hypothesis/fuzz"),
-    suppress_health_check=list(HealthCheck),
-)
-
-noise = st.binary(max_size=300)
-frames = st.builds(
-    lambda msgid, payload, sysid, version: FrameWriter(sysid, 190).frame(
-        Packed(msgid, payload, payload or b"\0"), version
-    ),
-    st.sampled_from(sorted(msgid for msgid in CRC_EXTRA if msgid < 256)),
-    st.binary(max_size=255),
-    st.integers(0, 255),
-    st.sampled_from((1, 2)),
-)
-replies = st.builds(
-    lambda direction, command, payload: MspFrame(direction, command, payload).encode(),
-    st.sampled_from(list(Direction)),
-    st.integers(0, 255),
-    st.binary(max_size=255),
-)
+AT_ONCE = 200
+#: The bridge acts on so many at a time.
+TOGETHER = 10
 
 
-def cut(whole: st.SearchStrategy[bytes]) -> st.SearchStrategy[bytes]:
-    """Frames as they are, cut, or behind noise."""
-    short = st.builds(lambda data, end: data[:end], whole, st.integers(0, 300))
-    return whole | short | st.builds(lambda before, data: before + data, noise, whole)
+def _fuzz(test: Callable[..., Any]) -> Callable[..., Any]:
+    options = settings(
+        max_examples=EXAMPLES,
+        database=DirectoryBasedExampleDatabase(".hypothesis/fuzz"),
+        phases=(Phase.explicit, Phase.reuse, Phase.generate),  # a smaller seed is no simpler
+        suppress_health_check=list(HealthCheck),
+        deadline=None,
+    )
+    return options(given(seed=st.integers(0, (1 << 64) - 1))(test))
 
 
 @_fuzz
-@given(st.lists(st.tuples(st.integers(0, 3), cut(frames) | noise, st.booleans()), max_size=AT_ONCE))
-def test_ground_stations(spoken: list[tuple[int, bytes, bool]]) -> None:
+def test_ground_stations(seed: int) -> None:
+    inputs = FuzzInputs(seed)
     world = World(speeds=(115200,))
     world.wait_ready()
     stations = [GroundStation(world, str(number), sysid=250 + number) for number in range(4)]
-    for number, data, is_datagram in spoken:
-        world.spoken_by(stations[number], data, datagram=is_datagram)
-        world.run(0.01)
+    for number in range(AT_ONCE):
+        station = inputs.random.choice(stations)
+        world.spoken_by(station, inputs.from_a_ground_station(), datagram=inputs.random.random() < 0.5)
+        if number % TOGETHER == 0:
+            world.run(0.01)
     world.run(1)
 
 
 @_fuzz
-@given(st.lists(cut(replies) | cut(frames) | noise, max_size=AT_ONCE), st.booleans())
-def test_the_uart(heard: list[bytes], is_found: bool) -> None:
+def test_the_uart(seed: int) -> None:
+    inputs = FuzzInputs(seed)
     world = World(speeds=(115200,))
-    if is_found:
+    if inputs.random.random() < 0.7:
         world.wait_ready()
-    for data in heard:
-        world.hear(data)
-        world.run(0.01)
+    for number in range(AT_ONCE):
+        world.hear(inputs.from_the_uart())
+        if number % TOGETHER == 0:
+            world.run(0.01)
     world.run(1)
 
 
 @_fuzz
-@given(
-    st.binary(max_size=2000)
-    | st.text(max_size=500).map(lambda text: ("QGC WPL 110\n" + text).encode())
-    | st.lists(st.text("0123456789.-eNaIn \t", max_size=30), max_size=40).map(
-        lambda words: ("QGC WPL 110\n" + "\t".join(words)).encode()
-    )
-    | st.text('{}[]",:0123456789.eE-missionitemsfileType ', max_size=400).map(str.encode)
-)
-def test_mission_files(data: bytes) -> None:
-    with suppress(MissionFileError):
-        read_mission_file(data, "fuzz")
+def test_mission_files(seed: int) -> None:
+    inputs = FuzzInputs(seed)
+    for _ in range(AT_ONCE):
+        with suppress(MissionFileError):
+            read_mission_file(inputs.like(mission_files()), "fuzz")
+
+
+@_fuzz
+def test_logs_and_captures(seed: int) -> None:
+    inputs = FuzzInputs(seed)
+    for _ in range(AT_ONCE // 2):
+        frames = MavlinkSplitter().feed(b"".join(inputs.from_a_ground_station() for _ in range(3)))
+        log = b"".join(tlog_record(frame.raw, number) for number, frame in enumerate(frames))
+        list(read_tlog(inputs.damaged(log), {0, 30} if inputs.random.random() < 0.5 else None))
+        read_capture(inputs.like(captures()))
+
+
+@pytest.fixture(scope="module")
+def store_file(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("store") / "missions.db"
+    with open_store(path, 0.0).store as store:
+        for tag in range(1, 6):
+            store.conclude(store.add(mission(tag)), "VERIFIED", "", 2.0)
+    return path.read_bytes()
+
+
+@_fuzz
+def test_mission_stores(store_file: bytes, seed: int) -> None:
+    inputs = FuzzInputs(seed)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "missions.db"
+        for _ in range(AT_ONCE // 100):
+            path.write_bytes(inputs.like([store_file]))
+            with suppress(StoreError), open_store(path, 0.0).store as store:
+                for line in store.list(100):
+                    with suppress(StoreError):
+                        store.get(line.number)
+
+
+@cache
+def mission_files() -> list[bytes]:
+    return [path.read_bytes() for kind in ("*.plan", "*.waypoints") for path in (REPOSITORY / "examples").glob(kind)]
+
+
+@cache
+def captures() -> list[bytes]:
+    """The beginnings: a whole capture takes too long."""
+    return [path.read_bytes()[:5000] for path in (REPOSITORY / "tests" / "captures").glob("*.uart")]
