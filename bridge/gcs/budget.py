@@ -45,12 +45,12 @@ class Budgets:
         own = self._peers.get((cost, peer))
         if own is None:
             own = self._peers[cost, peer] = TokenBucket(LIMITS[cost].each)
-        total = self._totals[cost]
-        if not own.has(now) or not (self._has_standing(peer) or total.has(now)):
+        total = None if self._has_standing(peer) else self._totals[cost]
+        if not own.has(now) or not (total is None or total.has(now)):
             self.exceeded[cost] += 1
             return False
         own.spend()
-        if not self._has_standing(peer):
+        if total is not None:
             total.spend()
         return True
 

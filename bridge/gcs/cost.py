@@ -19,6 +19,7 @@ class Rate:
 class Cost(Enum):
     """The limited kinds of work.
 
+    RECEIVED: a datagram or a read from a connection.
     ANSWER: a message sent on request. Mission Planner requests about twenty when it connects.
     TRANSFER: a message of a mission transfer; over a fast link there may be a thousand items a second.
     TEXT: a STATUSTEXT that a station causes; a mission of 146 items may need one for each.
@@ -29,6 +30,7 @@ class Cost(Enum):
     RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
 
+    RECEIVED = auto()
     ANSWER = auto()
     TRANSFER = auto()
     TEXT = auto()
@@ -48,6 +50,7 @@ class Limit:
 
 
 LIMITS = {
+    Cost.RECEIVED: Limit(Rate(1500, 3000), Rate(15000, 15000)),
     Cost.ANSWER: Limit(Rate(50, 200), Rate(500, 1000)),
     Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 2000)),
     Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),

@@ -157,6 +157,12 @@ class Ground:
         # Our own frames come back from a broadcast, or from a router that floods.
         return [frame for frame in frames if (frame.sysid, frame.compid) != (self._sysid, self._compid)]
 
+    def admits(self, peer: Peer, now: float) -> bool:
+        """False if a frame is not to be noted, because it comes from one of too many new addresses."""
+        standing = self._standing(peer)
+        is_listener = standing is Standing.LISTENER
+        return standing is Standing.PROVEN or self._stations.admits(peer, now, is_listener=is_listener)
+
     def heard(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
         """Note a frame from a peer, which counts as connected from now on."""
         self.frames_received[peer.link, frame.msgid] += 1

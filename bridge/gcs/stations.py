@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
+from bridge.gcs.budget import TokenBucket
+from bridge.gcs.cost import Rate
 from bridge.gcs.station import Peer, Station
 
 #: A UDP peer that is silent for this long has left; a TCP peer leaves with its connection.
@@ -16,6 +18,8 @@ MOVED_S = 5.0
 MAX_PEERS = 32
 #: The same for peers that may only read, so that they take no slot from those with the key.
 MAX_LISTENERS = 8
+#: Newcomers to a full link. Each costs as much as dozens of frames, and addresses may be made up by the thousand.
+_NEWCOMERS = Rate(100, 100)
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
 #: Ids behind one peer: a radio or a router may carry several.
@@ -44,6 +48,10 @@ def displaced(peers: Mapping[Peer, float]) -> Peer:
     return min(later, key=lambda peer: (-hosts[peer.host], peers[peer]))
 
 
+def _slots(*, is_listener: bool) -> int:
+    return MAX_LISTENERS if is_listener else MAX_PEERS
+
+
 class Stations:
     """The peers that were heard. Each is answered in its own version: MAVLink 2 once it has sent that.
 
@@ -52,8 +60,21 @@ class Stations:
 
     def __init__(self) -> None:
         self._known: dict[Peer, _Known] = {}  # in order of arrival
+        self._newcomers = TokenBucket(_NEWCOMERS)
+        self._seniors: set[Peer] | None = None  # counted again after each change
         self._displaced: list[Peer] = []
         self._expiry_due: float | None = None
+
+    def admits(self, peer: Peer, now: float, *, is_listener: bool) -> bool:
+        """Count a frame of an unproven peer; False if it is a newcomer to a full link and there are too many."""
+        if peer in self._known:
+            return True
+        if len(self._alongside(peer.link, is_listener=is_listener)) < _slots(is_listener=is_listener):
+            return True
+        if not self._newcomers.has(now):
+            return False
+        self._newcomers.spend()
+        return True
 
     def heard(self, station: Station, version: int, now: float, *, is_listener: bool = False) -> bool:
         """Note a frame from a station; True if its peer is new."""
@@ -68,26 +89,31 @@ class Stations:
 
     def _add(self, peer: Peer, version: int, is_listener: bool, now: float) -> _Known:
         self._known.pop(peer, None)
-        rivals = {
-            other: known.heard_at
-            for other, known in self._known.items()
-            if other.link == peer.link and known.is_listener == is_listener
-        }
-        if len(rivals) >= (MAX_LISTENERS if is_listener else MAX_PEERS):
+        self._seniors = None
+        rivals = self._alongside(peer.link, is_listener=is_listener)
+        if len(rivals) >= _slots(is_listener=is_listener):
             other = displaced(rivals)
             del self._known[other]
             self._displaced.append(other)
-            self._expiry_due = now
         added = self._known[peer] = _Known(version, is_listener, now, now)
         return added
 
+    def _alongside(self, link: str, *, is_listener: bool) -> dict[Peer, float]:
+        """When each peer of this kind on a link was last heard."""
+        return {
+            other: known.heard_at
+            for other, known in self._known.items()
+            if other.link == link and known.is_listener == is_listener
+        }
+
     def is_senior(self, peer: Peer) -> bool:
         """True if a peer belongs to the half of its full link that arrived first."""
-        known = self._known.get(peer)
-        if known is None:
-            return False
-        same = [other for other, its in self._known.items() if (other.link, its.is_listener) == (peer.link, False)]
-        return peer in same[: MAX_PEERS // 2]
+        if self._seniors is None:
+            self._seniors = set()
+            for link in {other.link for other in self._known}:
+                same = [other for other, its in self._known.items() if other.link == link and not its.is_listener]
+                self._seniors.update(same[: MAX_PEERS // 2])
+        return peer in self._seniors
 
     def is_unknown(self, peer: Peer) -> bool:
         """True if nothing was heard from `peer`."""
@@ -101,22 +127,23 @@ class Stations:
     def gone(self, peer: Peer) -> None:
         """The peer's connection is closed."""
         self._known.pop(peer, None)
+        self._seniors = None
 
     def expire(self, now: float) -> list[Peer]:
         """Forget silent peers; returns them and those displaced by others."""
-        if self._expiry_due is None or now < self._expiry_due:
-            return []
-        silent = [peer for peer, known in self._known.items() if now >= self._expires_at(peer, known)]
-        for peer in silent:
-            del self._known[peer]
-        silent += [peer for peer in self._displaced if peer not in self._known]
+        silent = [peer for peer in self._displaced if peer not in self._known]
         self._displaced.clear()
-        self._expiry_due = min((self._expires_at(peer, known) for peer, known in self._known.items()), default=None)
+        if self._expiry_due is not None and now >= self._expiry_due:
+            silent += [peer for peer, known in self._known.items() if now >= self._expires_at(peer, known)]
+            for peer in silent:
+                self._known.pop(peer, None)
+            self._seniors = None
+            self._expiry_due = min((self._expires_at(peer, known) for peer, known in self._known.items()), default=None)
         return silent
 
     def next_deadline(self) -> float | None:
         """The earliest time that a peer may expire; may be too early, which saves a search on each frame."""
-        return self._expiry_due
+        return 0.0 if self._displaced else self._expiry_due
 
     def peers(self) -> list[Peer]:
         """All connected peers."""

@@ -46,10 +46,15 @@ class Incoming:
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
         """Handle bytes from a ground station. A datagram holds whole frames only."""
+        if not self._ground.budgets.allows(Cost.RECEIVED, peer, now):
+            return
         for frame in self._ground.received(peer, data, now, datagram=datagram):
             refused = self._guard.refusal(peer, frame)
             if refused is not None and refused.is_forged:
                 continue
+            if not self._ground.admits(peer, now):
+                self._guard.forget(peer)
+                return
             self._ground.heard(peer, frame, now)
             station = Station(peer, frame.sysid, frame.compid)
             if refused is not None:

@@ -30,6 +30,8 @@ from protocols.msp.commands import Msp
 _TICK_S = 1.0
 #: Mission Planner needs two heartbeats to connect.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
+#: Home, and what prevents arming, are repeated for newcomers no more often.
+_REPEAT_S = 5.0
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
@@ -79,6 +81,8 @@ class OwnVehicle:
             CURRENT_MODE: lambda: vehicle_messages.current_mode(self._moment()),
         }
         self._announced_home: Home | None = None
+        self._is_news_wanted = False
+        self._repeated_at = -inf
         self._told_blockers: tuple[str, ...] = ()
         self._has_told_failsafe = False
         self._also_wanted: Mapping[type[Reading], float] = {}
@@ -89,13 +93,15 @@ class OwnVehicle:
         self._announced: _ShownState | None = None
 
     def newcomer(self, peer: Peer) -> None:
-        """Greet a new ground station with faster heartbeats, so that it connects sooner, and with home."""
-        self._announced_home = None
-        self._told_blockers = ()
+        """Greet a new ground station with faster heartbeats, so that it connects sooner, and soon with home."""
+        self._is_news_wanted = True
         self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
         self._ground.greet(peer, self._make_heartbeat())
-        self._set_polls(self._ground.everyone())
+        everyone = self._ground.everyone()
+        if len(everyone) == 1:
+            # Beside others its rates are counted at the next tick: addresses may be made up by the thousand.
+            self._set_polls(everyone)
 
     def tick(self, now: float) -> None:
         """Send the messages that are due."""
@@ -117,6 +123,9 @@ class OwnVehicle:
         if self._is_lost():
             # No reading triggers it now.
             self._send(_SYS_STATUS, self._moment(), self._rates.take_due(_SYS_STATUS.msgid, everyone, now))
+        if self._is_news_wanted and now >= self._repeated_at + _REPEAT_S:
+            self._is_news_wanted, self._repeated_at = False, now
+            self._announced_home, self._told_blockers = None, ()
         self._announce_home()
 
     def next_deadline(self) -> float:

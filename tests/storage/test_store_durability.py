@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was acknowledged is there after a kill -9, and after a power cut that tore what was being written."""
 
+import os
 import random
 import shutil
 import subprocess
@@ -12,6 +13,9 @@ import pytest
 
 from storage.mission_store import open_store
 from tests.support.sample_missions import mission
+
+#: `make soak` does it 200 times.
+KILLS = int(os.environ.get("STORE_KILLS", "8"))
 
 # Adds and concludes as fast as it can, and says so only when the store has returned.
 WRITER = """
@@ -30,12 +34,11 @@ while True:
 """
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, seed: int) -> None:
+def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "missions.db"
-    chance = random.Random(seed)
+    chance = random.Random(1)
     acknowledged: dict[int, str] = {}
-    for _ in range(4):
+    for kill in range(1, KILLS + 1):
         writer = subprocess.Popen(
             [sys.executable, "-c", WRITER, str(path)],
             stdout=subprocess.PIPE,
@@ -59,7 +62,9 @@ def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, seed: int) -
                 assert stored is not None
                 assert stored.received == mission(number, items=40)
                 assert outcome == "PENDING" or stored.detail == f"answer {number}"
-            assert len(store.list(10_000)) <= len(acknowledged) + 4  # a round's last one may be there unsaid
+            assert len(store.list(100_000)) <= len(acknowledged) + kill  # a round's last one may be there unsaid
+    with capsys.disabled():
+        print(f"\n{KILLS} x kill -9: all {len(acknowledged)} acknowledged missions are there")  # noqa: T201
 
 
 def _whole(line: str) -> bool:

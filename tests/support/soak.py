@@ -171,7 +171,7 @@ class Weather(threading.Thread):
 
 
 class Crowd:
-    """Ground stations that come, go, stall, move, talk rubbish, and write missions."""
+    """Ground stations that come, go, stall, move, talk rubbish, and write missions; and strangers that attack."""
 
     def __init__(self, daemon: Daemon, udp_port: int, tcp_port: int, chance: random.Random) -> None:
         self._daemon = daemon
@@ -179,10 +179,12 @@ class Crowd:
         self._tcp_port = tcp_port
         self._chance = chance
         self._stalled: list[socket.socket] = []
+        self._dawdlers: list[socket.socket] = []
         self.happened: Counter[str] = Counter()
         self.uploads: Counter[str] = Counter()
         self._kinds: list[Callable[[Board], None]] = [self._upload, self._upload, self._upload, self._download]
         self._kinds += [self._pass_by, self._move, self._babble, self._look_in, self._stall, self._stall, self._hammer]
+        self._kinds += [self._flood, self._change_addresses, self._dawdle]
 
     def act(self, board: Board) -> None:
         """Do one thing."""
@@ -192,9 +194,10 @@ class Crowd:
 
     def leave(self) -> None:
         """All who hold a connection hang up."""
-        for client in self._stalled:
+        for client in (*self._stalled, *self._dawdlers):
             client.close()
         self._stalled.clear()
+        self._dawdlers.clear()
 
     def writes(self, board: Board) -> bool:
         """Write a mission; if it is accepted (true), it is what the board holds."""
@@ -276,6 +279,36 @@ class Crowd:
                 except OSError:
                     # The daemon does not read on, or has hung up.
                     return
+
+    def _flood(self, board: Board) -> None:
+        """Ask for everything as fast as can be."""
+        asked = [
+            m.MAVLink_param_request_list_message(1, 1),
+            m.MAVLink_mission_count_message(1, 1, 9),
+            m.MAVLink_mission_request_list_message(1, 1),
+            m.MAVLink_command_long_message(1, 1, 42428, 0, 0, 0, 0, 0, 0, 0, 0),
+            m.MAVLink_command_long_message(1, 1, 511, 0, 30, 1, 0, 0, 0, 0, 0),
+        ]
+        frames = [FrameWriter(66, 190).frame(pack(message), 2) for message in asked]
+        with self._udp() as client:
+            for number in range(2000):
+                client.send(frames[number % len(frames)])
+
+    def _change_addresses(self, board: Board) -> None:
+        """Speak from hundreds of addresses, once from each."""
+        for _ in range(300):
+            with self._udp() as client:
+                self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=65)
+
+    def _dawdle(self, board: Board) -> None:
+        """Announce a list and give only its first item."""
+        client = self._udp()
+        self._say(client, m.MAVLink_mission_count_message(1, 1, 100), sysid=64)
+        self._rest()
+        self._say(client, m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1, 1, 9.0), sysid=64)
+        self._dawdlers.append(client)
+        if len(self._dawdlers) > _MAX_STALLED:
+            self._dawdlers.pop(0).close()
 
     def _rest(self) -> None:
         time.sleep(self._chance.uniform(0.0, 0.5))
