@@ -20,7 +20,7 @@ def explain_port_error(path: str, error: OSError) -> str:
         # pyserial hides the number; termios.error has one, too, but is no OSError.
         code = cause.args[0]
     if not Path(path).exists():
-        return f"{path} is missing: plug the flight controller in, or name another port with --fc"
+        return f"{path} is missing: plug the flight controller in, or name another port (fc)"
     if code in (errno.EACCES, errno.EPERM):
         return f"{path}: no permission; add the user to the group that owns it: sudo usermod -aG dialout $USER"
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):

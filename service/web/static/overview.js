@@ -30,7 +30,7 @@ export function showOverview(state) {
   pairs("link", [
     ["Firmware", state.link.flight_controller ?? "not found yet"],
     ["Protocol", state.link.state],
-    ["Port", state.port.address + (state.link.speed_baud ? `, ${state.link.speed_baud} baud` : "")],
+    ["Port", state.link.speed_baud ? `${state.port.address.replace(/,\d+$/, "")}, ${state.link.speed_baud} baud` : state.port.address],
     ["Line", rates.get("fc") ?? "–"],
     ["Round trip", known(state.link.round_trip_ms, " ms", 1)],
     ["Unanswered", known(state.link.requests_lost)],
