@@ -6,7 +6,7 @@ import struct
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge.controllers.harakiri import profile as harakiri
@@ -162,7 +162,8 @@ def test_an_unpatched_harakiri_that_answers_msp_is_told_what_it_lacks() -> None:
     assert Upload(station, waypoints(5)).run() is A.UNSUPPORTED
 
 
-@given(st.integers(-1_800_000_000, 1_800_000_000) | st.integers(-1000, 1000))
+@example(3384)
+@given(st.integers(-1_800_000_000, 1_800_000_000) | st.integers(-20_000_000, 20_000_000) | st.integers(-1000, 1000))
 def test_a_place_that_was_read_is_written_as_it_was_read(value_e7: int) -> None:
     readable = readable_e7(value_e7)
     assert readable_e7(readable) == readable

@@ -5,6 +5,7 @@ Not every degrees * 1e7 survives that: `readable_e7` is the nearest one that rea
 """
 
 import math
+from itertools import chain
 
 from protocols.float32 import neighbours, single
 
@@ -20,7 +21,9 @@ def degrees_to_send(value_e7: int) -> float:
     """The degrees in single precision whose reading is closest to `value_e7`."""
     if value_e7 == 0:
         return 0.0
-    return min(neighbours(single(value_e7 / 1e7)), key=lambda degrees: abs(_read_back_e7(degrees) - value_e7))
+    # Each of the two conversions to an integer may lose one.
+    near = (neighbours(single((value_e7 + lost) / 1e7)) for lost in (0, 1, 2, -1, -2) if value_e7 + lost)
+    return min(chain.from_iterable(near), key=lambda degrees: abs(_read_back_e7(degrees) - value_e7))
 
 
 def degrees_read_e7(degrees: float) -> int:
