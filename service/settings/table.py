@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The table of all settings, used by the reader, the sample file, the reference page and the environment."""
 
+import re
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
@@ -35,6 +36,12 @@ def _endpoint(entry: object, _folder: Path) -> str:
     if not isinstance(entry, str) or "/" not in entry:
         raise Unfit(f'holds {entry!r}, which is no endpoint: write one like "tcp/192.168.4.1:7447"')
     return entry
+
+
+def _host_name(entry: object, _folder: Path) -> str:
+    if not isinstance(entry, str) or re.fullmatch(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*", entry) is None:
+        raise Unfit(f'holds {entry!r}, which is no host name: write one like "naze-1.example.ts.net"')
+    return entry.lower()
 
 
 KEYS = (
@@ -177,6 +184,12 @@ KEYS = (
         Text('"HOST:PORT"', parse_listen),
         "Address of the status page: 0.0.0.0:8080 for the whole network, 127.0.0.1:8080 for this machine only.",
         f'"{DEFAULT_LISTEN}"',
+    ),
+    Key(
+        "web.hosts",
+        Several('as in ["naze-1.example.ts.net"]', _host_name),
+        "Full names by which browsers may open the page; addresses and local names always work.",
+        "[]",
     ),
     Key(
         "web.token_file",

@@ -24,9 +24,10 @@ class ListenAddress:
 
 @dataclass(frozen=True, slots=True)
 class WebSettings:
-    """`token_file` None: `web-token` in the state directory."""
+    """`hosts`: further names of this machine. `token_file` None: `web-token` in the state directory."""
 
     listen: ListenAddress = ListenAddress()
+    hosts: tuple[str, ...] = ()
     token_file: Path | None = None
 
 

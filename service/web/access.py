@@ -8,7 +8,7 @@ else needs the token in a header, which no other site can make a browser send.
 
 import ipaddress
 import re
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Container, Mapping
 from http import HTTPStatus
 
 import structlog
@@ -38,7 +38,9 @@ MAX_FILE = 256 << 10
 #: Domains of local networks, which cannot be registered.
 _LOCAL = (".local", ".lan", ".home.arpa", ".internal", ".localhost")
 _HOST = re.compile(r"(?P<name>\[[^\]]*\]|[^:\[\]]+)(:[0-9]*)?")
-_WRONG_NAME = "Open this page by the Pi's address in numbers, or by its local name."
+_WRONG_NAME = (
+    "Open this page by the Pi's address in numbers or its local name, or add this name to the setting web.hosts."
+)
 _FAILED = "The daemon has failed to answer; its log says more."
 _log = structlog.get_logger()
 
@@ -51,8 +53,8 @@ class Refused(Exception):
         self.status = status
 
 
-def is_local_name(host: str) -> bool:
-    """True if a Host header can only mean this machine: an address, a name without dots, or a local one."""
+def is_own_name(host: str, known: Container[str]) -> bool:
+    """True if a Host header can only mean this machine: an address, a name without dots, a local or a known one."""
     named = _HOST.fullmatch(host)
     if named is None:
         return False
@@ -60,7 +62,7 @@ def is_local_name(host: str) -> bool:
     try:
         ipaddress.ip_address(name)
     except ValueError:
-        return "." not in name or name.lower().endswith(_LOCAL)
+        return "." not in name or name.lower().endswith(_LOCAL) or name.lower() in known
     return True
 
 
@@ -79,7 +81,7 @@ def guarded(handler: Handler, max_body: int = 0) -> Handler:
 
     async def answer(request: Request) -> Response:
         try:
-            if not is_local_name(request.headers.get("host", "")):
+            if not is_own_name(request.headers.get("host", ""), request.app.state.hosts):
                 raise Refused(HTTPStatus.MISDIRECTED_REQUEST, _WRONG_NAME)
             _check_body(request, max_body)
             return await handler(request)

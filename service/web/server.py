@@ -37,7 +37,7 @@ class WebServer:
     def __init__(self, daemon: Daemon, settings: WebSettings) -> None:
         self._address = settings.listen
         self._api = Api(daemon, settings, _token(daemon, settings))
-        self._config = _config(self._api)
+        self._config = _config(self._api, settings.hosts)
         self._state = ServerState()
         self._door = Door()
         self._listening: asyncio.Task[None] | None = None
@@ -86,12 +86,13 @@ class WebServer:
         return H11Protocol(self._config, self._state, {})
 
 
-def _config(api: Api) -> Config:
+def _config(api: Api, hosts: tuple[str, ...]) -> Config:
     routes = [*api.routes(), *(Route(path, guarded(handler)) for path, handler in static_files())]
-    app = SafeHeaders(Starlette(routes=routes, exception_handlers={HTTPException: not_found}))
+    app = Starlette(routes=routes, exception_handlers={HTTPException: not_found})
+    app.state.hosts = hosts
     # uvicorn would log only the errors of browsers; ours are logged by `guarded`.
     return Config(
-        app,
+        SafeHeaders(app),
         lifespan="off",
         ws="none",
         proxy_headers=False,

@@ -90,6 +90,13 @@ def test_a_local_name_is_ours(lasting_web: WebBench, host: str) -> None:
     assert lasting_web.ask("/api/state", Host=host).status == 200
 
 
+def test_a_name_of_ones_own_is_a_setting(start: Starter) -> None:
+    page = web_daemon(start, web='hosts = ["Naze-1.example.ts.net"]')
+    for path in ("/", "/api/state", "/metrics"):
+        assert page.ask(path, Host="naze-1.Example.ts.net:8080").status == 200
+    assert page.ask("/api/state", Host="naze-2.example.ts.net").status == 421
+
+
 @pytest.mark.parametrize(
     "path",
     [

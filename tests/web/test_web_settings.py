@@ -18,9 +18,9 @@ def load(tmp_path: Path, text: str) -> WebSettings | None:
 
 def test_the_table(tmp_path: Path) -> None:
     assert load(tmp_path, "") is None
-    assert load(tmp_path, "[web]\n") == WebSettings(ListenAddress("127.0.0.1", 8080), None)
-    given = load(tmp_path, '[web]\nlisten = "[::]:80"\ntoken_file = "mine"\n')
-    assert given == WebSettings(ListenAddress("::", 80), tmp_path / "mine")
+    assert load(tmp_path, "[web]\n") == WebSettings(ListenAddress("127.0.0.1", 8080), (), None)
+    given = load(tmp_path, '[web]\nlisten = "[::]:80"\nhosts = ["Naze.example"]\ntoken_file = "mine"\n')
+    assert given == WebSettings(ListenAddress("::", 80), ("naze.example",), tmp_path / "mine")
     assert str(given.listen) == "[::]:80"
 
 
@@ -38,6 +38,7 @@ def test_one_word_in_the_environment_is_enough(tmp_path: Path, monkeypatch: pyte
         ("[web]\nlisten = '8080'", ["web.listen 8080", "needs a host and a port", "0.0.0.0:8080"]),
         ("[web]\nlisten = ':::80'", ["brackets"]),
         ("[web]\nlisten = '0.0.0.0:99999'", ["99999", "no port number"]),
+        ("[web]\nhosts = ['naze.example:8080']", ["web.hosts holds 'naze.example:8080'", "no host name"]),
         ("[web]\ntoken_file = ''", ["web.token_file is ''", "text in quotes"]),
         (
             "gcs = ['tcpin:127.0.0.1:8080']\n[web]",
