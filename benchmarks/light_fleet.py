@@ -22,6 +22,8 @@ from benchmarks.zenoh_programs import client, cpu_s
 
 _COUNTS = (1, 100, 400)
 _WATCHED_S = 20.0
+#: Each session has its own threads and shakes hands with the router: a second on a busy machine.
+_OPENING_S = 1.0
 _VEHICLES = """
 import json, sys, threading, time, zenoh
 endpoint, first, count = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
@@ -65,7 +67,7 @@ def main(counts: tuple[int, ...]) -> None:
             log, began_at = Path(name) / "vehicles.log", time.monotonic()
             command = [sys.executable, "-c", _VEHICLES, endpoint, "0", str(count)]
             vehicles = stack.enter_context(running(command, log))
-            wait_for(partial(_is_up, log), "the vehicles are up")
+            wait_for(partial(_is_up, log), "the vehicles are up", _OPENING_S * count + 30)
             opened_s = time.monotonic() - began_at
             heard = [0]
 

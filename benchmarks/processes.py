@@ -43,12 +43,12 @@ def running(command: Sequence[str], log: Path) -> Iterator[subprocess.Popen[byte
         process.wait()
 
 
-def wait_for(condition: Callable[[], bool], what: str) -> None:
+def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = _TIMEOUT_S) -> None:
     """Wait until `condition` holds; BenchmarkError if it takes too long."""
-    end = time.monotonic() + _TIMEOUT_S
+    end = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() > end:
-            raise BenchmarkError(f"timed out after {_TIMEOUT_S:.0f} s, waiting until {what}")
+            raise BenchmarkError(f"timed out after {timeout_s:.0f} s, waiting until {what}")
         time.sleep(_POLL_S)
 
 
