@@ -13,7 +13,7 @@ from itertools import count
 from types import TracebackType
 from typing import Self
 
-_DATAGRAM_SIZE = 2048
+_DATAGRAM_SIZE = 65535
 _LONGEST_SLEEP_S = 0.2
 
 
