@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from bridge.gcs.station import Severity
-from bridge.line.conversation import Conversation, LinkLost
+from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import check_list
-from bridge.missions.mission_service import NO_LINK, DeliveryResult, HeldMission
+from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from bridge.model.verdict import Result, Verdict
@@ -24,7 +24,6 @@ class LocalMissions:
     def __init__(self, context: MissionContext) -> None:
         self._context = context
         self._missions = context.missions
-        self._runner = context.runner
 
     def push(
         self,
@@ -54,10 +53,8 @@ class LocalMissions:
                 return _WOULD_ERASE
             return (yield from self._missions.deliver(arrived[0], on_progress))
 
-        def done(result: DeliveryResult | Refusal | LinkLost, _at: float) -> None:
+        def done(result: DeliveryResult | Refusal, _at: float) -> None:
             self._missions.release(owner)
-            if isinstance(result, LinkLost):
-                result = NO_LINK
             if arrived and isinstance(result, DeliveryResult):
                 severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
                 self._context.post.say(severity, f"{source}: {result.text}")
@@ -75,17 +72,13 @@ class LocalMissions:
         self._context.log_event("info", "mission.push_started", source=source, count=len(items), incident=incident)
         refusal = self._missions.acquire(owner)
         if refusal is None:
-            self._runner.start(conversation(), done, now)
+            self._context.run(conversation(), done, now)
         else:
             done(refusal, now)
 
     def pull(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
         """Read the flight controller's list."""
-
-        def done(held: HeldMission | Refusal | LinkLost, _at: float) -> None:
-            on_done(NO_LINK if isinstance(held, LinkLost) else held)
-
-        self._runner.start(self._missions.read_back(), done, now)
+        self._context.run(self._missions.read_back(), lambda held, _at: on_done(held), now)
 
     def check(
         self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
@@ -96,7 +89,4 @@ class LocalMissions:
             rules = yield from self._missions.rules()
             return rules if isinstance(rules, Refusal) else check_list(items, rules, self._context.vehicle.place())
 
-        def done(verdict: Verdict[Any] | Refusal | LinkLost, _at: float) -> None:
-            on_done(NO_LINK if isinstance(verdict, LinkLost) else verdict)
-
-        self._runner.start(conversation(), done, now)
+        self._context.run(conversation(), lambda verdict, _at: on_done(verdict), now)

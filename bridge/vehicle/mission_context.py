@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The parts of the bridge that work on missions shares."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 from bridge.gcs.station import Post
+from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import MissionService
+from bridge.missions.mission_service import NO_LINK, MissionService
 from bridge.model.events import EventLog, Incidents
+from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,3 +26,13 @@ class MissionContext:
     vehicle: Vehicle
     log_event: EventLog
     incidents: Incidents
+
+    def run(
+        self, conversation: Conversation[T | Refusal], on_done: Callable[[T | Refusal, float], None], now: float
+    ) -> None:
+        """Run a conversation; `on_done` gets its result and the time. A lost link is a refusal."""
+
+        def done(result: T | Refusal | LinkLost, at: float) -> None:
+            on_done(NO_LINK if isinstance(result, LinkLost) else result, at)
+
+        self.runner.start(conversation, done, now)

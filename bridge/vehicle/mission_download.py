@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.station import Severity, Station
-from bridge.line.conversation import LinkLost
-from bridge.missions.mission_service import NO_LINK, HeldMission
+from bridge.missions.mission_service import HeldMission
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Home
 from bridge.vehicle.mission_context import MissionContext
@@ -47,7 +46,7 @@ class MissionDownloads:
 
     def __init__(self, context: MissionContext) -> None:
         self._missions = context.missions
-        self._runner = context.runner
+        self._context = context
         self._post = context.post
         self._vehicle = context.vehicle
         self._snapshots: dict[Station, _Snapshot] = {}
@@ -101,12 +100,10 @@ class MissionDownloads:
             self._read(held, now)
         else:
             self._is_reading = True
-            self._runner.start(self._missions.read_back(), self._read, now)
+            self._context.run(self._missions.read_back(), self._read, now)
 
-    def _read(self, held: HeldMission | Refusal | LinkLost, now: float) -> None:
+    def _read(self, held: HeldMission | Refusal, now: float) -> None:
         self._is_reading = False
-        if isinstance(held, LinkLost):
-            held = NO_LINK
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):

@@ -18,18 +18,16 @@ _LAST_V1_ID = 255
 
 
 class MavlinkDecoder:
-    """Turns checked frames into pymavlink messages. Bad content is counted, never raised."""
+    """Turns checked frames into pymavlink messages. Bad content is dropped, never raised."""
 
     def __init__(self) -> None:
         self._mavlink = messages.MAVLink(None)
-        self.undecodable = 0
 
     def decode(self, frame: MavlinkFrame) -> Message | None:
         """Decode a frame; None if its length does not fit its message."""
         try:
             return self._mavlink.decode(bytearray(frame.raw))
         except (messages.MAVError, struct.error, UnicodeDecodeError):
-            self.undecodable += 1
             return None
 
 

@@ -12,15 +12,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import structlog
 
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
-from bridge.model.vehicle_groups import Group
-from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.control.client import ControlError
@@ -99,35 +97,30 @@ class MissionJobs:
 
     async def check(self, items: list[MissionItem]) -> Json:
         """The verdict on a list for the present flight controller."""
-        future: asyncio.Future[Verdict[Any] | Refusal] = self._loop.create_future()
-        self._daemon.bridge.local.check(items, lambda verdict: _resolve(future, verdict), self._loop.time())
-        self._daemon.flush()
-        verdict = await future
-        if isinstance(verdict, Refusal):
-            raise ControlError(verdict.text)
-        return verdict_data(verdict)
+        local = self._daemon.bridge.local
+        return verdict_data(await self._answer(lambda answered, now: local.check(items, answered, now)))
 
     async def pull(self) -> Json:
         """Read the mission of the flight controller."""
-        future: asyncio.Future[HeldMission | Refusal] = self._loop.create_future()
-        self._daemon.bridge.local.pull(lambda held: _resolve(future, held), self._loop.time())
-        self._daemon.flush()
-        held = await future
-        if isinstance(held, Refusal):
-            raise ControlError(held.text)
+        held = await self._answer(self._daemon.bridge.local.pull)
         return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.missions.others]}
+
+    async def _answer(self, start: Callable[[Callable[[T | Refusal], None], float], None]) -> T:
+        """Start an operation and wait for its result; ControlError if it is refused."""
+        future: asyncio.Future[T | Refusal] = self._loop.create_future()
+        start(lambda result: _resolve(future, result), self._loop.time())
+        self._daemon.flush()
+        result = await future
+        if isinstance(result, Refusal):
+            raise ControlError(result.text)
+        return result
 
     def status(self) -> Json:
         """The status of the bridge."""
-        bridge = self._daemon.bridge
-        session = bridge.session
-        controller = session.controller
-        report = bridge.report.whole()
-        held = bridge.missions.held
-        link = session.link
         daemon = self._daemon
-        gps, status = bridge.report.group(Group.GPS), bridge.report.group(Group.STATUS)
-        web = daemon.settings.web
+        bridge, web = daemon.bridge, daemon.settings.web
+        report = bridge.report.whole()
+        link, mission, firmware = report.link, report.mission, bridge.session.vehicle.version
         return {
             "version": version(),
             "uptime_s": round(self._loop.time() - daemon.started_at, 1),
@@ -136,30 +129,28 @@ class MissionJobs:
             "found_s": None if daemon.found_at is None else round(self._loop.time() - daemon.found_at, 1),
             "links": [str(address) for address in daemon.settings.gcs],
             "page": None if web is None else str(web.listen),
-            "mode": status.mode,
-            "fix": gps.fix,
-            "flight_controller": None if controller is None else controller.name,
-            "firmware_version": None
-            if session.vehicle.version is None
-            else ".".join(map(str, session.vehicle.version)),
-            "state": session.state.name,
-            "speed_baud": session.speed if controller else None,
+            "mode": report.status.mode,
+            "fix": report.gps.fix,
+            "flight_controller": link.flight_controller,
+            "firmware_version": None if firmware is None else ".".join(map(str, firmware)),
+            "state": link.state,
+            "speed_baud": link.speed_baud,
             "armed": report.status.armed,
             "battery_v": report.battery.voltage_v,
             "satellites": report.gps.satellites,
-            "ground_stations": [str(peer) for peer in bridge.ground.peers()],
+            "ground_stations": list(link.ground_stations),
             "refused": [
                 *(f"{count} x {why} ({link})" for (link, why), count in bridge.guard.refused.items()),
                 *(f"{count} x {why} (share)" for why, count in daemon.share_refused.items()),
             ],
-            "recording": self._daemon.recording,
-            "store_trouble": self._daemon.store_trouble,
-            "mission_records": None if held is None else held.identity.count,
-            "mission_checksum": None if held is None else _hex(held.identity.checksum),
-            "round_trip_ms": None if link is None else round(link.round_trip_s * 1000, 1),
-            "requests_lost": None if link is None else link.requests_lost,
-            "bad_checksums": session.bad_checksums,
-            **self._daemon.followers_status(),
+            "recording": daemon.recording,
+            "store_trouble": daemon.store_trouble,
+            "mission_records": None if mission is None else mission.count,
+            "mission_checksum": None if mission is None else mission.checksum,
+            "round_trip_ms": link.round_trip_ms,
+            "requests_lost": link.requests_lost,
+            "bad_checksums": link.bad_checksums,
+            **daemon.followers_status(),
         }
 
     async def list_missions(self, limit: int) -> Json:
