@@ -34,7 +34,7 @@ def test_the_log_of_a_flight_outlives_a_flood(start: Starter, stack: ExitStack) 
     stranger = Stranger(bench.daemon.address)
     stack.callback(stranger.close)
     text = m.MAVLink_statustext_message(6, b"x" * 50)
-    with Watch(bench.daemon.address), Attack(lambda: stranger.send(*[text] * 50), per_s=40) as attack:
+    with Watch(bench.daemon), Attack(lambda: stranger.send(*[text] * 50), per_s=40) as attack:
         assert comes(lambda: attack.count > 300)
     assert flight in logs(state)
     # 1.2 MB were sent; what floods is left out.
@@ -72,7 +72,7 @@ def test_lists_without_end(start: Starter, stack: ExitStack) -> None:
         stranger.send(m.MAVLink_mission_item_int_message(1, 1, 1, 3, 22, 0, 1, 0, 0, 0, 0, 2**31 - 1, 0, 9.0))
         stranger.send(m.MAVLink_mission_ack_message(1, 1, 15))
 
-    with Watch(bench.daemon.address) as witness, Attack(reject, per_s=100) as attack:
+    with Watch(bench.daemon) as witness, Attack(reject, per_s=100) as attack:
         assert comes(lambda: attack.count > 60)
         until(lambda: len(witness.gaps_s) >= 3, "heartbeats")
     assert len(bench.daemon.missions()) <= 25
@@ -86,7 +86,7 @@ def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path:
     board = start.board()
     daemon = start.daemon(str(board.link), state_dir=blocked / "state")
     daemon.wait()
-    with Watch(daemon.address) as witness, udp_station(daemon.address) as pilot:
+    with Watch(daemon) as witness, udp_station(daemon.address) as pilot:
         pilot.send(HELLO)
         assert "memory" in pilot.wait_for("STATUSTEXT").text
         assert_uploads(pilot, board, plain_plan(20))
@@ -100,7 +100,7 @@ def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path:
 def test_connections_that_ask_nothing(start: Starter) -> None:
     bench = start.bench()
     path = str(bench.daemon.state_dir / "control.sock")
-    with Watch(bench.daemon.address) as witness, ExitStack() as clients:
+    with Watch(bench.daemon) as witness, ExitStack() as clients:
         for _ in range(300):
             client = socket.socket(socket.AF_UNIX)
             clients.callback(client.close)
@@ -117,7 +117,7 @@ def test_connections_that_ask_nothing(start: Starter) -> None:
 
 def test_a_source_of_a_megabyte_is_cut(start: Starter) -> None:
     bench = start.bench()
-    with Watch(bench.daemon.address) as witness:
+    with Watch(bench.daemon) as witness:
         until(lambda: len(witness.gaps_s) >= 1, "a heartbeat")
         for _ in range(5):
             bench.daemon.ask({"do": "push", "source": "y" * 900_000, "items": []})
@@ -130,7 +130,7 @@ def test_answers_that_nobody_reads(start: Starter) -> None:
     bench.daemon.push(plain_plan(140))
     number = bench.daemon.missions()[0]["number"]
     before = _memory_kb(bench.daemon.process.pid)
-    with Watch(bench.daemon.address) as witness, ExitStack() as clients:
+    with Watch(bench.daemon) as witness, ExitStack() as clients:
         for _ in range(400):
             client = socket.socket(socket.AF_UNIX)
             client.settimeout(1)

@@ -60,7 +60,7 @@ def test_texts(bench: Bench, stack: ExitStack) -> None:
     with udp_station(bench.daemon.address) as pilot:
         pilot.send(HELLO)
         pilot.wait_for("HEARTBEAT")
-        with Watch(bench.daemon.address) as witness, Attack(lambda: stranger.send(*loud), per_s=125) as attack:
+        with Watch(bench.daemon) as witness, Attack(lambda: stranger.send(*loud), per_s=125) as attack:
             assert comes(lambda: attack.count > 600)
             assert_uploads(pilot, bench.board, plain_plan(20))
         assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4
@@ -81,7 +81,7 @@ def test_rates(bench: Bench, stack: ExitStack) -> None:
     def sent() -> int:
         return sum(len(stranger.heard()) for stranger in strangers)
 
-    with Watch(bench.daemon.address) as witness:
+    with Watch(bench.daemon) as witness:
         ask_for_all()
         until(lambda: len(witness.gaps_s) >= 1, "a heartbeat")
         sent()
@@ -106,7 +106,7 @@ def test_questions_to_an_armed_board(bench: Bench, line: Line, stack: ExitStack)
         command(241, 0, 1),
         command(245, 1),
     )
-    with Watch(bench.daemon.address) as witness:
+    with Watch(bench.daemon) as witness:
         until(lambda: len(witness.gaps_s) >= 2, "heartbeats")
         with Attack(lambda: stranger.send(*asked), per_s=100):
             beats = len(witness.gaps_s)
@@ -133,7 +133,7 @@ def test_flash_writes(bench: Bench, line: Line, stack: ExitStack) -> None:
                 radius = 200 + (radius + 1) % 500
                 stranger.send(m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", radius, 9), command(245, 1))
 
-        with Watch(bench.daemon.address), Attack(write, per_s=10) as attack:
+        with Watch(bench.daemon), Attack(write, per_s=10) as attack:
             assert comes(lambda: attack.count > 80)
         # 300 at most for ten peers without a limit for all of them together; 60 with it, and one every 20 s.
         assert line.flash_writes() - before <= 70

@@ -141,6 +141,27 @@ def test_idle_connections_lock_no_newcomer_out(start: Starter, stack: ExitStack)
 
 def test_the_pilots_heartbeats_come_through_the_crowd(start: Starter, stack: ExitStack) -> None:
     bench = start.bench()
-    with Watch(bench.daemon.address) as witness, crowd(bench, stack) as attack:
+    with Watch(bench.daemon) as witness, crowd(bench, stack) as attack:
         assert comes(lambda: attack.count > 150)
         assert comes(lambda: len(witness.gaps_s) >= 5)
+
+
+def test_slow_uploads_and_made_up_addresses_hold_up_no_pilot(start: Starter, stack: ExitStack) -> None:
+    """Twenty announce a list and give one item; six hundred addresses say hello, a hundred a second."""
+    bench = start.bench()
+    with udp_station(bench.daemon.address) as pilot:
+        pilot.send(HELLO)
+        pilot.wait_for("HEARTBEAT")
+        slow = [Stranger(bench.daemon.address, f"127.0.2.{number}", sysid=number) for number in range(1, 21)]
+        many = [Stranger(bench.daemon.address, f"127.0.1.{number % 200 + 1}") for number in range(600)]
+        for stranger in (*slow, *many):
+            stack.callback(stranger.close)
+        turns = itertools.cycle(many)
+        for stranger in slow:
+            stranger.send(m.MAVLink_mission_count_message(1, 1, 100))
+        with Watch(bench.daemon) as witness, Attack(lambda: next(turns).send(HELLO), per_s=100) as attack:
+            assert comes(lambda: attack.count > 100)
+            for stranger in slow:
+                stranger.send(m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1, 1, 9.0))
+            assert_uploads(pilot, bench.board, plain_plan(30))
+            until(lambda: len(witness.gaps_s) >= 4, "heartbeats")

@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from tests.support.attack_pilot import Attack
 from tests.support.benches import Starter
+from tests.support.programs import run_naze_bridge
 from tests.support.secured_fleet import Fleet, password_fleet, tls_fleet
 from tests.support.zenoh_bench import Reader, ask_surely, key, zenoh_bench
+from tests.support.zenoh_router import EXAMPLES
 
 
 @pytest.fixture(params=[tls_fleet, password_fleet], ids=["tls", "passwords"])
@@ -44,6 +47,13 @@ def test_nobody_speaks_for_a_vehicle(start: Starter, fleet: Fleet) -> None:
         assert b"forged" not in replies
         assert ask_surely(pilot, "state").keys() == truth.keys()
         assert [token for token in tokens if "forged" in token] == []
+        with Attack(lambda: _flood(guest), per_s=200), Attack(lambda: _flood(other), per_s=200):
+            pilots = ("--zenoh-config", fleet.config("pilot", "pilot"))
+            pushed = run_naze_bridge("fleet", "push", EXAMPLES / "naze-field.waypoints", "--vehicle", "naze-1", *pilots)
+            assert pushed.returncode == 0, pushed
+            pulled = run_naze_bridge("fleet", "pull", "--vehicle", "naze-1", *pilots)
+            assert pulled.returncode == 0, pulled
+        assert len(bench.board.records()) == len((EXAMPLES / "naze-field.waypoints").read_text().splitlines()) - 2
     bench.board.assert_was_treated_well()
 
 
@@ -51,4 +61,11 @@ def _lie(session: zenoh.Session) -> None:
     session.put(key("telemetry/position"), b"forged")
     session.delete(key("telemetry/position"))
     session.declare_queryable(key("state"), lambda query: query.reply(query.key_expr, b"forged"), complete=True)
+    session.declare_queryable("fleet/naze-1/@cmd/v1/**", lambda query: query.reply(query.key_expr, b"forged"))
     session.liveliness().declare_token(key("forged"))
+
+
+def _flood(session: zenoh.Session) -> None:
+    session.put(key("telemetry/position"), b"forged" * 1000)
+    session.put("fleet/naze-1/@cmd/v1/mission/upload", b"forged")
+    session.get("fleet/naze-1/@cmd/v1/mission/clear", lambda _reply: None, payload=b"{}", timeout=1.0)

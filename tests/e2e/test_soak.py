@@ -36,7 +36,7 @@ def test_soak(start: Starter, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     meter = Meter(daemon.process.pid)
     crowd = Crowd(daemon, udp_port, tcp_port, random.Random(SEED))
     stalls = Stalls()
-    witness = Witness(("127.0.0.1", udp_port), stalls)
+    witness = Witness(("127.0.0.1", udp_port), stalls, daemon.process.pid)
     weather: list[Weather] = []
     boards: list[dict[str, Any]] = []
     memory_kb: list[int] = []

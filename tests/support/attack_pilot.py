@@ -13,7 +13,7 @@ from protocols.mavlink.signing import key_from_passphrase, ticks
 from protocols.mission_item import MissionResult
 from tests.support.plain_station import PlainStation
 from tests.support.plan import PlanRow, judge, records_of
-from tests.support.programs import Board
+from tests.support.programs import Board, Daemon
 from tests.support.soak import Stalls, Witness
 
 m = messages
@@ -87,9 +87,9 @@ class Attack(threading.Thread):
 class Watch:
     """Watches the pilot's heartbeats while it is entered; at the end none may have been missing."""
 
-    def __init__(self, address: tuple[str, int]) -> None:
+    def __init__(self, daemon: Daemon) -> None:
         self._stalls = Stalls()
-        self._witness = Witness(address, self._stalls)
+        self._witness = Witness(daemon.address, self._stalls, daemon.process.pid)
 
     def __enter__(self) -> Witness:
         self._stalls.start()
