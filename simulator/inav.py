@@ -135,7 +135,11 @@ class InavFirmware:
         flown = {ARM: self.armed, NAV_WP: in_mission, NAV_RTH: returning}
         if in_mission or returning:
             flown |= {ANGLE: True, NAV_ALTHOLD: True}
-        return sum(flown.get(box, self._is_on(box)) << bit for bit, box in enumerate(self._boxes[:_STATUS_FLAGS]))
+        flags = self._faults.boxes & (1 << _STATUS_FLAGS) - 1
+        for box, is_on in flown.items():
+            bit = 1 << self._boxes.index(box)
+            flags = flags | bit if is_on else flags & ~bit
+        return flags
 
     # -- MSP -------------------------------------------------------------------------------------------------
 

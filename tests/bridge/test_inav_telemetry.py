@@ -130,11 +130,12 @@ def test_a_mission_that_is_loaded_while_it_is_identified_does_not_hide_it() -> N
 def test_the_present_item_is_told_together_with_nav_status() -> None:
     board, world, station = introduced()
     home = (453838000, 84733000)
-    legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home[0] + 900 * n, home[1], 20.0) for n in (1, 2, 3)]
+    legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home[0] + 500 * n, home[1], 4.0) for n in (1, 2, 3)]
     assert Upload(station, [plan(1)[0], *legs]).run() is MissionResult.ACCEPTED
     board.faults.armed, board.faults.boxes = True, 1 << BOXES["9.1.0"].index(NAV_WP)
     seen: set[int] = set()
-    for _ in range(400):
+    while not seen or station.said("MISSION_CURRENT")[-1].mission_state != messages.MISSION_STATE_COMPLETE:
+        assert world.now < 100
         world.run(0.1)
         leg = world.bridge.session.vehicle.last(MissionLeg)
         if leg is not None and leg.status.mode == NavMode.MISSION:

@@ -337,6 +337,8 @@ def test_what_is_not_used_is_no_news_unless_something_is_lost() -> None:
     assert [finding.news for finding in verdict_on(WP, WP, replace(jump(1), p3=3.0)).findings] == [News.NONE]
     assert news(item(C.DO_SET_ROI_NONE)) == [News.NONE] * 3
     assert news(item(C.DO_CHANGE_SPEED, p1=1.0, p2=0.0, at=False)) == [News.NONE]
+    assert news(item(C.NAV_ROI, p2=1.0, p4=2.0)) == [News.NONE] * 2
+    assert [f.news for f in verdict_on(WP, item(C.NAV_RETURN_TO_LAUNCH, p3=1.0, alt_m=0.0)).findings] == [News.NONE] * 3
     assert news(replace(WP, p2=2.0)) == [News.NOTICE]
     assert news(item(C.NAV_LOITER_TURNS, p1=3)) == [News.NOTICE, News.WARNING]
 
@@ -487,7 +489,7 @@ foreign_turns = st.one_of(
 
 
 @given(st.lists(st.one_of(foreign_legs, foreign_turns), max_size=8), foreign_legs)
-@settings(max_examples=300)
+@settings(max_examples=MANY, deadline=None)
 def test_another_planners_list_that_is_read_and_written_again_is_the_same(
     before: list[NavRecord], last: NavRecord
 ) -> None:
