@@ -17,7 +17,7 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import MissionProgress
-from bridge.model.vehicle import STALE_S, FlightState, Home, MissionLeg, Readiness, Reading
+from bridge.model.vehicle import STALE_S, FlightState, Health, Home, MissionLeg, Readiness, Reading
 from bridge.vehicle import vehicle_messages
 from bridge.vehicle.telemetry_table import EXTENDED_STATUS, EXTRA3, NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
@@ -32,6 +32,8 @@ _TICK_S = 1.0
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: Home, and what prevents arming, are repeated for newcomers no more often.
 _REPEAT_S = 5.0
+#: Without a reading for so long, SYS_STATUS is sent all the same, to say that nothing is known.
+_SILENT_S = 3.0
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
@@ -120,8 +122,8 @@ class OwnVehicle:
             message = make() if peers else None
             if message is not None:
                 self._ground.multicast(pack(message), peers)
-        if self._is_lost():
-            # No reading triggers it now.
+        if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
+            # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
             self._send(_SYS_STATUS, self._moment(), self._rates.take_due(_SYS_STATUS.msgid, everyone, now))
         if self._is_news_wanted and now >= self._repeated_at + _REPEAT_S:
             self._is_news_wanted, self._repeated_at = False, now

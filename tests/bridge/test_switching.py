@@ -80,6 +80,10 @@ def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> Non
         assert station.said("HEARTBEAT")[-1].base_mode & 128
         warnings = [text for text in station.texts() if "FrSky" in text]
         assert len(warnings) == (board is DeafWhileArmed)
+        # Of what is no longer heard nothing stays on the screen as if it were new.
+        status = station.said("SYS_STATUS")[-1]
+        assert (status.voltage_battery == 65535) == (board is DeafWhileArmed)
+        assert world.now - next(at for at, message in reversed(station.heard) if message is status) <= 1.1
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         faults.armed = False
         world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.speed == 115200, 5)
