@@ -103,7 +103,7 @@ def _noise() -> list[Figure]:
 
     now = 0.0
     bridge = Bridge(BridgeConfig((115200,)), log_event, now)
-    bridge.fc_opened(now)
+    bridge.session.opened(now)
     ground, controller = Peer("udp", "noise"), Controller()
     while "fc.found" not in events:
         now += 0.01

@@ -171,7 +171,7 @@ class _Fed:
         self._controller = Controller()
         # An hour ahead: no timer of the loop runs before its simulated time.
         self._now = asyncio.get_running_loop().time() + 3600
-        daemon.bridge.fc_opened(self._now)
+        daemon.bridge.session.opened(self._now)
         while daemon.bridge.session.vehicle.last(Orientation) is None:
             self.step()
 

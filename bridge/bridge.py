@@ -110,14 +110,6 @@ class Bridge:
         """True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes."""
         return not self._is_represented and isinstance(self.session.state, Mavlink)
 
-    def fc_opened(self, now: float) -> None:
-        """The port is open."""
-        self.session.opened(now)
-
-    def fc_closed(self, now: float, why: str | None) -> None:
-        """The port is gone; `why` is None if the bridge closed it."""
-        self.session.closed(now, why)
-
     def fc_received(self, data: bytes, now: float) -> None:
         """Handle bytes from the port."""
         self.session.received(data, now)

@@ -2,6 +2,7 @@
 """`naze-bridge sim`: a simulated flight controller behind a pseudo-terminal or a TCP socket."""
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -38,19 +39,24 @@ def _load_core(path: Path, capacity: int) -> BootMissions:
         raise click.ClickException(f"Cannot load the core: {error}. Make it with: make -C firmware sim") from error
 
 
-#: The options that --image allows; all else depends on the firmware.
-_IMAGE_OPTIONS = {
+#: The options that --image and --play allow: the rest depends on the firmware, or is recorded.
+_WITH_IMAGE = {
     "image", "link", "tcp", "armed", "bit_errors", "lost_bytes", "seed", "hang_after", "power_cut_after", "state",
     "control",
 }  # fmt: skip
+_WITH_PLAY = {"play", "link", "speed"}
+#: Options of Harakiri and its mission extension, of --image and of --play.
+_OF_THE_NAZE = {
+    "tele_prot", "no_extension", "flash_stall", "program_stall", "wp_radius_cm", "core", "play", "speed",
+}  # fmt: skip
 
 
-def _refuse_options_of_the_model() -> None:
+def _refuse_options(mode: str, is_refused: Callable[[str], bool]) -> None:
     context = click.get_current_context()
     for parameter in context.command.params:
         name = parameter.name or ""
-        if name not in _IMAGE_OPTIONS and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"{parameter.opts[0]} is for the simulated firmware: leave it out with --image.")
+        if is_refused(name) and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"{parameter.opts[0]} has no effect with {mode}: leave it out.")
 
 
 def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[str, int] | None:
@@ -146,16 +152,18 @@ def sim(
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
     running = Running(link, tcp, control, hang_after, power_cut_after)
     if image is not None:
-        _refuse_options_of_the_model()
+        _refuse_options("--image", lambda name: name not in _WITH_IMAGE)
         run_image(image, faults, running, state, seed)
         return
     if kind != "naze":
+        _refuse_options(f"--kind {kind}", lambda name: name in _OF_THE_NAZE)
         line = MspOptions(version=inav_version, baud=int(baud), capacity=capacity or 178, seed=seed)
         run_other_board(kind, line, faults, running, state)
         return
     if play is not None:
         if link is None:
             raise click.UsageError("--play needs --link.")
+        _refuse_options("--play", lambda name: name not in _WITH_PLAY)
         play_capture(play, link, speed)
         return
     options = SimOptions(

@@ -5,8 +5,6 @@ import asyncio
 from dataclasses import replace
 from pathlib import Path
 
-import click
-
 from simulator.fc_kinds import make_board, new_eeprom
 from simulator.memory_file import open_memory
 from simulator.msp_options import MspOptions
@@ -14,16 +12,10 @@ from simulator.options import Faults
 from simulator.run_board import Running, run_board
 
 _NAMES = {"inav": "INAV", "multiwii": "MultiWii", "betaflight": "Betaflight", "baseflight": "baseflight"}
-#: Options of Harakiri and its mission extension.
-_OF_THE_NAZE = ("tele_prot", "no_extension", "flash_stall", "program_stall", "wp_radius_cm", "core", "play", "speed")
 
 
 def run_other_board(kind: str, options: MspOptions, faults: Faults, running: Running, state: Path | None) -> None:
     """Run one until Ctrl-C. `state`: the file with its EEPROM."""
-    context = click.get_current_context()
-    for name in _OF_THE_NAZE:
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--{name.replace('_', '-')} is for a Naze; leave it away with --kind {kind}")
     if running.tcp:
         # A socket is served at once, with the ring of INAV's own simulator.
         options = replace(options, baud=None, ring_size=2048, serial_task_ms=0.01)

@@ -11,17 +11,9 @@ from protocols.uart_capture import read_capture
 from simulator.playback import CapturePlayer
 from simulator.pty_link import PlugError, PtyLink
 
-#: The options for a replay; all others are about a simulated board.
-_OPTIONS_OF_PLAYING = ("play", "link", "speed")
-
 
 def play_capture(path: Path, link: Path, tempo: float) -> None:
     """Replay until Ctrl-C. The port appears and disappears as in the recording."""
-    context = click.get_current_context()
-    for name in context.params:
-        given = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-        if given and name not in _OPTIONS_OF_PLAYING:
-            raise click.UsageError(f"--{name.replace('_', '-')} is for a simulated board; leave it away with --play")
     asyncio.run(_play(_player(path, tempo), path, link))
 
 

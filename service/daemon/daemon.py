@@ -313,7 +313,7 @@ class Daemon:
     # The flight controller's port, the clock and the store.
 
     def _fc_opened(self) -> None:
-        self.bridge.fc_opened(self._loop.time())
+        self.bridge.session.opened(self._loop.time())
         self.flush()
         self._report_search()
 
@@ -333,7 +333,7 @@ class Daemon:
             self.flush()
 
     def _fc_closed(self, why: str) -> None:
-        self.bridge.fc_closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
+        self.bridge.session.closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
         self.flush()
 
     def _tell_followers(self) -> None:

@@ -268,7 +268,7 @@ def test_a_long_queue_without_a_link_ends() -> None:
     answers: list[HeldMission | Refusal] = []
     for _ in range(600):
         bridge.local.pull(answers.append, world.now)
-    bridge.fc_closed(world.now, "unplugged")
+    bridge.session.closed(world.now, "unplugged")
     assert len(answers) == 600
     assert {answer.text for answer in answers if isinstance(answer, Refusal)} == {"No link to the flight controller"}
 

@@ -241,7 +241,7 @@ def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: St
         (
             ("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt", "--armed"),
             2,
-            "--armed is for a simulated board",
+            "--armed has no effect with --play",
         ),
     ],
 )

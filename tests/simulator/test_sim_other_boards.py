@@ -186,7 +186,7 @@ def test_the_truth_of_a_flight(start: Callable[..., Simulator]) -> None:
     [
         (("--kind", "inav"), "either --link PATH or --tcp HOST:PORT"),
         (("--tcp", "5760"), "'5760' is not HOST:PORT"),
-        (("--kind", "inav", "--tcp", "127.0.0.1:1", "--tele-prot", "1"), "--tele-prot is for a Naze"),
+        (("--kind", "inav", "--tcp", "127.0.0.1:1", "--tele-prot", "1"), "--tele-prot has no effect with --kind inav"),
         (("--kind", "inav", "--tcp", "192.0.2.1:5760"), "192.0.2.1:5760 cannot be listened on"),
         (("--kind", "inav", "--tcp", "127.0.0.1:5760", "--state", "pyproject.toml"), "name another file"),
     ],

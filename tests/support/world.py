@@ -160,13 +160,13 @@ class World:
     def plug(self) -> None:
         """The port is there."""
         self._plugged = True
-        self.bridge.fc_opened(self.now)
+        self.bridge.session.opened(self.now)
         self._flush()
 
     def unplug(self) -> None:
         """The port is gone; the board keeps its power."""
         self._plugged = False
-        self.bridge.fc_closed(self.now, "unplugged")
+        self.bridge.session.closed(self.now, "unplugged")
         self._flush()
 
     def power_off(self) -> None:
