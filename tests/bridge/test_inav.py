@@ -352,6 +352,17 @@ def test_a_save_whose_answer_is_lost_is_done_again() -> None:
     assert inav.saves == 2
 
 
+@pytest.mark.parametrize("erased", [bytes(19) + b"\xfe", b"\xff" * 20])
+def test_an_erased_place_ends_the_reading_of_a_multiwii(erased: bytes) -> None:
+    multiwii = FakeMultiwii()
+    multiwii.erased = erased
+    multiwii.places[1] = packed(plan(9))[0]
+    world, station = found(multiwii)
+    assert Download(station).run()[1:] == []
+    asked = [frame for _, _, data in world.written for frame in MspParser().feed(data) if frame.command == Nav.WP]
+    assert {frame.payload[0] for frame in asked} == {0, 1, 2}
+
+
 def test_a_multiwii_is_not_made_to_store_what_it_holds() -> None:
     multiwii = FakeMultiwii()
     _, station = found(multiwii)

@@ -92,6 +92,8 @@ class FakeInav(MspFake):
 class FakeMultiwii(FakeInav):
     """A MultiWii 2.4.1 with NAV: every number is a place of its own, and there is no SAVE."""
 
+    erased = bytes(19) + b"\xfe"
+
     def __init__(self, capacity: int = 60, drop: Callable[[MspFrame], str] = lambda _frame: "") -> None:
         super().__init__(capacity, drop)
         self.answers = {100: ident(241, 1 << 4), 116: b"ANGLE;ARM;MISSION;", 122: bytes(30) + bytes((capacity, 7))}
@@ -109,7 +111,7 @@ class FakeMultiwii(FakeInav):
             self.places[number] = record
 
     def read(self, number: int) -> bytes:
-        return self.places.get(number, bytes(19) + b"\xfe") if number else super().read(0)
+        return self.places.get(number, self.erased) if number else super().read(0)
 
     @property
     def flown(self) -> list[bytes]:
