@@ -56,6 +56,9 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
     try:
         while not folder.exists():
             folder = folder.parent
+        if not folder.is_dir():
+            remedy = f"move {folder} away, or name another state_dir"
+            return problem("disk", f"{state_dir} cannot be made, because {folder} is a file", remedy)
         free = free_of(folder)
     except PermissionError:
         return note("disk", f"{state_dir} is closed to you", "ask again with sudo")

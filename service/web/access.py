@@ -18,7 +18,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.control.mission_data import to_json
-from service.web.token import Token
+from service.web.token import Token, TokenError
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -66,10 +66,10 @@ def is_own_name(host: str, known: Container[str]) -> bool:
     return True
 
 
-def check_token(request: Request, token: Token | None) -> None:
+def check_token(request: Request, token: Token | TokenError) -> None:
     """Refuse a request without the token."""
-    if token is None:
-        raise Refused(HTTPStatus.FORBIDDEN, "The Pi has no token, so this page is read-only; its log says why.")
+    if isinstance(token, TokenError):
+        raise Refused(HTTPStatus.FORBIDDEN, f"This page is read-only: {token}.")
     if not token.is_shown_by(request.headers.get("authorization")):
         peer = None if request.client is None else request.client.host
         _log.warning("web.wrong_token", peer=peer, path=request.url.path)

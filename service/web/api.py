@@ -47,7 +47,7 @@ from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles
 from service.web.mission_writer import MissionWriter
 from service.web.telemetry_logs import TelemetryLogs
-from service.web.token import Token
+from service.web.token import Token, TokenError
 from storage.store_error import StoreError
 
 _LISTED = 50
@@ -56,7 +56,7 @@ _LISTED = 50
 class Api:
     """Answers from MissionJobs and the bridge's report. `token` None: everything that needs it is refused."""
 
-    def __init__(self, daemon: Daemon, settings: WebSettings, token: Token | None) -> None:
+    def __init__(self, daemon: Daemon, settings: WebSettings, token: Token | TokenError) -> None:
         self._daemon = daemon
         self._listen = settings.listen
         self._jobs = MissionJobs(daemon)

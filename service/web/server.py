@@ -103,13 +103,13 @@ def _config(api: Api, hosts: tuple[str, ...]) -> Config:
     )
 
 
-def _token(daemon: Daemon, settings: WebSettings) -> Token | None:
+def _token(daemon: Daemon, settings: WebSettings) -> Token | TokenError:
     state_dir = daemon.settings.state_dir
     path = settings.token_file or (None if state_dir is None else state_dir / DEFAULT_NAME)
-    if path is None:
-        return None
     try:
+        if path is None:
+            raise TokenError("there is no state directory: name a token_file under [web]")
         return Token(path)
     except TokenError as error:
         _log.error("web.no_token", why=str(error), what="the page is read-only")
-        return None
+        return error

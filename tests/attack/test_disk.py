@@ -13,6 +13,7 @@ from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
 from tests.support.programs import comes, free_port, until
+from tests.support.web_bench import WebBench
 
 
 def logs(state_dir: Path) -> list[Path]:
@@ -84,7 +85,10 @@ def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path:
     blocked = tmp_path / "blocked"
     blocked.write_text("a file where the folder should be")
     board = start.board()
-    daemon = start.daemon(str(board.link), state_dir=blocked / "state")
+    port = free_port(socket.SOCK_STREAM)
+    config = tmp_path / "naze-bridge.toml"
+    config.write_text(f'[web]\nlisten = "127.0.0.1:{port}"\n')
+    daemon = start.daemon(str(board.link), state_dir=blocked / "state", options=("--config", str(config)))
     daemon.wait()
     with Watch(daemon) as witness, udp_station(daemon.address) as pilot:
         pilot.send(HELLO)
@@ -95,6 +99,12 @@ def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path:
     status = daemon.status()
     assert status is not None
     assert "cannot" in status["store_trouble"]
+    until(lambda: daemon.has_logged("web.listening"), "the page")
+    page = WebBench(daemon, None, port)
+    assert page.ask("/api/state").data["store_trouble"] == status["store_trouble"]
+    refused = page.ask("/api/missions/1/restore", "POST", Authorization="Bearer none")
+    assert refused.status == 403
+    assert str(blocked) in refused.data["error"]
 
 
 def test_connections_that_ask_nothing(start: Starter) -> None:

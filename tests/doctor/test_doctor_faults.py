@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Faults made on purpose: each is found and named, with what to do about it."""
 
+import os
 import sqlite3
 from collections.abc import Iterable
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -273,6 +275,15 @@ def test_the_disk(tmp_path: Path) -> None:
     state = tmp_path / "not made yet" / "state"
     assert_ok(check_disk(state, lambda _: 1 << 30), "1024 MB free")
     assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove what is not needed")
+
+
+def test_a_state_directory_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    assert_problem(check_disk(tmp_path / "file" / "state"), f"{tmp_path}/file is a file", "name another state_dir")
+    monkeypatch.setattr(os, "access", lambda _path, _mode: False)
+    assert_note(check_disk(tmp_path), "is not yours to write")
+    monkeypatch.setattr(os, "statvfs", lambda _path: SimpleNamespace(f_flag=os.ST_RDONLY))
+    assert_problem(check_disk(tmp_path, lambda _: 1 << 30), "on a disk that is read-only", "remount,rw")
 
 
 def test_the_missions(tmp_path: Path) -> None:
