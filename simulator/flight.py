@@ -12,8 +12,8 @@ _CRUISE_HEIGHT_M = 20.0
 _CIRCLE_RADIUS_M = 25.0
 _CRUISE_SPEED_MS = 2.5
 _CLIMB_SECONDS = 8.0
-_METRES_PER_DEGREE = 111_320.0
-_METRES_PER_DEGREE_EAST = _METRES_PER_DEGREE * math.cos(math.radians(FIELD_LAT_E7 / 1e7))
+METRES_PER_DEGREE = 111_320.0
+METRES_PER_DEGREE_EAST = METRES_PER_DEGREE * math.cos(math.radians(FIELD_LAT_E7 / 1e7))
 _FULL_BATTERY_V = 12.6
 _EMPTY_BATTERY_V = 10.2
 _IDLE_SAG_VS = 0.0002
@@ -52,8 +52,8 @@ class Craft:
         if self.home is None:
             return 0.0, 0.0
         lat_e7, lon_e7 = self.home
-        north = (lat_e7 - self.flight.lat_e7) / 1e7 * _METRES_PER_DEGREE
-        east = (lon_e7 - self.flight.lon_e7) / 1e7 * _METRES_PER_DEGREE_EAST
+        north = (lat_e7 - self.flight.lat_e7) / 1e7 * METRES_PER_DEGREE
+        east = (lon_e7 - self.flight.lon_e7) / 1e7 * METRES_PER_DEGREE_EAST
         return math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360
 
 
@@ -68,8 +68,8 @@ def fly(uptime: float, flown: float, armed: bool) -> FlightState:
     height = _CRUISE_HEIGHT_M * climbed if armed else 0.0
     sway = 1.0 if armed else 0.1
     return FlightState(
-        lat_e7=FIELD_LAT_E7 + round(north / _METRES_PER_DEGREE * 1e7),
-        lon_e7=FIELD_LON_E7 + round(east / _METRES_PER_DEGREE_EAST * 1e7),
+        lat_e7=FIELD_LAT_E7 + round(north / METRES_PER_DEGREE * 1e7),
+        lon_e7=FIELD_LON_E7 + round(east / METRES_PER_DEGREE_EAST * 1e7),
         altitude_m=_FIELD_ALTITUDE_M + height,
         height_m=height,
         climb_ms=_CRUISE_HEIGHT_M / _CLIMB_SECONDS * (1 - climbed) if armed else 0.0,

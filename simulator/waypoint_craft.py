@@ -3,10 +3,14 @@
 
 import math
 
-from simulator.flight import FIELD_LAT_E7, FIELD_LON_E7, FlightState
+from simulator.flight import (
+    FIELD_LAT_E7,
+    FIELD_LON_E7,
+    METRES_PER_DEGREE,
+    METRES_PER_DEGREE_EAST,
+    FlightState,
+)
 
-_METRES_PER_DEGREE = 111_320.0
-_METRES_PER_DEGREE_EAST = _METRES_PER_DEGREE * math.cos(math.radians(FIELD_LAT_E7 / 1e7))
 #: The launch field above the sea, metres.
 FIELD_ALTITUDE_M = 131.0
 _CLIMB_MS = 2.0
@@ -28,8 +32,8 @@ class WaypointCraft:
     @property
     def position(self) -> tuple[int, int]:
         """Latitude and longitude."""
-        lat = FIELD_LAT_E7 + round(self._north / _METRES_PER_DEGREE * 1e7)
-        return lat, FIELD_LON_E7 + round(self._east / _METRES_PER_DEGREE_EAST * 1e7)
+        lat = FIELD_LAT_E7 + round(self._north / METRES_PER_DEGREE * 1e7)
+        return lat, FIELD_LON_E7 + round(self._east / METRES_PER_DEGREE_EAST * 1e7)
 
     def rest(self) -> None:
         """Stay on the ground."""
@@ -43,8 +47,8 @@ class WaypointCraft:
 
     def fly_to(self, target: tuple[int, int], height_m: float, speed_ms: float, seconds: float) -> bool:
         """Fly towards a position; True once it is reached."""
-        north = (target[0] - FIELD_LAT_E7) / 1e7 * _METRES_PER_DEGREE - self._north
-        east = (target[1] - FIELD_LON_E7) / 1e7 * _METRES_PER_DEGREE_EAST - self._east
+        north = (target[0] - FIELD_LAT_E7) / 1e7 * METRES_PER_DEGREE - self._north
+        east = (target[1] - FIELD_LON_E7) / 1e7 * METRES_PER_DEGREE_EAST - self._east
         distance = math.hypot(north, east)
         share = min(speed_ms * seconds / distance, 1.0) if distance else 1.0
         if distance:

@@ -2,11 +2,11 @@
 """One setting: its name, its meaning, and how its value is read."""
 
 import tomllib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from reprlib import Repr
-from typing import Protocol
 
 _ENVIRONMENT = "NAZE_BRIDGE_"
 _repr = Repr()
@@ -17,14 +17,16 @@ class Unfit(ValueError):
     """A value that cannot be used; the text continues a sentence after the key's name: "is 7, but must be ..."."""
 
 
-class Reader(Protocol):
+class Reader(ABC):
     """Converts a given value to the one used; raises Unfit, or another ValueError with a whole sentence."""
 
+    @abstractmethod
     def read(self, value: object, folder: Path) -> object:
         """Read a value of the file in `folder`."""
 
     def from_text(self, text: str) -> object:
-        """Convert text from the environment or a flag to the form of the file."""
+        """Convert text from the environment or a flag to the form of the file; most readers take it as it is."""
+        return text
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +63,7 @@ def _wrong(value: object, wanted: str) -> Unfit:
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class Text(Reader):
     """Any text; `wanted` describes it, `parse` may reject it."""
 
     wanted: str = "text in quotes"
@@ -73,13 +75,9 @@ class Text:
             raise _wrong(value, self.wanted)
         return self.parse(value)
 
-    def from_text(self, text: str) -> object:
-        """The text itself."""
-        return text
-
 
 @dataclass(frozen=True, slots=True)
-class FileName:
+class FileName(Reader):
     """A file or folder; if `in_config_folder`, a relative path starts at the configuration file's folder."""
 
     in_config_folder: bool = False
@@ -90,13 +88,9 @@ class FileName:
             raise _wrong(value, "text in quotes: the name of a file or folder")
         return folder / value if self.in_config_folder else Path(value)
 
-    def from_text(self, text: str) -> object:
-        """The text itself."""
-        return text
-
 
 @dataclass(frozen=True, slots=True)
-class Whole:
+class Whole(Reader):
     """A whole number from `least` to `most`."""
 
     least: int
@@ -116,7 +110,7 @@ class Whole:
 
 
 @dataclass(frozen=True, slots=True)
-class YesNo:
+class YesNo(Reader):
     """True or false."""
 
     def read(self, value: object, folder: Path) -> object:
@@ -131,7 +125,7 @@ class YesNo:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(Reader):
     """One of several words, converted by `parse`."""
 
     words: Sequence[str]
@@ -143,13 +137,9 @@ class Choice:
             raise _wrong(value, " or ".join(f'"{word}"' for word in self.words))
         return self.parse(value)
 
-    def from_text(self, text: str) -> object:
-        """The text itself."""
-        return text
-
 
 @dataclass(frozen=True, slots=True)
-class Several:
+class Several(Reader):
     """A list, each entry read by `parse(entry, folder)`."""
 
     wanted: str
@@ -170,7 +160,7 @@ class Several:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class Table(Reader):
     """A table of one line, {name = value}."""
 
     wanted: str
