@@ -77,7 +77,8 @@ def _flight_controller(facts: Json) -> str:
         return facts["trouble"] or f"none yet: searching on {facts['where']}"
     speed = "" if facts["speed_baud"] is None else f" at {facts['speed_baud']} baud"
     since = "" if facts["found_s"] is None else f", for {duration(facts['found_s'])}"
-    return f"{facts['flight_controller']} on {facts['where']}, {facts['state']}{speed}{since}"
+    firmware = "" if facts["firmware_version"] is None else f", firmware {facts['firmware_version']},"
+    return f"{facts['flight_controller']}{firmware} on {facts['where']}, {facts['state']}{speed}{since}"
 
 
 def _gps(facts: Json) -> str:

@@ -261,7 +261,7 @@ def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: 
 
 def test_status_is_for_people(daemon: Daemon) -> None:
     lines = dict(line.split("  ", 1) for line in ask(daemon, "status").stdout.splitlines())
-    assert "on sim:, MSP" in lines["Flight controller"]
+    assert ", firmware 2.1.1, on sim:, MSP" in lines["Flight controller"]
     assert ", for " in lines["Flight controller"]
     assert "disarmed" in lines["Vehicle"]
     assert lines["Connect to"].strip() == f"UDP 127.0.0.1, port {daemon.port}"
