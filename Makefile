@@ -53,7 +53,7 @@ test: $(VENV)/.test-ready
 	@$(BROWSER) || echo 'The status page: NOT TESTED in a browser: none here (apt-get install $(BROWSER_PACKAGES))'
 	@command -v systemd-analyze >/dev/null || { $(call INSTALL,systemd); } || true
 	@$(BARE_ROOT) || echo 'The Debian package: NOT INSTALLED anywhere: no namespaces can be made here'
-	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile \
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder \
 	    $$($(BROWSER) || echo --ignore=tests/web/test_web_page.py) \
 	    $$($(BARE_ROOT) || echo --deselect=$(IN_BARE_ROOT)) $(ARGS)
 	$(if $(ARGS),,$(MAKE) -C firmware test)

@@ -2,9 +2,12 @@
 """The page's state bar, and what an update leaves alone."""
 
 import socket
+from collections.abc import Iterator
+
+import pytest
 
 from protocols.mavlink.dialect import messages
-from tests.support.chromium import PHONE, browser
+from tests.support.chromium import PHONE, Browser, browser
 from tests.support.plain_station import PlainStation
 from tests.support.plan import plain_plan
 from tests.support.programs import until
@@ -40,53 +43,57 @@ def test_the_state_stays_in_sight(web: WebBench) -> None:
         page.wait_text("#trouble", "The Pi does not answer. The values below may be old.")
 
 
-def test_old_values_are_called_stale(web: WebBench) -> None:
-    assert web.board is not None
-    with browser(web.port) as page:
-        page.open()
-        page.wait_text("#badges", "DISARMED")
-        web.board.set("hang 1")
-        until(lambda: {"STALE", "LOST"} & set(page.text("#badges").split()), "a word on the silence")
-        web.board.set("hang 0")
-        until(lambda: page.text("#badges") == "DISARMED", "the craft again")
+@pytest.fixture(scope="module")
+def laptop(lasting_web: WebBench) -> Iterator[Browser]:
+    with browser(lasting_web.port) as laptop:
+        yield laptop
+
+
+@pytest.fixture
+def page(laptop: Browser) -> Browser:
+    laptop.open()
+    laptop.wait_text("#badges", "DISARMED")
+    return laptop
+
+
+def test_old_values_are_called_stale(lasting_web: WebBench, page: Browser) -> None:
+    assert lasting_web.board is not None
+    lasting_web.board.set("hang 1")
+    until(lambda: {"STALE", "LOST"} & set(page.text("#badges").split()), "a word on the silence")
+    lasting_web.board.set("hang 0")
+    until(lambda: page.text("#badges") == "DISARMED", "the craft again")
 
 
 LIVE = """
     return [...document.querySelectorAll('[role=status], [role=alert], [aria-live]')].map((e) => e.textContent);"""
 
 
-def test_only_changes_are_spoken(web: WebBench) -> None:
-    assert web.board is not None
-    with browser(web.port) as page:
-        page.open()
-        before = page.run(LIVE)
-        assert not any(before)
-        page.wait_for_looks(3)
-        assert page.run(LIVE) == before
-        web.board.set("armed 1")
-        page.wait_text("#spoken", "armed")
-        spoken = page.run(LIVE)
-        page.wait_for_looks(3)
-        assert page.run(LIVE) == spoken
+def test_only_changes_are_spoken(lasting_web: WebBench, page: Browser) -> None:
+    assert lasting_web.board is not None
+    before = page.run(LIVE)
+    assert not any(before)
+    page.wait_for_looks(3)
+    assert page.run(LIVE) == before
+    lasting_web.board.set("armed 1")
+    page.wait_text("#spoken", "armed")
+    spoken = page.run(LIVE)
+    page.wait_for_looks(3)
+    assert page.run(LIVE) == spoken
+    lasting_web.board.set("armed 0")
 
 
-def test_a_selection_survives_updates(web: WebBench) -> None:
-    web.daemon.push(plain_plan(9))
-    select = """
+def test_a_selection_survives_updates(lasting_web: WebBench, page: Browser) -> None:
+    page.run("""
         const all = [...document.querySelectorAll('dt')].find((e) => e.innerText === 'Firmware').nextElementSibling;
-        getSelection().selectAllChildren(all);"""
-    with browser(web.port) as page:
-        page.open()
-        page.run(select)
-        web.push_example()
-        page.wait_text("#held-text", "13 records")
-        page.wait_for_looks(2)
-        assert page.run("return String(getSelection())") == "Harakiri with the mission extension"
+        getSelection().selectAllChildren(all);""")
+    lasting_web.daemon.push(plain_plan(9))
+    page.wait_text("#held-text", "9 records")
+    page.wait_for_looks(2)
+    assert page.run("return String(getSelection())") == "Harakiri with the mission extension"
 
 
-def test_an_upload_in_progress_has_a_bar(web: WebBench) -> None:
-    with browser(web.port) as page, PlainStation(udp_to(web.daemon.address)) as station:
-        page.open()
+def test_an_upload_in_progress_has_a_bar(lasting_web: WebBench, page: Browser) -> None:
+    with PlainStation(udp_to(lasting_web.daemon.address)) as station:
         station.say_hello()
         station.send(messages.MAVLink_mission_count_message(1, 1, 20, 0))
         station.wait_for("MISSION_REQUEST")  # and now it is silent

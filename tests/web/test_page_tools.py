@@ -8,7 +8,6 @@ from selenium.webdriver.common.keys import Keys
 
 from service.web.telemetry_logs import PIECE
 from tests.support.chromium import PHONE, Browser, browser
-from tests.support.plan import plain_plan
 from tests.support.programs import until
 from tests.support.web_bench import WebBench
 
@@ -22,9 +21,8 @@ def place(page: Browser) -> list[float]:
     return found
 
 
-def test_the_map_is_zoomed_and_panned(web: WebBench) -> None:
-    web.daemon.push(plain_plan(9))
-    with browser(web.port) as page:
+def test_the_map_is_zoomed_and_panned(lasting_web: WebBench) -> None:
+    with browser(lasting_web.port) as page:
         page.open()
         until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
         fit, scale = place(page), page.text("#map .scale + text")
@@ -46,17 +44,17 @@ def test_the_map_is_zoomed_and_panned(web: WebBench) -> None:
         assert place(page) == fit
 
 
-def test_a_log_is_downloaded(web: WebBench, tmp_path: Path) -> None:
-    folder = web.daemon.state_dir / "logs"
+def test_a_log_is_downloaded(lasting_web: WebBench, tmp_path: Path) -> None:
+    folder = lasting_web.daemon.state_dir / "logs"
     folder.mkdir(exist_ok=True)
     name, contents = "2026-01-02 03-04-05.tlog", bytes(range(256)) * (PIECE // 100)
     (folder / name).write_bytes(contents)
     downloads = tmp_path / "downloads"
-    with browser(web.port, PHONE) as page:
+    with browser(lasting_web.port, PHONE) as page:
         allow = {"behavior": "allow", "downloadPath": str(downloads)}
         page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", allow)
         page.open()
-        page.find("#logs input").send_keys(web.token)
+        page.find("#logs input").send_keys(lasting_web.token)
         page.press("#logs button")
         page.wait_text("#logs", name)
         page.press(f"button[aria-label='Download {name}']")
