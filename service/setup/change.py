@@ -64,9 +64,8 @@ class Machine:
         path = self._host.path(change.path)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            replace_file(path, change.text.encode())
-            if not change.secret:
-                path.chmod(0o644)
+            # Readable from its first moment: Avahi reads a new file at once.
+            replace_file(path, change.text.encode(), 0o600 if change.secret else 0o644)
         except OSError as error:
             raise SetupError(f"{change.path} cannot be written: {error.strerror}; run setup with sudo") from error
 

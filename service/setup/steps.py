@@ -20,6 +20,8 @@ STATE_FOLDER = "/var/lib/naze-bridge"
 PAGE_PORT = 8080
 GCS_PORT = 14550
 _HOTSPOT_FILE = "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection"
+#: A file for each device, which names its active connection.
+_NM_DEVICES = "/run/NetworkManager/devices"
 _AVAHI_FILE = "/etc/avahi/services/naze-bridge.service"
 _OTHERS_FILE = "/etc/udev/rules.d/59-naze-bridge-others.rules"
 _WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
@@ -106,11 +108,13 @@ def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
     hosts = host.read("/etc/hosts")
     renamed = re.sub(rf"^(127\.0\.1\.1\s+){re.escape(old)}$", rf"\g<1>{answers.name}", hosts, flags=re.MULTILINE)
     changes: list[Change] = [WriteFile("/etc/hosts", renamed)] if old and renamed != hosts else []
-    change = Run(("hostnamectl", "set-hostname", answers.name)) if _now(host) else None
-    yield Step(
-        f"name this machine {answers.name}.local",
-        [*changes, change or WriteFile("/etc/hostname", f"{answers.name}\n")],
-    )
+    if _now(host):
+        changes.append(Run(("hostnamectl", "set-hostname", answers.name)))
+        # Avahi reads the name only when it starts.
+        changes.append(Run(("systemctl", "try-restart", "avahi-daemon")))
+    else:
+        changes.append(WriteFile("/etc/hostname", f"{answers.name}\n"))
+    yield Step(f"name this machine {answers.name}.local", changes)
 
 
 def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
@@ -184,21 +188,23 @@ def _hotspot(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if answers.hotspot is None:
         return
     ssid, password = answers.hotspot
+    identity = uuid.uuid5(uuid.NAMESPACE_DNS, ssid)
     text = (
         "# Written by `naze-bridge setup`.\n"
-        f"[connection]\nid=naze-bridge-hotspot\nuuid={uuid.uuid5(uuid.NAMESPACE_DNS, ssid)}\ntype=wifi\n"
+        f"[connection]\nid=naze-bridge-hotspot\nuuid={identity}\ntype=wifi\n"
         "interface-name=wlan0\nautoconnect=true\nautoconnect-priority=100\n\n"
         f"[wifi]\nmode=ap\nband=bg\nssid={_keyfile(ssid)}\n\n[wifi-security]\nkey-mgmt=wpa-psk\n"
         f"psk={_keyfile(password)}\n\n"
         "[ipv4]\nmethod=shared\naddress1=10.42.0.1/24\n\n[ipv6]\nmethod=disabled\n"
     )
+    changes: list[Change] = []
     if host.read(_HOTSPOT_FILE) != text:
-        changes: list[Change] = [WriteFile(_HOTSPOT_FILE, text, secret=True)]
-        if _now(host):
-            changes += [
-                Run(("nmcli", "connection", "reload")),
-                Run(("nmcli", "connection", "up", "naze-bridge-hotspot")),
-            ]
+        changes.append(WriteFile(_HOTSPOT_FILE, text, secret=True))
+    devices = (host.read(f"{_NM_DEVICES}/{name}") for name in host.names(_NM_DEVICES))
+    if _now(host) and (changes or not any(f"connection-uuid={identity}" in device for device in devices)):
+        changes.append(Run(("nmcli", "connection", "reload")))
+        changes.append(Run(("nmcli", "connection", "up", "naze-bridge-hotspot")))
+    if changes:
         yield Step(f"open the Wi-Fi hotspot {ssid!r}", changes)
 
 

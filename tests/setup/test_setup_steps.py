@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Setup on each Raspberry Pi model, under a root of files: what it changes, and that a second run changes nothing."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -56,6 +57,9 @@ class FreshPi(FaultyMachine):
                     self.path(f"/etc/systemd/system/getty.target.wants/{unit}").unlink()
                 case ("hostnamectl", "set-hostname", name):
                     self.write("/etc/hostname", f"{name}\n")
+                case ("nmcli", "connection", "up", _):
+                    (identity,) = re.findall(r"^uuid=.*", self.read(HOTSPOT), re.MULTILINE)
+                    self.write("/run/NetworkManager/devices/3", f"[device]\nconnection-{identity}\n")
                 case ("raspi-config", "nonint", "do_wifi_country", country):
                     self.write(CMDLINE, f"{self.read(CMDLINE).strip()} cfg80211.ieee80211_regdom={country}\n")
 
@@ -85,11 +89,23 @@ def test_a_fresh_card(tmp_path: Path, model: str) -> None:
     assert pi.path(HOTSPOT).stat().st_mode & 0o777 == 0o600
     assert "ssid=naze field\n" in pi.read(HOTSPOT)
     assert "127.0.1.1\tnaze\n" in pi.read("/etc/hosts")
-    assert "_mavlink._udp" in pi.read("/etc/avahi/services/naze-bridge.service")
+    announcement = pi.path("/etc/avahi/services/naze-bridge.service")
+    assert "_mavlink._udp" in announcement.read_text()
+    assert announcement.stat().st_mode & 0o777 == 0o644
+    assert "systemctl try-restart avahi-daemon" in pi.ran
     assert [step.purpose for step in steps if step.needs_reboot]
     # The step that may end the connection over which this is typed.
     assert pi.ran[-1] == "nmcli connection up naze-bridge-hotspot"
     assert missing_steps(pi, answers) == []
+
+
+def test_a_hotspot_that_did_not_come_up_is_tried_again(tmp_path: Path) -> None:
+    pi = FreshPi(tmp_path, "4")
+    answers = SetupChoices(hotspot=("naze field", "long-enough"))
+    pi.carry_out(missing_steps(pi, answers))
+    pi.path("/run/NetworkManager/devices/3").unlink()
+    (step,) = missing_steps(pi, answers)
+    assert step.purpose == "open the Wi-Fi hotspot 'naze field'"
 
 
 def test_a_second_run_keeps_the_key_and_the_hotspot(tmp_path: Path, model: str) -> None:
