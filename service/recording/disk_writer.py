@@ -9,7 +9,7 @@ import structlog
 #: How much is lost if the process is killed.
 _FLUSH_S = 1.0
 #: For the last write: a hanging disk must not keep the daemon from ending.
-_CLOSE_TIMEOUT_S = 2.0
+_CLOSE_TIMEOUT_S = 1.0
 #: Bytes beyond this are dropped while an SD card stalls: minutes of telemetry, 90 s of a full UART at 115200.
 _MAX_WAITING = 1 << 20
 
