@@ -39,7 +39,7 @@ class PushFailure(Enum):
 
     ARMED = "the flight controller is armed: disarm first"
     BUSY = "the flight controller is busy writing its configuration: try again"
-    WRITES_SPENT = "the flight controller limits flash wear: one new list in 5 minutes now, no limit after a restart"
+    WRITES_SPENT = "the flight controller limits flash wear: one write in 5 minutes now, no limit after a restart"
     NO_SPACE = "the list does not fit the flight controller"
     REFUSED = "the flight controller refused a record"
     UNSAFE = "an item's bytes would set off a trap of the firmware: move a waypoint a little"
@@ -90,8 +90,8 @@ class FcMissionStore(Protocol[RecordT]):
     def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         """A list as a ground station reads it, home first; `sent_as`: remembered commands, by record number."""
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
-        """Set gps_wp_radius, 0..2000 cm; the value in force, None if there was no answer."""
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
+        """Set gps_wp_radius, 0..2000 cm; None if it is in force now."""
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""

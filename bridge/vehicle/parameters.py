@@ -6,6 +6,7 @@ import math
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import LinkLost
+from bridge.missions.fc_mission_store import PushFailure
 from bridge.vehicle.mission_context import MissionContext
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.mission import MAX_RADIUS_CM
@@ -60,7 +61,7 @@ class Parameters:
             # A change is pending; a station that requested another value repeats its request.
             return
         if self._missions.armed_refusal() is not None:
-            self._post.say(Severity.ERROR, _stays(dialect.wp_radius_cm), station)
+            self._post.say(Severity.ERROR, _stays(dialect.wp_radius_cm, PushFailure.ARMED), station)
             self._send(station, name)
             return
         if not self._post.allows(station, Cost.FLASH):
@@ -68,12 +69,12 @@ class Parameters:
             self._send(station, name)
             return
 
-        def done(radius_cm: int | LinkLost | None, _at: float) -> None:
+        def done(failure: PushFailure | LinkLost | None, _at: float) -> None:
             self._is_setting = False
-            if radius_cm is None or isinstance(radius_cm, LinkLost):
+            if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
                 self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer", station)
-            elif radius_cm != wanted_cm:
-                self._post.say(Severity.ERROR, _stays(radius_cm), station)
+            elif failure is not None:
+                self._post.say(Severity.ERROR, _stays(dialect.wp_radius_cm, failure), station)
             self._send(station, name)
 
         self._is_setting = True
@@ -98,5 +99,5 @@ class Parameters:
         )
 
 
-def _stays(radius_cm: int) -> str:
-    return f"{WP_RADIUS} stays {radius_cm}: disarm, or try again"
+def _stays(radius_cm: int | None, failure: PushFailure) -> str:
+    return f"{WP_RADIUS} stays {radius_cm}: {failure.value}"

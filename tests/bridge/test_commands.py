@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from bridge.missions.fc_mission_store import PushFailure
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message, messages
 from simulator.options import Faults
@@ -339,6 +340,20 @@ def test_armed_the_radius_stays_and_the_pilot_hears_why() -> None:
     heard = answers((world, station), param_set(b"WPNAV_RADIUS", 400.0))
     assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
     assert any("disarm" in text for text in station.texts())
+
+
+def test_a_board_that_limits_flash_wear_keeps_its_radius_and_the_pilot_hears_why() -> None:
+    world, station = radius_world()
+    for radius_cm in range(301, 301 + 64):
+        ended: list[object] = []
+        change = world.bridge.missions.dialect.set_wp_radius(radius_cm)  # type: ignore[union-attr]
+        world.bridge.runner.start(change, lambda failure, _, ended=ended: ended.append(failure), world.now)  # type: ignore[misc]
+        world.wait_until(lambda _, ended=ended: bool(ended), 5)  # type: ignore[misc]
+        assert ended == [None]
+    station.send(param_set(b"WPNAV_RADIUS", 400.0))
+    world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 5)
+    assert values(station.said()) == [("WPNAV_RADIUS", 364.0, 1, 2)]
+    assert " ".join(station.texts()) == f"WPNAV_RADIUS stays 364: {PushFailure.WRITES_SPENT.value}"
 
 
 def test_a_board_that_falls_silent_is_said_to_have_set_nothing() -> None:

@@ -129,10 +129,10 @@ class HarakiriMavlinkMissions(OneMission):
         """The same number: each record is an item, home too."""
         return number if number < len(records) else 0
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
         """Not supported: Harakiri has the parameter under another name and scale."""
         yield from pause(0.0)
-        return None
+        return PushFailure.REFUSED
 
     def _write(self, items: Sequence[Message], progress: PushProgress) -> Conversation[None]:
         """Send the list, up to its MISSION_ACK."""

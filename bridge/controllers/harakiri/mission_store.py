@@ -156,7 +156,7 @@ class HarakiriMissions(OneMission):
         """The same number: each record is an item, home too."""
         return number if number < len(records) else 0
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
         """Set gps_wp_radius, 0..2000 cm; INFO gives the result, as a reply may belong to an earlier value."""
         frame = ext.encode_radius(wp_radius_cm)
         waited_s = 0.0
@@ -164,16 +164,20 @@ class HarakiriMissions(OneMission):
             reply = yield from ask(frame, MissionCommand.RADIUS, 3)
             answer = None if reply is None else ext.decode_radius(reply.payload)
             if answer is None:
-                return None
+                return PushFailure.NO_ANSWER
             if answer.status is not ReplyStatus.BUSY or waited_s >= _BUSY_TIMEOUT_S:
                 break
             yield from pause(_BUSY_INTERVAL_S)
             waited_s += _BUSY_INTERVAL_S
         info = yield from self._read_info()
         if info is None:
-            return None
+            return PushFailure.NO_ANSWER
         self.info = info
-        return info.wp_radius_cm
+        if info.wp_radius_cm == wp_radius_cm:
+            return None
+        if answer.status is ReplyStatus.BUSY and InfoFlag.WRITES_SPENT in info.flags:
+            return PushFailure.WRITES_SPENT
+        return _FAILURES.get(answer.status, PushFailure.BUSY)
 
     def _read_info(self) -> Conversation[Info | None]:
         # Every waypoint's radius depends on the one in INFO, and its checksum identifies the stored list.

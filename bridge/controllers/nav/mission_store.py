@@ -74,10 +74,10 @@ class NavMissions(OneMission, ABC):
         """Not supported."""
         return None
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[int | None]:
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
         """Not supported."""
         yield from pause(0.0)
-        return None
+        return PushFailure.REFUSED
 
     def report(self) -> Conversation[StoreReport | None]:
         """Its state from telemetry; the stored list is unknown until it is read."""
