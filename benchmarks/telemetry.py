@@ -36,6 +36,7 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from simulator.flight import Craft, fly
 from simulator.msp_port import MspAnswers, reply
+from simulator.options import Tree
 
 POLLS_HZ = 100
 #: With the regular polls (STATUS 4 Hz, RC 2 Hz, three others 2.5 Hz) these make 100 polls per second.
@@ -177,7 +178,7 @@ class Controller:
         self.asked = 0
         self.attitudes_at = [0.0] * ATTITUDES
         self._parser = MspParser()
-        self._answers = MspAnswers(lambda: Craft(fly(1.0, 0.0, armed=False), False, 1, None))
+        self._answers = MspAnswers(lambda: Craft(fly(1.0, 0.0, armed=False), False, 1, None), Tree.TESTCODE3)
         self._number = 0
 
     def answer(self, data: bytes) -> bytes:

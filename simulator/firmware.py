@@ -86,7 +86,7 @@ class Firmware:
         self._missions = boot_missions(flash, self._board) if faults.extension else None
         # The extension enlarges the buffer for its longest CHUNK: mask, number, records.
         self._msp = MspReceiver(3 + options.chunk_records * RECORD_SIZE) if faults.extension else MspReceiver()
-        self._answers = MspAnswers(lambda: self.craft_at(self._clock))
+        self._answers = MspAnswers(lambda: self.craft_at(self._clock), options.tree)
         self._mavlink = MavlinkSplitter()
         self._sender = MavlinkSender()
         # Harakiri's own list and MAVLink upload, also alongside the extension.

@@ -7,6 +7,7 @@ from enum import IntEnum
 
 from protocols.msp.frame import Direction, MspFrame
 from simulator.flight import Craft
+from simulator.options import Tree
 from simulator.transmitter import box_activation, channels_us
 
 _STOCK_BUFFER = 64
@@ -142,12 +143,13 @@ class MspReceiver:
 class MspAnswers:
     """The replies to the stock commands. `craft` returns the present state."""
 
-    def __init__(self, craft: Callable[[], Craft]) -> None:
+    def __init__(self, craft: Callable[[], Craft], tree: Tree) -> None:
         self._craft = craft
+        self._boxes = [box for box in _BOXES if box != "PASSTHRU" or tree is Tree.TESTCODE3]
         self._settings = {
             HarakiriCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
             HarakiriCommand.PID: bytes((40, 30, 23)) * len(_PIDS),
-            HarakiriCommand.BOX: box_activation(len(_BOXES)),
+            HarakiriCommand.BOX: box_activation(len(self._boxes)),
         }
 
     def answer(self, command: int, payload: bytes) -> bytes:
@@ -208,7 +210,7 @@ class MspAnswers:
             case HarakiriCommand.MOTOR_PINS:
                 return bytes(range(1, 9))
             case HarakiriCommand.BOXNAMES:
-                return "".join(f"{name};" for name in _BOXES).encode()
+                return "".join(f"{name};" for name in self._boxes).encode()
             case HarakiriCommand.PIDNAMES:
                 return "".join(f"{name};" for name in _PIDS).encode()
             case HarakiriCommand.DEBUG:

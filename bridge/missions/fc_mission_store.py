@@ -44,7 +44,7 @@ class PushFailure(Enum):
     REFUSED = "the flight controller refused a record"
     UNSAFE = "an item's bytes would set off a trap of the firmware: move a waypoint a little"
     FLASH = "the flight controller could not write its flash; its old mission is kept"
-    NO_ANSWER = "the flight controller does not answer; its old mission is kept"
+    NO_ANSWER = "the flight controller does not answer; its old mission is kept: write it again"
     OUT_OF_TIME = "the flight controller did not take it in time; its old mission is kept: check the wiring"
     STOPPED = "naze-bridge was stopped meanwhile; the old mission is kept"
     UNCERTAIN = "Link lost while writing: checked when it is back"

@@ -344,7 +344,7 @@ class MissionService:
             elif has_arrived:
                 outcome, text = Outcome.VERIFIED, f"The mission did arrive: {held.identity.count} records"
             elif mission.before == held.identity or (mission.before is None and held.records):
-                outcome, text = Outcome.FAILED, "The mission did not arrive: old mission kept"
+                outcome, text = Outcome.FAILED, "The mission did not arrive: old mission kept, write it again"
             else:
                 outcome, text = Outcome.FAILED, "The mission did not arrive whole: write it again"
             if mission.number is not None:
