@@ -40,6 +40,7 @@ class RealDevice:
 
     def __init__(self, bench: RealBench) -> None:
         self._bench = bench
+        self._is_busy = False
 
     def request(self, command: int, payload: bytes) -> bytes | None:
         frame = self._bench.ask(request(command, payload), 2.0)
@@ -52,10 +53,13 @@ class RealDevice:
         self._bench.run(milliseconds / 1000)
 
     def arm(self, armed: bool) -> None:
+        # With a scheduled write it would refuse.
         self._bench.hold_write(False)
         self._bench.arm(armed)
+        self._bench.hold_write(self._is_busy)
 
     def set_busy(self, busy: bool) -> None:
+        self._is_busy = busy
         self._bench.hold_write(busy)
 
     def power_cycle(self) -> None:

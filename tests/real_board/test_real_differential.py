@@ -17,6 +17,7 @@ from protocols.msp.mission import (
 from protocols.wp_record import WpRecord
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand as Msp
+from simulator.options import SimOptions, Tree
 from tests.support.naze_bench import Bench, WireBench, mission
 from tests.support.real_bench import Figure, RealBench
 
@@ -28,11 +29,14 @@ _MEASURED = {Msp.STATUS, Msp.RAW_IMU, Msp.RC, Msp.RAW_GPS, Msp.COMP_GPS, Msp.ATT
 _MEASURED |= {Msp.DEBUG, Msp.MOTOR, Msp.WP}
 #: Answered with settings of this craft, which the model does not have.
 _SETTINGS = frozenset((Msp.RC_TUNING, Msp.PID, Msp.BOX, Msp.SERVO, Msp.MISC))
-_READS = tuple(command for command in Msp if command < Msp.WP and command is not Msp.BOXNAMES)
+_READS = tuple(command for command in Msp if command < Msp.WP)
 
 
 def test_a_hundred_exchanges(image: Image, flash: bytes, figure: Figure) -> None:
-    real, model = RealBench(image, flash), Bench()
+    real = RealBench(image, flash)
+    boxes = real.payload(request(Msp.BOXNAMES))
+    model = Bench(SimOptions(tree=Tree.TESTCODE3 if b"PASSTHRU" in boxes else Tree.WEBSTORE1))
+    assert model.payload(request(Msp.BOXNAMES)) == boxes
     dice = random.Random(13)
     different = []
     lists = [mission(count, seed) for count in (0, 1, 15, 40) for seed in (1, 2)]
