@@ -193,6 +193,20 @@ def test_strangers_by_the_hundred_take_no_memory_and_leave_room() -> None:
     assert station.said("HEARTBEAT")
 
 
+def test_thirty_that_want_everything_share_2400_messages_a_second() -> None:
+    world = start()
+    stations = [GroundStation(world, str(number), sysid=number) for number in range(1, 31)]
+    for station in stations:
+        station.send(gcs_heartbeat())
+        for msgid in (m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_RAW_IMU, m.MAVLINK_MSG_ID_VFR_HUD):
+            station.send(m.MAVLink_command_long_message(1, 1, 511, 0, msgid, 10_000, 0, 0, 0, 0, 0))
+    world.run(3)
+    for station in stations:
+        station.frames_heard.clear()
+    world.run(2)
+    assert 1000 < sum(len(station.frames_heard) for station in stations) < 2 * 2600
+
+
 def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
     world = start()
     station = GroundStation(world, "tcp")

@@ -277,6 +277,18 @@ def test_many_that_begin_and_never_end_hold_up_no_other() -> None:
     assert state(world) is None
 
 
+def test_few_lists_that_a_station_gives_up_are_stored() -> None:
+    world, station = holding()
+    for _ in range(60):
+        station.take()
+        station.send(count_message(3))
+        world.wait_until(lambda _: bool(requested(station)), 2)
+        station.send(item_message(0, OLD[0]))
+        station.send(ack_message(A.ERROR))
+        world.run(0.3)
+    assert 10 < len(world.store.missions) <= 25
+
+
 def hanging_push(world: World) -> None:
     """The command line pushes a list, which waits for a disk that hangs."""
     world.store.delay_s = 60
