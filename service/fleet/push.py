@@ -13,7 +13,7 @@ import zenoh
 
 from service.control.mission_data import Json
 from service.fleet.payload import decode, part, text, whole
-from service.fleet.session import AT_ONCE, ask, send_query
+from service.fleet.session import AT_ONCE, NO_COMMANDS, ask, send_query
 from service.fleet.vehicle import BridgeState, bridge_of, replier
 from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
 
@@ -23,7 +23,6 @@ _STATE_TIMEOUT_S = 2.0
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _LOOK = "`naze-bridge fleet list` shows what it holds"
 _LOST = f"it or the router disconnected before the result was known; {_LOOK} when it is back"
-_SILENT = "it takes no commands: they are off there (zenoh.commands), or the router's access control denies them to you"
 _TWO = "several bridges use this name, and the mission is for one: give each its own name (zenoh.vehicle)"
 _TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
@@ -108,7 +107,7 @@ class FleetPush:
         """Take the end of the replies; `is_alive` without any reply means that the command is switched off."""
         progress = self.vehicles[vehicle]
         if not progress.is_done:
-            progress.error = _SILENT if is_alive and progress.total is None else _LOST
+            progress.error = NO_COMMANDS if is_alive and progress.total is None else _LOST
 
     def gone(self, vehicle: str) -> None:
         """Take the loss of a vehicle's liveliness token."""

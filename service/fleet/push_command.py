@@ -97,11 +97,11 @@ def verify_mission(
     mission, _ = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):
         trials = try_mission(session, prefix, _meant(session, prefix, names, conditions), mission)
-    held = sum(trial.is_held for trial in trials)
+    held = sum(trial.is_held is True for trial in trials)
     if as_json:
         print_json({"vehicles": [asdict(each) | {"is_held": each.is_held} for each in trials]})
     else:
-        print_table(trial_table(trials))
+        print_table(trial_table(trials, "Holds it", lambda trial: trial.is_held))
         click.echo(f"{held} of {len(trials)} vehicles hold the mission")
     if held < len(trials):
         raise SystemExit(1)
@@ -133,7 +133,7 @@ def _show_trials(trials: list[Trial], as_json: bool) -> None:
     if as_json:
         print_json({"vehicles": [asdict(each) for each in trials], "failed": failed})
     else:
-        print_table(trial_table(trials))
+        print_table(trial_table(trials, "Takes it", lambda trial: trial.is_taken))
         click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would take the mission; nothing was written")
     if failed:
         raise SystemExit(1)

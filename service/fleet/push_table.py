@@ -16,6 +16,12 @@ from service.fleet.payload import part, text, whole
 from service.fleet.push import FleetPush, PushState
 from service.fleet.trial import Trial
 
+_ANSWERS = {
+    True: Text("yes", style="green"),
+    False: Text("no", style="bold red"),
+    None: Text("not known", style="yellow"),
+}
+
 
 @contextmanager
 def progress_bars(fleet: FleetPush, item_count: int) -> Iterator[Callable[[FleetPush], None]]:
@@ -52,19 +58,18 @@ def _result(progress: PushState) -> Text:
     return Text("under way" if progress.is_begun else "not begun", style="yellow")
 
 
-def trial_table(trials: Sequence[Trial]) -> Table:
-    """One row per vehicle: its verdict on the mission, and each correction below it."""
+def trial_table(trials: Sequence[Trial], question: str, answer: Callable[[Trial], bool | None]) -> Table:
+    """One row per vehicle: the answer to a question, and each correction below it."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     table.add_column("Vehicle", overflow="fold")
     table.add_column("Records", justify="right", no_wrap=True)
     table.add_column("Checksum", no_wrap=True)
-    table.add_column("Holds it", no_wrap=True)
+    table.add_column(question, no_wrap=True)
     table.add_column("Details")
     for trial in trials:
         said = [trial.error] if trial.error else [_correction(finding) for finding in trial.findings]
         count = "" if trial.count is None else str(trial.count)
-        holds = Text("yes", style="green") if trial.is_held else Text("no", style="bold red")
-        table.add_row(Text(trial.vehicle), count, trial.checksum or "", holds, Text("\n".join(said)))
+        table.add_row(Text(trial.vehicle), count, trial.checksum or "", _ANSWERS[answer(trial)], Text("\n".join(said)))
     return table
 
 

@@ -6,7 +6,7 @@ import zenoh
 from service.control.mission_data import Json
 from service.fleet.payload import decode_reply
 from service.fleet.session import FleetError, ask
-from service.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
+from service.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
 from service.zenoh_link.keys import ALIVE, STATE, full
 
 #: After this a bridge without a reply is shown as not answering.
@@ -42,7 +42,7 @@ def roll_call(session: zenoh.Session, prefix: str) -> list[FleetVehicle]:
 
 def chosen(bridges: set[BridgeState], names: tuple[str, ...], prefix: str) -> list[str]:
     """The names to use: the given ones, or all; FleetError if one is not alive."""
-    there = sorted({bridge.vehicle for bridge in bridges})
+    there = sorted({bridge.vehicle for bridge in bridges}, key=in_order)
     if not there:
         raise FleetError(f"no vehicle is alive under {prefix!r}: is naze-bridge running there, with this prefix?")
     for name in names:

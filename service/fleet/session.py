@@ -65,6 +65,10 @@ def ask(
         yield reply
 
 
+#: Why a vehicle that is alive does not reply to a command.
+NO_COMMANDS = "takes no commands: zenoh.commands is off there, or the router denies you"
+
+
 def ask_each(
     session: zenoh.Session,
     prefix: str,

@@ -8,11 +8,10 @@ from typing import Any
 import zenoh
 
 from service.fleet.payload import decode, part, text, whole
-from service.fleet.session import ask_each
+from service.fleet.session import NO_COMMANDS, ask_each
 from service.zenoh_link.keys import CHECK, MISSION_CURRENT
 
 _TIMEOUT_S = 15.0
-_SILENT = "it takes no commands: they are off there (zenoh.commands), or the router's access control denies them to you"
 
 
 @dataclass(slots=True)
@@ -23,16 +22,21 @@ class Trial:
     """
 
     vehicle: str
-    error: str | None = _SILENT
+    error: str | None = NO_COMMANDS
     count: int | None = None
     checksum: str | None = None
     held: str | None = None
     findings: tuple[Any, ...] = ()
 
     @property
-    def is_held(self) -> bool:
-        """True if the vehicle holds the mission, by its checksum."""
-        return self.error is None and self.checksum is not None and self.checksum == self.held
+    def is_held(self) -> bool | None:
+        """True if the vehicle holds the mission, by its checksum; None if it gave no verdict."""
+        return None if self.checksum is None else self.error is None and self.checksum == self.held
+
+    @property
+    def is_taken(self) -> bool | None:
+        """True if the vehicle would take the mission; None if it gave no verdict."""
+        return None if self.checksum is None else self.error is None
 
 
 def try_mission(session: zenoh.Session, prefix: str, names: Iterable[str], mission: bytes) -> list[Trial]:
@@ -50,7 +54,7 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
     answer = reply.ok or reply.err
     data = None if answer is None else decode(answer)
     if data is None:
-        trial.error = _SILENT
+        trial.error = NO_COMMANDS
         return
     result = part(data, "result")
     if reply.ok is None or not isinstance(result, dict):

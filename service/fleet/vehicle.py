@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A vehicle of the fleet, made from its `state`."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -89,4 +90,9 @@ def as_fleet(vehicles: Iterable[FleetVehicle]) -> list[FleetVehicle]:
     found = list(vehicles)
     bridges = Counter(vehicle.name for vehicle in found)
     counted = [replace(vehicle, bridges=bridges[vehicle.name]) for vehicle in found]
-    return sorted(counted, key=lambda vehicle: (vehicle.name, vehicle.session_id))
+    return sorted(counted, key=lambda vehicle: (in_order(vehicle.name), vehicle.session_id))
+
+
+def in_order(name: str) -> list[tuple[int, str]]:
+    """A sort key with numbers by their value: naze-2 comes before naze-10."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]

@@ -15,7 +15,7 @@ from service.fleet.conditions import Condition
 from service.fleet.fleet_table import watch_table
 from service.fleet.keyboard import scrolling, wait_for_scroll
 from service.fleet.session import is_connected
-from service.fleet.vehicle import FleetVehicle
+from service.fleet.vehicle import FleetVehicle, in_order
 from service.fleet.watch import Watch
 
 _REFRESH_S = 0.5
@@ -93,4 +93,4 @@ def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[ScreenRow]:
     fleet, ages_s = seen.look()
     rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in zip(fleet, ages_s, strict=True)]
     rows = [row for row in rows if all(condition(row.vehicle) for condition in conditions)]
-    return sorted(rows, key=lambda row: (row.vehicle.armed is not True, not row.problem, row.vehicle.name))
+    return sorted(rows, key=lambda row: (row.vehicle.armed is not True, not row.problem, in_order(row.vehicle.name)))

@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.console import Console
 
-from service.fleet.vehicle import FleetVehicle
+from service.fleet.vehicle import FleetVehicle, in_order
 from service.fleet.watch import Watch
 from service.fleet.watch_screen import ScreenRow, screen
 
@@ -81,3 +81,8 @@ def test_a_backlog_is_shown_as_old_as_it_is() -> None:
     assert heard(1408.0) == 0
     now = 5009.0
     assert heard(200.0) == 0, "its clock was set back"
+
+
+def test_numbers_in_names_are_ordered_by_value() -> None:
+    names = ["kite-10", "kite-2", "2kites", "kite", "kite-02b", "Kite-1"]
+    assert sorted(names, key=in_order) == ["2kites", "Kite-1", "kite", "kite-2", "kite-02b", "kite-10"]

@@ -16,7 +16,7 @@ from service.control.client import ControlError, ask_daemon
 from tests.support.plan import PlanRow
 
 #: Seconds after which something that must come at all counts as not coming.
-PATIENCE = 20.0
+PATIENCE = 50.0
 REPOSITORY = Path(__file__).resolve().parents[2]
 NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')"]
 T = TypeVar("T")
