@@ -16,6 +16,7 @@ from bridge.model.vehicle import (
     FlightState,
     GlobalPosition,
     GpsFix,
+    GpsTime,
     Health,
     Height,
     Orientation,
@@ -34,6 +35,8 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
+#: 2020: a time before that is no time of a GPS.
+_EARLIEST_UNIX_S = 1_577_836_800
 #: The autopilot field of a heartbeat's payload. Cameras and gimbals send INVALID.
 _AUTOPILOT_AT = 5
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
@@ -73,6 +76,7 @@ class MavlinkTelemetry:
             m.MAVLINK_MSG_ID_SCALED_PRESSURE: self._scaled_pressure,
             m.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels,
             m.MAVLINK_MSG_ID_RC_CHANNELS_RAW: self._rc_channels,
+            m.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
         }
         #: Message id by the bytes of a frame's header that hold sender and message id.
         self._known: dict[bytes, int] = {}
@@ -182,6 +186,12 @@ class MavlinkTelemetry:
     def _vfr_hud(self, message: Message, now: float) -> None:
         if self._is_harakiri and math.isfinite(message.alt) and math.isfinite(message.climb):
             self._vehicle.hear(Height(now, Source.MAVLINK, message.alt, message.climb))
+
+    def _system_time(self, message: Message, now: float) -> None:
+        """An autopilot without a GPS time counts from its start."""
+        unix_s = message.time_unix_usec / 1e6
+        if unix_s > _EARLIEST_UNIX_S:
+            self._vehicle.hear(GpsTime(now, Source.MAVLINK, unix_s))
 
     def _home_position(self, message: Message, _now: float) -> None:
         self._vehicle.hear_home(message.latitude, message.longitude)

@@ -199,6 +199,13 @@ class MissionLeg(Reading):
 
 
 @dataclass(frozen=True, slots=True)
+class GpsTime(Reading):
+    """UTC by the flight controller's GPS, seconds since 1970."""
+
+    unix_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Home:
     """Degrees * 1e7; altitude_m above mean sea level."""
 

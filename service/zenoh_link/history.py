@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Answers `history?_time=[..]`: events of this run, earlier ones from telemetry logs, and missions from the store."""
 
-import time
 from collections import deque
+from collections.abc import Callable
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -22,9 +22,10 @@ _DEFAULT_RANGE = "[now(-1h)..]"
 class History:
     """Keeps the newest events. Missions and telemetry logs (in the folder `logs`) are read on request."""
 
-    def __init__(self, jobs: MissionJobs, logs: Path | None) -> None:
+    def __init__(self, jobs: MissionJobs, logs: Path | None, clock: Callable[[], float]) -> None:
         self._jobs = jobs
         self._logs = logs
+        self._clock = clock
         self._disk = DiskThread("history")
         self._events: deque[Json] = deque(maxlen=_MAX_EVENTS)
 
@@ -34,7 +35,7 @@ class History:
 
     async def answer(self, time_range: str | None, max_positions: int) -> Json:
         """The events, missions and positions of a time range; StoreError, OSError, or ValueError about the range."""
-        wanted = parse_time_range(time_range or _DEFAULT_RANGE, time.time())
+        wanted = parse_time_range(time_range or _DEFAULT_RANGE, self._clock())
         found = await self._jobs.missions_between(wanted.start_s, wanted.end_s, _MAX_MISSIONS)
         kept_from_s = self._events[0]["time_s"] if self._events else inf
         logged = LoggedPast()

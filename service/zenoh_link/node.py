@@ -39,6 +39,7 @@ from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
 from service.zenoh_link.rates import SampleRates
 from service.zenoh_link.session import SessionThread
+from service.zenoh_link.time_source import SampleClock
 from service.zenoh_link.vehicle_data import VehicleData
 
 _STATE_INTERVAL_S = 1.0
@@ -59,16 +60,17 @@ class Node:
         self._config = make_config(settings)
         self._endpoints = connect_endpoints(self._config)
         self._thread = SessionThread(self._config, self._declare)
-        self._payloads = Payloads(settings.encoding)
+        clock = SampleClock(self._loop.time)
+        self._payloads = Payloads(settings.encoding, clock.unix_s)
         self._publisher = Publisher(self._payloads, self._readers_changed)
         self._mavlink = MavlinkLink(self._publisher, daemon)
         self._presence = Liveliness(settings.vehicle, self._note)
-        self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others)
+        self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others, clock)
         self._queries = Queries(self._thread)
         jobs = MissionJobs(daemon)
         state_dir = daemon.settings.state_dir
         self._rates = SampleRates(settings.profile, settings.rates)
-        self._history = History(jobs, None if state_dir is None else state_dir / TLOG_FOLDER)
+        self._history = History(jobs, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
         self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads, self._history).answerers
         if settings.commands:
             self._answerers |= CommandQueries(jobs, self._rates).answerers

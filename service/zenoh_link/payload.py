@@ -3,7 +3,6 @@
 
 import json
 import math
-import time
 from collections.abc import Callable, Hashable
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -42,10 +41,11 @@ def decoded(data: bytes, encoding: str) -> Any:
 
 
 class Payloads:
-    """Makes the payloads of one vehicle. Each key has its own sequence."""
+    """Makes the payloads of one vehicle. Each key has its own sequence. `clock`: seconds since 1970 (UTC)."""
 
-    def __init__(self, encoding: PayloadEncoding) -> None:
+    def __init__(self, encoding: PayloadEncoding, clock: Callable[[], float]) -> None:
         self._encoding = encoding
+        self._clock = clock
         self._next: dict[str, int] = {}
 
     def encoding(self, key: ZenohKey) -> zenoh.Encoding:
@@ -62,17 +62,12 @@ class Payloads:
         """Begin the next payload of a key."""
         seq = self._next.get(key.suffix, 0)
         self._next[key.suffix] = seq + 1
-        return {"v": VERSION, "seq": seq, "time_s": _now_s()}
+        return {"v": VERSION, "seq": seq, "time_s": self._clock()}
 
     def answer(self, key: ZenohKey, body: Json) -> bytes:
         """Make the reply to a query: it has the number of the last sample."""
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
-        return self.encode(key, {"v": VERSION, "seq": seq, "time_s": _now_s(), **body})
-
-
-def _now_s() -> float:
-    """The time in milliseconds: a Pi's clock is no better, and each digit costs data."""
-    return round(time.time(), 3)
+        return self.encode(key, {"v": VERSION, "seq": seq, "time_s": self._clock(), **body})
 
 
 def plain(thing: Any) -> Json:

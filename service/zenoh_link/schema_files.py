@@ -51,7 +51,10 @@ def schemas() -> dict[str, Json]:
     made["state"] = {
         "vehicle": {"type": "string", "description": "its name, as in the key"},
         "others_of_this_name": {"type": "integer", "minimum": 0, "description": "more bridges that use the name"},
-        "time_source": {"type": "string", "description": "ntp: the clock was set over the network; pi: it was not"},
+        "time_source": {
+            "type": "string",
+            "description": "gps: the flight controller's; ntp: the clock was set over the network; pi: it was not",
+        },
         **_fields(VehicleReport),
     }
     made["event"] = {

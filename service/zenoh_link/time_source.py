@@ -1,12 +1,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The source of the bridge's time, so that a reader can judge a timestamp."""
+"""The time of samples, and its source, so that a reader can judge it."""
 
+import time
+from collections.abc import Callable
 from pathlib import Path
+
+from bridge.model.vehicle import Fix, GpsFix, GpsTime, Vehicle
 
 #: Made by systemd-timesyncd when it has set the clock. adjtimex(2) is forbidden to the hardened service.
 _SYNCHRONIZED = Path("/run/systemd/timesync/synchronized")
+#: Autopilots send SYSTEM_TIME once a second or more often.
+_FRESH_S = 5.0
+#: A smaller difference to the Pi's clock is the time on the line.
+_TOLERANCE_S = 0.5
 
 
-def time_source() -> str:
-    """Either "ntp" (the clock was set over the network since the start) or "pi" (it may be hours off)."""
-    return "ntp" if _SYNCHRONIZED.exists() else "pi"
+class SampleClock:
+    """The Pi's clock, corrected while it is wrong and the flight controller has the time from its GPS.
+
+    `now`: the monotonic time of readings, s.
+    """
+
+    def __init__(self, now: Callable[[], float], synchronized: Path = _SYNCHRONIZED) -> None:
+        self._now = now
+        self._synchronized = synchronized
+        self._offset_s = 0.0
+
+    def unix_s(self) -> float:
+        """Seconds since 1970 (UTC), in milliseconds: a Pi's clock is no better, and each digit costs data."""
+        return round(time.time() + self._offset_s, 3)
+
+    def source(self, vehicle: Vehicle) -> str:
+        """Either gps (the flight controller has a 3D fix and the time), ntp (the clock was set) or pi. Follows it."""
+        gps_time, fix, now = vehicle.last(GpsTime), vehicle.last(GpsFix), self._now()
+        if gps_time is not None and fix is not None and fix.fix is Fix.THREE_D:
+            age_s = now - min(gps_time.heard_at, fix.heard_at)
+            if age_s < _FRESH_S:
+                self._follow(gps_time.unix_s + now - gps_time.heard_at - time.time())
+                return "gps"
+        if self._synchronized.exists():
+            self._offset_s = 0.0
+            return "ntp"
+        return "pi"
+
+    def _follow(self, offset_s: float) -> None:
+        if abs(offset_s) < _TOLERANCE_S:
+            self._offset_s = 0.0
+        elif abs(offset_s - self._offset_s) > _TOLERANCE_S:
+            self._offset_s = offset_s

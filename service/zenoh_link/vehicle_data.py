@@ -10,23 +10,24 @@ from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from service.control.mission_data import Json
 from service.zenoh_link.payload import plain, strict
-from service.zenoh_link.time_source import time_source
+from service.zenoh_link.time_source import SampleClock
 
 
 class VehicleData:
     """Reads the bridge. `others`: bridges with the same name."""
 
-    def __init__(self, vehicle: str, bridge: Bridge, others: set[str]) -> None:
+    def __init__(self, vehicle: str, bridge: Bridge, others: set[str], clock: SampleClock) -> None:
         self._vehicle = vehicle
         self._bridge = bridge
         self._others = others
+        self._clock = clock
 
     def state(self) -> Json:
         """The whole state."""
         return {
             "vehicle": self._vehicle,
             "others_of_this_name": len(self._others),
-            "time_source": time_source(),
+            "time_source": self._clock.source(self._bridge.session.vehicle),
             **plain(self._bridge.report.whole()),
         }
 

@@ -114,7 +114,7 @@ class Told:
     encoding: PayloadEncoding
 
     def group(self, group: Group) -> Any:
-        key, payloads = TELEMETRY[group], Payloads(self.encoding)
+        key, payloads = TELEMETRY[group], Payloads(self.encoding, lambda: 0.0)
         body = payloads.head(key) | plain(self.report.group(group))
         return decoded(payloads.encode(key, body), str(payloads.encoding(key)))
 
