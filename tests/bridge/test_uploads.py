@@ -289,6 +289,16 @@ def test_few_lists_that_a_station_gives_up_are_stored() -> None:
     assert 10 < len(world.store.missions) <= 25
 
 
+def test_nothing_is_kept_of_a_station_that_hangs_up_before_its_answer() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(60), 60)
+    assert state(world) is Delivering
+    world.bridge.gcs_gone(station.peer, world.now)
+    world.run(3)
+    assert acks(station) == [A.ACCEPTED]
+    assert station.peer not in world.bridge.ground._writers
+
+
 def hanging_push(world: World) -> None:
     """The command line pushes a list, which waits for a disk that hangs."""
     world.store.delay_s = 60
