@@ -38,8 +38,8 @@ _WHEELS_OF = {"amd64": ("x86_64",), "arm64": ("aarch64",), "armhf": ("armv7l", "
 _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux2014")
 
 
-def build(architecture: str, pythons: Sequence[str] = PYTHONS) -> Path:
-    """Build the package; returns its path."""
+def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _DIST) -> Path:
+    """Build the package in `folder`; returns its path."""
     work = _WORK / architecture
     shutil.rmtree(work, ignore_errors=True)
     wheels = work / "wheels"
@@ -56,8 +56,8 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS) -> Path:
         _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *target, requirement)
     root = work / "root"
     lay_out(root, libraries, _PROJECT, project["version"], architecture)
-    _DIST.mkdir(exist_ok=True)
-    package = _DIST / f"naze-bridge_{project['version']}_{architecture}.deb"
+    folder.mkdir(exist_ok=True)
+    package = folder / f"naze-bridge_{project['version']}_{architecture}.deb"
     _run("dpkg-deb", "--root-owner-group", "-Zxz", "--build", root, package)
     return package
 

@@ -47,8 +47,8 @@ _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do
 
 
 @pytest.fixture(scope="module")
-def package() -> Path:
-    return build(_HOST, _PYTHONS)
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(_HOST, _PYTHONS, tmp_path_factory.mktemp("package"))
 
 
 @pytest.fixture
