@@ -14,6 +14,7 @@ from benchmarks.line import Line
 from benchmarks.processes import ROOT, daemon, running
 
 OURS, FLOOR, MAVPROXY, MAVP2P = "naze-bridge", "C floor", "MAVProxy", "mavp2p"
+MAVLINK_ROUTER = "mavlink-router"
 _SPEED = 57600
 #: Starts a forwarder in a folder, on a line; yields its process id.
 _Start = Callable[[Path, Line], AbstractContextManager[int]]
@@ -28,10 +29,15 @@ class Forwarder:
 
 
 def forwarders() -> list[Forwarder]:
-    """The forwarders on this machine: the floor needs cc; mavp2p is looked for as $MAVP2P and on the path."""
+    """The forwarders on this machine: the floor needs cc.
+
+    mavlink-router and mavp2p are looked for as $MAVLINK_ROUTERD and $MAVP2P, and on the path.
+    """
     found = [Forwarder(OURS, _naze_bridge), Forwarder(MAVPROXY, _mavproxy)]
     if shutil.which("cc"):
         found.insert(0, Forwarder(FLOOR, _floor))
+    if router := os.environ.get("MAVLINK_ROUTERD") or shutil.which("mavlink-routerd"):
+        found.append(Forwarder(MAVLINK_ROUTER, lambda folder, line: _mavlink_router(router, folder, line)))
     if mavp2p := os.environ.get("MAVP2P") or shutil.which("mavp2p"):
         found.append(Forwarder(MAVP2P, lambda folder, line: _mavp2p(mavp2p, folder, line)))
     return found
@@ -64,6 +70,17 @@ def _mavproxy(folder: Path, line: Line) -> Iterator[int]:
     program = [sys.executable, str(Path(sys.executable).parent / "mavproxy.py"), "--daemon"]
     link = [f"--master={line.tty}", f"--baudrate={_SPEED}", f"--out=127.0.0.1:{line.port}", "--mav20"]
     with running([*program, *link, f"--state-basedir={folder}"], folder / "mavproxy.log") as process:
+        yield process.pid
+
+
+@contextmanager
+def _mavlink_router(program: str, folder: Path, line: Line) -> Iterator[int]:
+    """The daemon without its TCP server, and regardless of the machine's configuration."""
+    configuration = folder / "mavlink-router.conf"
+    configuration.write_text("[General]\nTcpServerPort = 0\n")
+    options = ["--conf-file", str(configuration), "--conf-dir", str(folder / "none")]
+    command = [program, *options, "--endpoint", f"127.0.0.1:{line.port}", f"{line.tty}:{_SPEED}"]
+    with running(command, folder / "mavlink-router.log") as process:
         yield process.pid
 
 

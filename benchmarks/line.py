@@ -59,6 +59,7 @@ class Line:
     def __init__(self) -> None:
         self._autopilot, self._held_open = pty.openpty()
         tty.setraw(self._held_open)
+        os.set_blocking(self._autopilot, False)
         self.tty = os.ttyname(self._held_open)
         self._ground = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._ground.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
@@ -111,7 +112,7 @@ class Line:
         frames: list[bytes] = []
         due = time.monotonic_ns()
         for piece in pieces:
-            os.write(self._autopilot, piece)
+            self._write(piece)
             due += int(1e9 / rate)
             while (left := due - time.monotonic_ns()) > 0:
                 frames += self._frames(left / 1e9)
@@ -126,7 +127,7 @@ class Line:
         return b"\xfd" + body + mcrf4xx(body + bytes((CRC_EXTRA[msgid],))).to_bytes(_CRC_SIZE, "little")
 
     def _send_timed(self, passage: Passage, count: int) -> None:
-        os.write(self._autopilot, b"".join(self._timed_frame() for _ in range(count)))
+        self._write(b"".join(self._timed_frame() for _ in range(count)))
         passage.sent += count
 
     def _timed_frame(self) -> bytes:
@@ -137,7 +138,14 @@ class Line:
     def _send_heartbeat(self, now_ns: int) -> None:
         if now_ns >= self._heartbeat_at_ns:
             self._heartbeat_at_ns = now_ns + _HEARTBEAT_INTERVAL_NS
-            os.write(self._autopilot, self.frame(messages.MAVLINK_MSG_ID_HEARTBEAT, _HEARTBEAT))
+            self._write(self.frame(messages.MAVLINK_MSG_ID_HEARTBEAT, _HEARTBEAT))
+
+    def _write(self, data: bytes) -> None:
+        while data:
+            _, writable, _ = select.select([], [self._autopilot], [], _TIMEOUT_S)
+            if not writable:
+                raise BenchmarkError(f"the forwarder has read nothing for {_TIMEOUT_S:.0f} s")
+            data = data[os.write(self._autopilot, data) :]
 
     def _receive(self, passage: Passage, first: int, timeout_s: float) -> bool:
         """Receive frames; False if none arrived."""
