@@ -26,6 +26,8 @@ _COMMANDS = {
     "demo": LazyCommand("service.cli.demo:demo", "Show a mission written to a simulated Naze."),
 }
 
+#: Libraries and their optional dependencies, 12 MB together, that the daemon does not need: OpenSSL, coloured logs.
+_OPTIONAL = (("hmac", "_hashlib"), ("asyncio", "ssl"), ("structlog", "rich"))
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 
@@ -56,17 +58,18 @@ class _Main(LazyGroup):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name == "run":
-            _load_structlog_alone()
+            for library, dependency in _OPTIONAL:
+                _import_without(library, dependency)
         return super().get_command(ctx, cmd_name)
 
 
-def _load_structlog_alone() -> None:
-    """Import structlog without rich, which it would load for tracebacks: 5 MB that a daemon does not need."""
-    if "structlog" in sys.modules or "rich" in sys.modules:
+def _import_without(library: str, dependency: str) -> None:
+    """Import a library without its optional dependency."""
+    if library in sys.modules or dependency in sys.modules:
         return
-    sys.modules["rich"] = None  # type: ignore[assignment]
-    importlib.import_module("structlog")
-    del sys.modules["rich"]
+    sys.modules[dependency] = None  # type: ignore[assignment]
+    importlib.import_module(library)
+    del sys.modules[dependency]
 
 
 @click.group(cls=_Main, commands=_COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
