@@ -182,16 +182,15 @@ class Bridge:
 
     def next_deadline(self) -> float:
         """The time of the next `tick`."""
-        deadlines = (
+        return min(
             self.session.next_deadline(),
             self.runner.next_deadline(),
             self._uploads.next_deadline(),
             self.ground.next_deadline(),
             self._announcer.next_deadline(),
             self._watch.next_deadline(),
-            self._vehicle.next_deadline() if self._is_represented else None,
+            self._vehicle.next_deadline() if self._is_represented else inf,
         )
-        return min((deadline for deadline in deadlines if deadline is not None), default=inf)
 
     # Between the parts.
 

@@ -130,7 +130,7 @@ class Ground:
             self._log_event("info", "gcs.silent", peer=str(peer))
         return silent
 
-    def next_deadline(self) -> float | None:
+    def next_deadline(self) -> float:
         """The time of the next `expire`."""
         return self._stations.next_deadline()
 

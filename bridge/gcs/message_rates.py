@@ -2,6 +2,7 @@
 """Message rates of each ground station: as requested, else the defaults. Sans-IO."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from math import inf
 
 from bridge.gcs.budget import TokenBucket
@@ -47,12 +48,12 @@ class MessageRates:
     def take_due(self, msgid: int, peers: Sequence[Peer], now: float) -> list[Peer]:
         """The peers for which the message is due now; schedules the next one for each."""
         taken = []
-        share = Rate(_MOST_PER_S / max(1, len(peers)), _MOST_PER_S / max(1, len(peers)))
         for peer in peers:
             interval_s = self.interval_s(peer, msgid)
             due = self._due.get((peer, msgid), -inf)
             if interval_s == inf or now < due - interval_s * _EARLY:
                 continue
+            share = _share(len(peers))
             bucket = self._shares.get(peer)
             if bucket is None:
                 bucket = self._shares[peer] = TokenBucket(share)
@@ -74,3 +75,9 @@ class MessageRates:
             del self._shares[peer]
         for key in [key for key in self._due if key[0] not in present]:
             del self._due[key]
+
+
+@cache
+def _share(peers: int) -> Rate:
+    """The share of each of so many peers."""
+    return Rate(_MOST_PER_S / peers, _MOST_PER_S / peers)

@@ -4,14 +4,13 @@
 from collections.abc import Hashable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from bridge.gcs.cost import Cost
 from protocols.mavlink.dialect import Message
 
 
-@dataclass(frozen=True, slots=True)
-class Peer:
+class Peer(NamedTuple):  # hashed several times for each message: as a tuple, in C
     """The other end of a link: a UDP address or a TCP connection. `key` is the service's own handle."""
 
     link: str

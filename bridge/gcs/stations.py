@@ -63,7 +63,7 @@ class Stations:
         self._newcomers = TokenBucket(_NEWCOMERS)
         self._seniors: set[Peer] | None = None  # counted again after each change
         self._displaced: list[Peer] = []
-        self._expiry_due: float | None = None
+        self._expiry_due = inf
 
     def admits(self, peer: Peer, now: float, *, is_listener: bool) -> bool:
         """Count a frame of an unproven peer; False if it is a newcomer to a full link and there are too many."""
@@ -133,15 +133,15 @@ class Stations:
         """Forget silent peers; returns them and those displaced by others."""
         silent = [peer for peer in self._displaced if peer not in self._known]
         self._displaced.clear()
-        if self._expiry_due is not None and now >= self._expiry_due:
+        if now >= self._expiry_due:
             silent += [peer for peer, known in self._known.items() if now >= self._expires_at(peer, known)]
             for peer in silent:
                 self._known.pop(peer, None)
             self._seniors = None
-            self._expiry_due = min((self._expires_at(peer, known) for peer, known in self._known.items()), default=None)
+            self._expiry_due = min((self._expires_at(peer, known) for peer, known in self._known.items()), default=inf)
         return silent
 
-    def next_deadline(self) -> float | None:
+    def next_deadline(self) -> float:
         """The earliest time that a peer may expire; may be too early, which saves a search on each frame."""
         return 0.0 if self._displaced else self._expiry_due
 
@@ -179,7 +179,7 @@ class Stations:
             if len(known.speakers) >= _MAX_SPEAKERS:
                 return
             # From now on another peer may count as moved.
-            self._expiry_due = now + MOVED_S if self._expiry_due is None else min(now + MOVED_S, self._expiry_due)
+            self._expiry_due = min(now + MOVED_S, self._expiry_due)
         known.speakers[speaker] = now
 
     def _expires_at(self, peer: Peer, known: _Known) -> float:

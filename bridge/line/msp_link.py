@@ -10,6 +10,7 @@ loss.
 from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
+from math import inf
 
 from bridge.line.conversation import Send
 from protocols.frsky import FRSKY_SPEED
@@ -102,7 +103,7 @@ class MspLink:
         self.any_byte = False
         #: Set for boards that serve one request at a time: the interval, s.
         self.turn_s = 0.0
-        self._follow_up_at: float | None = None
+        self._follow_up_at = inf
         self._risky: int | None = None  # the command of the frame that is followed up
         self.requests_lost = 0
         #: From a request's last byte on the wire to its reply.
@@ -111,7 +112,7 @@ class MspLink:
     @property
     def outstanding_bytes(self) -> int:
         """The total size of the pending replies, bytes."""
-        return sum(sent.reply_size for sent in self._sent)
+        return sum([sent.reply_size for sent in self._sent])
 
     def unanswered(self) -> list[tuple[float, int]]:
         """The pending replies: when each was requested, and its size."""
@@ -141,11 +142,7 @@ class MspLink:
     @property
     def room(self) -> int:
         """The largest reply that a request may have to be sent now, bytes."""
-        if not self._sent and not self._waiting:
-            return _ANY_SIZE
-        if self._waiting or self._is_exclusive():
-            return 0
-        return self._limit - self.outstanding_bytes
+        return 0 if self._waiting else self._room_in_ring()
 
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for its reply."""
@@ -167,7 +164,7 @@ class MspLink:
 
     def tick(self, now: float) -> list[MspFrame]:
         """Time out requests; return replies that were hidden behind a false header."""
-        if self._follow_up_at is not None and now >= self._follow_up_at:
+        if now >= self._follow_up_at:
             self._ask(_QUESTION, now)
         if not any(now >= sent.deadline for sent in self._sent):
             return []
@@ -193,12 +190,9 @@ class MspLink:
         queued = any(message.command in commands for message in self._waiting)
         return max(deadlines, default=now + self._timeout_s() if queued else now)
 
-    def next_deadline(self) -> float | None:
-        """The time of the next `tick`; None while nothing is pending."""
-        deadlines = [sent.deadline for sent in self._sent]
-        if self._follow_up_at is not None:
-            deadlines.append(self._follow_up_at)
-        return min(deadlines, default=None)
+    def next_deadline(self) -> float:
+        """The time of the next `tick`; infinity while nothing is pending."""
+        return min([self._follow_up_at, *[sent.deadline for sent in self._sent]])
 
     def _timeout_s(self) -> float:
         floor = max(MIN_TIMEOUT_S, self.receiver_timeout_s + 0.02 if self.receiver_timeout_s else 0.0)
@@ -207,13 +201,17 @@ class MspLink:
     def _is_exclusive(self) -> bool:
         return any(sent.awaited and sent.exclusive for sent in self._sent)
 
-    @property
-    def _limit(self) -> int:
-        is_in_doubt = any(not sent.awaited for sent in self._sent)
-        return min(self._ring_size, _OUTSTANDING_IN_DOUBT) if is_in_doubt else self._ring_size
-
-    def _has_room(self, reply_size: int) -> bool:
-        return not self._sent or self.outstanding_bytes + reply_size <= self._limit
+    def _room_in_ring(self) -> int:
+        if not self._sent:
+            return _ANY_SIZE
+        pending, limit = 0, self._ring_size
+        for sent in self._sent:
+            pending += sent.reply_size
+            if not sent.awaited:
+                limit = min(self._ring_size, _OUTSTANDING_IN_DOUBT)
+            elif sent.exclusive:
+                return 0
+        return limit - pending
 
     def _fits_ring(self, reply_size: int) -> bool:
         return self.outstanding_bytes + reply_size <= self._ring_size
@@ -223,9 +221,7 @@ class MspLink:
             self._resync(now)
         while self._waiting:
             message = self._waiting[0]
-            if self._is_exclusive():
-                return
-            if not self._has_room(message.reply_size):
+            if message.reply_size > self._room_in_ring():
                 if not any(sent.awaited for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
                     # Only abandoned requests block this one: the reply to a short request behind them clears them.
                     self._ask(_QUESTION, now)
@@ -257,7 +253,7 @@ class MspLink:
 
     def _write(self, data: bytes, now: float) -> None:
         self._line_free_at = max(self._line_free_at, now) + len(data) * self.byte_s
-        self._follow_up_at = None
+        self._follow_up_at = inf
         self._output.append(data)
 
     def _take(self, frames: list[MspFrame], now: float) -> list[MspFrame]:
@@ -276,7 +272,7 @@ class MspLink:
         if not alike:
             return
         if reply.command == self._risky:
-            self._follow_up_at = None
+            self._follow_up_at = inf
         oldest = alike[0]
         earlier = self._sent.index(oldest)
         self.requests_lost += sum(sent.awaited for sent in self._sent[:earlier])

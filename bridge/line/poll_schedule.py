@@ -197,14 +197,14 @@ class PollSchedule:
         elif is_bent:
             self._bend()
 
-    def next_deadline(self, link: MspLink) -> float | None:
-        """The time of the next request; None if a reply must arrive first."""
+    def next_deadline(self, link: MspLink) -> float:
+        """The time of the next request; infinity if a reply must arrive first."""
         room = link.room
         earliest = inf
         for slot in self._slots.values():
             if slot.due < earliest:
                 earliest = min(earliest, slot.may_be_asked_at(link, room))
-        return None if earliest == inf else max(earliest, self._free_at)
+        return max(earliest, self._free_at)
 
     def _look_at(self, link: MspLink, beside_missions: bool) -> None:
         lost, self._lost_before = link.requests_lost - self._lost_before, link.requests_lost

@@ -56,7 +56,7 @@ class Runner:
         self._queue: deque[Task[Any]] = deque()
         self._current: Task[Any] | None = None
         self._awaited: Receive | Await | Pause | StoreEffect | None = None
-        self._deadline: float | None = None
+        self._deadline = inf
         self._limit = inf
         self._busy = False
 
@@ -130,7 +130,7 @@ class Runner:
             self._limit = inf
             self._advance(OutOfTime("the limit is over"), now)
             return
-        if self._deadline is None or now < self._deadline:
+        if now < self._deadline:
             return
         if isinstance(self._awaited, Receive) and self._link is not None:
             # The link may have sent the request later than it was handed over, or heard other replies meanwhile.
@@ -140,9 +140,9 @@ class Runner:
                 return
         self._advance(None, now)
 
-    def next_deadline(self) -> float | None:
-        """The time of the next `tick`; None while nothing is awaited."""
-        if isinstance(self._awaited, Receive | Await | Pause) and self._deadline is not None:
+    def next_deadline(self) -> float:
+        """The time of the next `tick`; infinity while nothing is awaited."""
+        if isinstance(self._awaited, Receive | Await | Pause):
             return min(self._deadline, self._limit)
         return self._deadline
 
@@ -164,7 +164,7 @@ class Runner:
         task = self._current
         conversation = task.conversation
         self._awaited = None
-        self._deadline = None
+        self._deadline = inf
         try:
             while True:
                 effect = conversation.throw(answer) if isinstance(answer, LinkLost) else conversation.send(answer)

@@ -5,6 +5,8 @@ A craft that arms may change protocol and speed; finding it again takes a second
 loss: Mission Planner reads warnings out loud.
 """
 
+from math import inf
+
 from bridge.fc.autosense import Spoken
 from bridge.fc.profile import FlightController
 from bridge.gcs.station import Severity
@@ -54,6 +56,6 @@ class LinkAnnouncer:
         self._say_at = now + _REPEAT_S
         return Severity.WARNING, trouble or f"Flight controller lost: silent for {now - self._silent_since:.0f} s"
 
-    def next_deadline(self) -> float | None:
+    def next_deadline(self) -> float:
         """The time of the next `tick`."""
-        return None if self._silent_since is None else self._say_at
+        return inf if self._silent_since is None else self._say_at

@@ -223,6 +223,8 @@ class MissionUploads:
 
     def next_deadline(self) -> float:
         """The time of the next `tick`."""
+        if not (self._uploads or self._reminders):
+            return inf
         arriving, waiting = self._in(Asking, Receiving), self._in(Waiting)
         if self._missions.occupied() is not OCCUPIED and (self._in(Complete) or (waiting and not arriving)):
             return 0.0

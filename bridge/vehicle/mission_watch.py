@@ -15,7 +15,7 @@ class MissionWatch:
     def __init__(self, context: MissionContext) -> None:
         self._context = context
         self._is_looking = False
-        self._due: float | None = None
+        self._due = inf
         self._began_at = 0.0
 
     def look(self, now: float) -> None:
@@ -27,10 +27,10 @@ class MissionWatch:
 
     def tick(self, now: float) -> None:
         """Check if it is time."""
-        if self._due is None or now < self._due:
+        if now < self._due:
             return
         if self._context.missions.dialect is None:
-            self._due = None
+            self._due = inf
         elif self._context.runner.is_busy:
             self._due = now + self._interval_s
         else:
@@ -41,15 +41,14 @@ class MissionWatch:
         dialect = self._context.missions.dialect
         return inf if dialect is None else dialect.watch_s
 
-    def next_deadline(self) -> float | None:
+    def next_deadline(self) -> float:
         """The time of the next `tick`."""
         return self._due
 
     def _looked(self, news: MissionChange | LinkLost | None, now: float) -> None:
         self._is_looking = False
-        if self._due is not None:
-            # On a slow line, half of the time is left to others.
-            self._due = max(self._due, 2 * now - self._began_at)
+        # On a slow line, half of the time is left to others.
+        self._due = max(self._due, 2 * now - self._began_at)
         if not isinstance(news, MissionChange):
             return
         self._context.post.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)

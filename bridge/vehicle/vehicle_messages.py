@@ -107,7 +107,7 @@ _THROTTLE = 2
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Moment:
     """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S."""
 

@@ -12,7 +12,6 @@ from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 
 _SIGNED = 0x01
-_HEADER_V2 = 10
 _CRC_SIZE = 2
 _LAST_V1_ID = 255
 
@@ -45,7 +44,8 @@ class Packed:
         return self.msgid > _LAST_V1_ID
 
 
-_PACKER = messages.MAVLink(None)
+def _payload_alone(_packer: None, _crc_extra: int, payload: bytes, *, force_mavlink1: bool) -> bytes:
+    return payload
 
 
 def pack(message: Message) -> Packed:
@@ -56,11 +56,11 @@ def pack(message: Message) -> Packed:
     """
     if isinstance(message, Packed):
         return message
+    # pymavlink would add a header and a CRC, which takes as long as everything else that is done for a message.
+    message._pack = _payload_alone
+    payload: bytes = message.pack(None)
     msgid: int = message.get_msgId()
-    whole_size: int = message.unpacker.size
-    payload = bytes(message.pack(_PACKER)[_HEADER_V2:-_CRC_SIZE])
-    payload_v1 = payload.ljust(whole_size, b"\0")[: MESSAGE_FORMATS[msgid].base_size]
-    return Packed(msgid, payload_v1, payload)
+    return Packed(msgid, payload[: MESSAGE_FORMATS[msgid].base_size], payload.rstrip(b"\0") or b"\0")
 
 
 class FrameWriter:

@@ -5,8 +5,8 @@ Layouts: Harakiri's serial.c; INAV's fc_msp.c. A payload that is too short gives
 """
 
 import struct
-from dataclasses import dataclass
 from enum import IntFlag
+from typing import NamedTuple
 
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
@@ -33,8 +33,7 @@ class Sensor(IntFlag):
     SONAR = 16
 
 
-@dataclass(frozen=True, slots=True)
-class Ident:
+class Ident(NamedTuple):
     """MSP_IDENT: `version` is 211 on Harakiri, `mixer` MultiWii's MULTITYPE number."""
 
     version: int
@@ -48,8 +47,7 @@ class Ident:
         return self.version // 100, self.version // 10 % 10, self.version % 10
 
 
-@dataclass(frozen=True, slots=True)
-class StatusReport:
+class StatusReport(NamedTuple):
     """MSP_STATUS: `box_flags` has one bit a box, in the order of BOXNAMES."""
 
     cycle_time_us: int
@@ -58,8 +56,7 @@ class StatusReport:
     box_flags: int
 
 
-@dataclass(frozen=True, slots=True)
-class RawImu:
+class RawImu(NamedTuple):
     """MSP_RAW_IMU: x, y, z of accelerometer, gyro and compass; every firmware has units of its own."""
 
     acc: tuple[int, int, int]
@@ -67,8 +64,7 @@ class RawImu:
     mag: tuple[int, int, int]
 
 
-@dataclass(frozen=True, slots=True)
-class RawGps:
+class RawGps(NamedTuple):
     """MSP_RAW_GPS: degrees * 1e7, metres above sea level, cm/s; course in 0.1 degrees and HDOP * 100 where sent.
 
     `fix` is 0 or 1; INAV's is 0, 1 (two dimensions) or 2 (three).
@@ -84,8 +80,7 @@ class RawGps:
     hdop_e2: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AttitudeReply:
+class AttitudeReply(NamedTuple):
     """MSP_ATTITUDE: roll and pitch in 0.1 degrees, heading in degrees.
 
     Right wing down and nose down are positive on all firmware; Harakiri's and baseflight's heading is -180..180, the
@@ -97,16 +92,14 @@ class AttitudeReply:
     heading_deg: int
 
 
-@dataclass(frozen=True, slots=True)
-class AltitudeReply:
+class AltitudeReply(NamedTuple):
     """MSP_ALTITUDE: estimated height above the launch point in cm, climb in cm/s."""
 
     height_cm: int
     climb_cms: int
 
 
-@dataclass(frozen=True, slots=True)
-class Analog:
+class Analog(NamedTuple):
     """MSP_ANALOG: battery in 0.1 V, receiver strength 0..1023; mAh drawn and 0.01 A where the current is sent.
 
     A sensor that is not there reads 0.
@@ -118,8 +111,7 @@ class Analog:
     current_ca: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class HomePoint:
+class HomePoint(NamedTuple):
     """MSP_WP number 0: where the flight controller took off, degrees * 1e7; 0, 0 if it does not know."""
 
     lat_e7: int

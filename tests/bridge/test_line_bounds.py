@@ -137,7 +137,7 @@ def test_what_timed_out_counts_until_its_answer_cannot_come_any_more() -> None:
     link.send(question(195, 99), 0.0)
     sent(link)
     for _ in range(2):
-        now = link.next_deadline() or 0.0
+        now = link.next_deadline()
         link.tick(now)
     assert not link.awaits(frozenset((195,)))
     assert link.outstanding_bytes == 210
@@ -157,7 +157,7 @@ def test_what_is_never_answered_is_forgotten_after_the_longest_stall() -> None:
     link.send(question(195, 99), 0.0)
     now = 0.0
     for _ in range(12):
-        now = link.next_deadline() or now
+        now = link.next_deadline()
         link.tick(now)
     assert 3.0 < now < 8
     assert sent(link).count(195) == 3
@@ -167,7 +167,7 @@ def test_a_late_answer_is_not_measured_and_not_counted_twice() -> None:
     link = MspLink(115200, 0.0)
     link.receiver_timeout_s = 0.05
     link.send(question(101, 11), 0.0)
-    link.tick(link.next_deadline() or 0.0)
+    link.tick(link.next_deadline())
     link.send(question(101, 11), 0.2)
     before = link.round_trip_s
     link.receive(reply(101, 11), 0.201)
@@ -209,7 +209,7 @@ def test_a_reply_behind_a_false_header_is_found_when_the_line_falls_silent() -> 
     link = MspLink(115200, 0.0)
     link.send(question(101, 11), 0.0)
     assert link.receive(b"$M>\xf0" + reply(101, 11), 0.005) == []
-    (found,) = link.tick(link.next_deadline() or 0.0)
+    (found,) = link.tick(link.next_deadline())
     assert found.command == 101
     assert link.requests_lost == 0
 
@@ -219,7 +219,7 @@ def test_half_a_reply_is_not_thrown_away_because_another_request_timed_out() -> 
     link.send(question(101, 11), 0.0)
     link.send(question(106, 18), 0.0)
     long_one = reply(106, 18)
-    deadline = link.next_deadline() or 0.0
+    deadline = link.next_deadline()
     assert link.receive(long_one[:10], deadline - 0.01) == []
     link.tick(deadline)
     (found,) = link.receive(long_one[10:], deadline + 0.1)

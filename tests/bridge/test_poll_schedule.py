@@ -42,7 +42,7 @@ class Line:
         end, before = self.now + seconds, len(self.asked)
         while self.now < end:
             due = [self.schedule.next_deadline(self.link), self.link.next_deadline(), *(at for at, _ in self._replies)]
-            self.now = min(max(min(at for at in due if at is not None), self.now), end)
+            self.now = min(max(min(due), self.now), end)
             while self._replies and self._replies[0][0] <= self.now:
                 self._settle(self.link.receive(self._replies.pop(0)[1], self.now))
             self._settle(self.link.tick(self.now))

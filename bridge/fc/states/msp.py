@@ -74,9 +74,7 @@ class MspLine(State):
         """The link's next deadline, or the end of its silence."""
         if self.finished() is not None:
             return 0.0
-        link = self.link.next_deadline()
-        silent_at = self._silent_since() + self._silence_s
-        return silent_at if link is None else min(link, silent_at)
+        return min(self.link.next_deadline(), self._silent_since() + self._silence_s)
 
     def take_output(self) -> list[bytes]:
         """The link's requests."""
@@ -111,7 +109,8 @@ class MspLine(State):
     @property
     def _is_foreign(self) -> bool:
         """True if more bytes arrived than damaged replies could explain."""
-        return self._foreign.size >= self.link.outstanding_bytes + _FOREIGN_SIZE
+        surplus = self._foreign.size - _FOREIGN_SIZE
+        return surplus >= 0 and surplus >= self.link.outstanding_bytes
 
     def _silence(self, now: float) -> Event | None:
         """Leave MSP when it is not answered any more: for MAVLink if that is heard instead, else to search."""
@@ -205,9 +204,8 @@ class Polling(MspLine):
 
     def deadline(self) -> float:
         """The next poll, or the next deadline of any MSP line."""
-        poll = self.port.polls.next_deadline(self.link)
         check_at = inf if self.port.runner.is_busy else self._check_at
-        return min(super().deadline(), check_at, inf if poll is None else poll)
+        return min(super().deadline(), check_at, self.port.polls.next_deadline(self.link))
 
     def finished(self) -> Event | None:
         """Set when the board turned out to be another one."""
