@@ -229,10 +229,11 @@ class Bridge:
         if self.report.is_watched:
             self.session.settle_telemetry()
         news = self.session.vehicle.take_news()
-        if news:
-            self.report.heard(news)
-            if self._is_represented:
-                self._vehicle.heard(news, now)
+        if not news:
+            return
+        self.report.heard(news)
+        if self._is_represented:
+            self._vehicle.heard(news, now)
         if FlightState in news:
             self._follow_arming(now)
 

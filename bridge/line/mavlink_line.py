@@ -55,6 +55,8 @@ class MavlinkLine:
     def _note(self, frames: list[MavlinkFrame], now: float) -> None:
         if frames:
             self._heard_at = now
+        if not self._is_harakiri:
+            return
         for frame in frames:
             if frame.msgid == 0 and is_plausible_heartbeat(frame):
                 armed = bool(frame.payload[_BASE_MODE] & _SAFETY_ARMED)

@@ -275,7 +275,7 @@ class MspLink:
             self._follow_up_at = inf
         oldest = alike[0]
         earlier = self._sent.index(oldest)
-        self.requests_lost += sum(sent.awaited for sent in self._sent[:earlier])
+        self.requests_lost += sum([sent.awaited for sent in self._sent[:earlier]])
         del self._sent[: earlier + 1]
         answered = next((sent for sent in alike if sent.awaited), None)
         if answered is None:

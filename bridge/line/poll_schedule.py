@@ -195,7 +195,8 @@ class PollSchedule:
         if known != (slot.size, slot.refusals):
             self._fit()
         elif is_bent:
-            self._bend()
+            # The others follow with their own replies.
+            slot.set_interval(self._interval(slot, self._scale))
 
     def next_deadline(self, link: MspLink) -> float:
         """The time of the next request; infinity if a reply must arrive first."""
@@ -232,9 +233,12 @@ class PollSchedule:
 
     def _bend(self) -> None:
         """Set the intervals."""
-        scale = self._line_scale * self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
         for slot in self._slots.values():
-            slot.set_interval(self._interval(slot, scale))
+            slot.set_interval(self._interval(slot, self._scale))
+
+    @property
+    def _scale(self) -> float:
+        return self._line_scale * self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
 
     def _interval(self, slot: _Slot, scale: float) -> float:
         is_status = slot.poll.command is Msp.STATUS

@@ -57,8 +57,9 @@ def pack(message: Message) -> Packed:
     if isinstance(message, Packed):
         return message
     # pymavlink would add a header and a CRC, which takes as long as everything else that is done for a message.
-    message._pack = _payload_alone
+    message._pack = _payload_alone  # noqa: SLF001
     payload: bytes = message.pack(None)
+    del message._pack  # noqa: SLF001
     msgid: int = message.get_msgId()
     return Packed(msgid, payload[: MESSAGE_FORMATS[msgid].base_size], payload.rstrip(b"\0") or b"\0")
 

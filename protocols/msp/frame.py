@@ -33,7 +33,7 @@ class Direction(Enum):
 _DIRECTIONS = {direction.value: direction for direction in Direction}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen, as in protocols.mavlink.frame
 class MspFrame:
     """One frame. `payload` has at most 255 bytes; a `command` above 255 makes it a v2 frame, `is_v2` any other."""
 
@@ -82,9 +82,7 @@ class MspParser:
         buffer += data
         frames: list[MspFrame] = []
         start = 0
-        while True:
-            found = buffer.find(_START, start)
-            found = len(buffer) if found < 0 else found
+        while (found := buffer.find(_START, start)) >= 0:
             self.skipped_bytes += found - start
             start = found
             end = _frame_end(buffer, start, takes_low_v2=self._takes_low_v2)
@@ -98,6 +96,9 @@ class MspParser:
             else:
                 frames.append(frame)
                 start = end
+        else:
+            self.skipped_bytes += len(buffer) - start
+            start = len(buffer)
         del buffer[:start]
         return frames
 
