@@ -77,7 +77,8 @@ class Line:
 
     async def has_come(self, count: int) -> None:
         """Wait until so many frames have come since the beginning."""
-        await until(lambda: len(self.numbers()) == count, "what was sent")
+        await until(lambda: len(MavlinkSplitter().feed(bytes(self.heard))) == count, "what was sent")
+        self.numbers()
 
     async def feed(self, first: int, count: int, rate_hz: int) -> int:
         """Send frames one by one, evenly; return the number after the last."""
