@@ -226,10 +226,11 @@ class MissionUploads:
         if not (self._uploads or self._reminders):
             return inf
         arriving, waiting = self._in(Asking, Receiving), self._in(Waiting)
-        if self._missions.occupied() is not OCCUPIED and (self._in(Complete) or (waiting and not arriving)):
+        is_free = self._missions.occupied() is not OCCUPIED
+        if is_free and (self._in(Complete) or (waiting and not arriving)):
             return 0.0
         times = [self._may_ask_at] if self._in(Asking) and not self._is_asking else []
-        times += [self._arriving_since + _ALONE_S] if waiting and arriving else []
+        times += [self._arriving_since + _ALONE_S] if is_free and waiting and arriving else []
         times += [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
         return min(times, default=inf)
 
