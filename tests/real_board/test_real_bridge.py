@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bridge and the image, in simulated time: an upload that a reset interrupts, and a board in its command line."""
+
+from collections.abc import Callable
+
+import pytest
+
+from bridge.fc.states.cli import Cli
+from protocols.mission_item import MissionItem, MissionResult
+from simulator.emulated_naze.board import EmulatedNaze
+from simulator.emulated_naze.image import Image
+from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.real_bench import Figure
+from tests.support.world import GroundStation, World
+
+_OLD, _NEW = waypoints(20), waypoints(60, seed=1)
+#: The list is read, and a station that asks for nothing needs little.
+_SETTLED_S = 2.0
+_BOOT_S = 20.0
+
+
+@pytest.fixture
+def world(image: Image, flash: bytes) -> World:
+    world = World(peer=EmulatedNaze(image, flash=memoryview(bytearray(flash))))
+    world.wait_ready()
+    return world
+
+
+@pytest.fixture
+def station(world: World) -> GroundStation:
+    return GroundStation(world)
+
+
+def is_written(naze: EmulatedNaze) -> Callable[[World], bool]:
+    """The last records are being programmed, eight half-words each, and COMMIT is in the board's ring."""
+    enough = naze.flash_operations + 8 * (len(_NEW) - 5)
+    return lambda _: naze.flash_operations >= enough
+
+
+def is_stored(naze: EmulatedNaze) -> Callable[[World], bool]:
+    """The seal is programmed, and the reply not yet sent."""
+    return lambda _: len(naze.stored_records) == len(_NEW)
+
+
+@pytest.mark.parametrize(
+    ("moment", "last_word", "stored"),
+    [
+        (is_written, "The mission did not arrive: old mission kept, write it again", _OLD),
+        (is_stored, f"The mission did arrive: {len(_NEW)} records", _NEW),
+    ],
+)
+def test_an_upload_that_a_reset_interrupts_is_settled(
+    world: World,
+    station: GroundStation,
+    figure: Figure,
+    moment: Callable[[EmulatedNaze], Callable[[World], bool]],
+    last_word: str,
+    stored: list[MissionItem],
+) -> None:
+    assert Upload(station, _OLD).run() is MissionResult.ACCEPTED
+    world.run(_SETTLED_S)
+    ended = world.push(_NEW)
+    world.wait_until(moment(world.naze), 5)
+    world.naze.reset(world.now)
+    began = world.now
+    world.wait_until(lambda _: "The mission did" in said(station), _BOOT_S)
+    figure(f"reset in mid upload: '{last_word}'", f"after {world.now - began:.1f} s")
+    assert ended
+    assert world.naze.stored_records == [record.pack() for record in records_of(stored)]
+    world.run(_SETTLED_S)
+    assert said(station).endswith(last_word)
+
+
+def said(station: GroundStation) -> str:
+    """All texts; each holds 50 characters."""
+    return " ".join(station.texts())
+
+
+def test_its_command_line_is_recognised_and_left_alone(world: World, station: GroundStation, figure: Figure) -> None:
+    world.run(_SETTLED_S)
+    world.naze.receive(b"\r\r\r", world.now)
+    began = world.now
+    world.wait_until(lambda w: isinstance(w.bridge.session.state, Cli), 5)
+    figure("its command line is recognised", f"after {world.now - began:.2f} s")
+    world.run(8)
+    assert isinstance(world.bridge.session.state, Cli)
+    assert Upload(station, _OLD).run() is MissionResult.DENIED
+    # On the tree Webstore1 the first one is appended to what the bridge has asked.
+    for _ in range(2):
+        world.naze.receive(b"exit\r", world.now)
+        world.run(0.5)
+    world.wait_until(lambda w: w.is_found, _BOOT_S)
+    assert Upload(station, _OLD).run() is MissionResult.ACCEPTED
