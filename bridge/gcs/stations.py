@@ -18,8 +18,8 @@ MOVED_S = 5.0
 MAX_PEERS = 32
 #: The same for peers that may only read, so that they take no slot from those with the key.
 MAX_LISTENERS = 8
-#: Newcomers to a full link. Each costs as much as dozens of frames, and addresses may be made up by the thousand.
-_NEWCOMERS = Rate(100, 100)
+#: Newcomers to a full link: addresses may be made up by the thousand. A pilot who comes now must be among them.
+_NEWCOMERS = Rate(1000, 1000)
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
 #: Ids behind one peer: a radio or a router may carry several.
