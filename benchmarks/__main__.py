@@ -8,7 +8,20 @@ from collections.abc import Callable
 
 import structlog
 
-from benchmarks import fleet, forward, idle, inav, push, resync, search, status_page, telemetry, upload, zenoh_link
+from benchmarks import (
+    fleet,
+    forward,
+    idle,
+    inav,
+    mission_planner,
+    push,
+    resync,
+    search,
+    status_page,
+    telemetry,
+    upload,
+    zenoh_link,
+)
 from benchmarks.figure import Figure
 from benchmarks.report import keep_json, print_table
 
@@ -16,6 +29,7 @@ _BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "push": push.measure,
     "inav": inav.measure,
     "upload": upload.measure,
+    "mission-planner": mission_planner.measure,
     "idle": idle.measure,
     "telemetry": telemetry.measure,
     "search": search.measure,

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The floors that need their own program: `python -m benchmarks.floors echo`, or `... poll LINK`.
+"""The floors that need their own program: `python -m benchmarks.floors echo`, `... vehicle`, or `... poll LINK`.
 
 echo        sends every UDP datagram back; prints its port
+vehicle     answers heartbeats, and accepts any mission without storing it; prints its port
 poll LINK   asks a flight controller what the idle daemon asks it, as often, and looks at nothing that comes back
 """
 
@@ -9,6 +10,7 @@ import asyncio
 import os
 import socket
 import sys
+from collections.abc import Callable
 from math import inf
 
 import serial
@@ -16,19 +18,51 @@ import serial
 from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.vehicle.telemetry_table import TELEMETRY
+from protocols.mavlink.codec import FrameWriter, pack
+from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
 
-def _echo(loop: asyncio.AbstractEventLoop) -> None:
+def _serve(loop: asyncio.AbstractEventLoop, answers: Callable[[bytes], list[bytes]]) -> None:
     port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     port.bind(("127.0.0.1", 0))
     port.setblocking(False)
 
     def readable() -> None:
         data, sender = port.recvfrom(2048)
-        port.sendto(data, sender)
+        for answer in answers(data):
+            port.sendto(answer, sender)
 
     loop.add_reader(port, readable)
     print(port.getsockname()[1], flush=True)
+
+
+class _Vehicle:
+    """An ideal vehicle for one ground station at a time."""
+
+    def __init__(self) -> None:
+        self._writer = FrameWriter(1, 1)
+        self._count = self._seq = 0
+
+    def answers(self, data: bytes) -> list[bytes]:
+        """The frames that answer a datagram."""
+        answers = [self._answer(frame) for frame in MavlinkSplitter().feed(data)]
+        return [self._writer.frame(pack(answer), 2) for answer in answers if answer is not None]
+
+    def _answer(self, frame: MavlinkFrame) -> Message | None:
+        match frame.msgid:
+            case m.MAVLINK_MSG_ID_HEARTBEAT:
+                return m.MAVLink_heartbeat_message(m.MAV_TYPE_QUADROTOR, m.MAV_AUTOPILOT_ARDUPILOTMEGA, 0, 0, 3, 3)
+            case m.MAVLINK_MSG_ID_MISSION_COUNT:
+                self._count, self._seq = int.from_bytes(frame.payload[:2], "little"), 0
+            case m.MAVLINK_MSG_ID_MISSION_ITEM_INT:
+                self._seq += 1
+            case _:
+                return None
+        if self._seq < self._count:
+            return m.MAVLink_mission_request_message(frame.sysid, frame.compid, self._seq)
+        return m.MAVLink_mission_ack_message(frame.sysid, frame.compid, m.MAV_MISSION_ACCEPTED)
 
 
 def _poll(loop: asyncio.AbstractEventLoop, link: str) -> None:
@@ -50,7 +84,9 @@ def main() -> None:
     loop = asyncio.new_event_loop()
     match sys.argv[1:]:
         case ["echo"]:
-            _echo(loop)
+            _serve(loop, lambda data: [data])
+        case ["vehicle"]:
+            _serve(loop, _Vehicle().answers)
         case ["poll", link]:
             _poll(loop, link)
     loop.run_forever()
