@@ -46,9 +46,9 @@ def _idle(folder: Path, board: Board) -> list[Figure]:
             percent,
             "%",
             Floor(bare_percent, "bare polls"),
-            3.0,
+            2.0,
         ),
-        Figure("idle daemon, resident", memory_mb, "MB", Floor(libraries_mb(LIBRARIES), "its libraries"), 45.0),
+        Figure("idle daemon, resident", memory_mb, "MB", Floor(libraries_mb(LIBRARIES), "its libraries"), 40.0),
     ]
 
 
