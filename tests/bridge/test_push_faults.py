@@ -124,6 +124,19 @@ def test_many_bit_errors_are_recovered() -> None:
     assert outcomes(setting(bit_error_rate=5e-4), 15) == {"ACCEPTED": 15}
 
 
+def test_a_list_that_is_written_again_goes_on_where_it_ended() -> None:
+    for seed in range(10):
+        world = holding_the_old_list(seed)
+        world.faults.bit_error_rate = 1e-3
+        for _ in range(3):
+            outcome = world.push(NEW)
+            world.wait_until(lambda _, outcome=outcome: bool(outcome), 4.9)  # type: ignore[misc]
+            if outcome[0][0].ack is MissionResult.ACCEPTED:
+                break
+            assert world.stored == OLD_RECORDS
+        assert world.stored == NEW_RECORDS
+
+
 @pytest.mark.parametrize("rate", [1e-3, 4e-3])
 def test_more_bit_errors_end_while_mission_planner_still_waits_for_the_ack(rate: float) -> None:
     for seed in range(10):

@@ -119,7 +119,7 @@ def test_a_power_cut_at_every_flash_operation_leaves_the_old_list() -> None:
 @pytest.mark.parametrize(
     ("inject", "least"),
     [
-        (setting("bit_error_rate", 1e-3), 8),
+        (setting("bit_error_rate", 5e-4), 8),
         (setting("lost_byte_rate", 1e-3), 10),
         (setting("flash_failures", 2), 10),
         (setting("flash_failures", 50), 0),

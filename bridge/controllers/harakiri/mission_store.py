@@ -35,7 +35,7 @@ _BUSY_INTERVAL_S = 0.1
 #: Restarts of one push (after a reset, damaged line, flash error) before it is given up.
 _MAX_BEGINS = 3
 #: A push may take this long, and twice the time of its bytes on the line: Mission Planner waits 4.9 s for the ack.
-_PUSH_S = 3.5
+_PUSH_S = 3.8
 #: How long to ask what has become of a COMMIT without a reply.
 _LOOK_S = 0.6
 #: Losses in a row without progress before a push is given up.
@@ -122,8 +122,11 @@ class HarakiriMissions(OneMission):
                     yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1)
         except _GiveUp as end:
             failure = end.failure
-        except (Stopped, OutOfTime) as end:
-            failure = PushFailure.STOPPED if isinstance(end, Stopped) else PushFailure.OUT_OF_TIME
+        except OutOfTime:
+            # The transfer stays open for 5 s: the same list continues where this one ended.
+            failure = PushFailure.OUT_OF_TIME
+        except Stopped:
+            failure = PushFailure.STOPPED
             with suppress(LinkLost):
                 yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1, tries=1)
         except LinkLost:
