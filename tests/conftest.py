@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """For all tests."""
 
+import signal
+
 import pytest
 from hypothesis import settings
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell starts its background jobs so, and programs started by tests would inherit it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Elapsed time is never judged: the machine may be busy with something else.
 settings.register_profile("unhurried", deadline=None)
