@@ -3,7 +3,7 @@
 
 A conversation is a generator. It yields one effect at a time and is sent the effect's answer;
 `bridge.line.runner.Runner` carries the effects out. When the line goes down, LinkLost is raised at the `yield`;
-when the bridge is about to end, its subclass Stopped; when a limit is over, its subclass OutOfTime.
+when the bridge is about to end, its subclass Stopped; when its limit has passed, the subclass OutOfTime.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -25,7 +25,7 @@ class Stopped(LinkLost):
 
 
 class OutOfTime(LinkLost):
-    """The conversation's limit is over. The line is still up, to leave the flight controller in a clean state."""
+    """The conversation's limit has passed. The line is still up, to leave the flight controller in a clean state."""
 
 
 @dataclass(frozen=True, slots=True)

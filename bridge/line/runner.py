@@ -35,12 +35,13 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class Task(Generic[T]):
-    """A conversation that was started. `began_at` is None while it waits for its turn."""
+    """A conversation that was started. `began_at` is None while it waits for its turn; `ends_at` is set by a Limit."""
 
     conversation: Conversation[T]
     on_done: Callable[[T | LinkLost, float], None]
     in_background: bool
     began_at: float | None = None
+    ends_at: float = inf
 
 
 class Runner:
@@ -57,7 +58,6 @@ class Runner:
         self._current: Task[Any] | None = None
         self._awaited: Receive | Await | Pause | StoreEffect | None = None
         self._deadline = inf
-        self._limit = inf
         self._busy = False
 
     @property
@@ -101,12 +101,12 @@ class Runner:
         """The line is down: LinkLost is raised in the running conversation."""
         self._link = None
         self._mavlink = None
-        if isinstance(self._awaited, Receive | Await | Pause):
+        if self._interruptible is not None:
             self._advance(LinkLost("the flight controller's port is gone"), now)
 
     def stop(self, now: float) -> None:
         """Raise Stopped in the running conversation, which may still use the line to clean up."""
-        if isinstance(self._awaited, Receive | Await | Pause):
+        if self._interruptible is not None:
             self._advance(Stopped("the bridge is stopping"), now)
 
     def received(self, frame: MspFrame, now: float) -> None:
@@ -126,9 +126,10 @@ class Runner:
 
     def tick(self, now: float) -> None:
         """End a wait that has timed out."""
-        if now >= self._limit and isinstance(self._awaited, Receive | Await | Pause):
-            self._limit = inf
-            self._advance(OutOfTime("the limit is over"), now)
+        task = self._interruptible
+        if task is not None and now >= task.ends_at:
+            task.ends_at = inf
+            self._advance(OutOfTime("the limit has passed"), now)
             return
         if now < self._deadline:
             return
@@ -142,9 +143,13 @@ class Runner:
 
     def next_deadline(self) -> float:
         """The time of the next `tick`; infinity while nothing is awaited."""
-        if isinstance(self._awaited, Receive | Await | Pause):
-            return min(self._deadline, self._limit)
-        return self._deadline
+        task = self._interruptible
+        return self._deadline if task is None else min(self._deadline, task.ends_at)
+
+    @property
+    def _interruptible(self) -> Task[Any] | None:
+        """The running conversation, unless it waits for the store, which has a timeout of its own."""
+        return self._current if isinstance(self._awaited, Receive | Await | Pause) else None
 
     def _begin_next(self, now: float) -> None:
         """Run the queue; a loop, because without a link every conversation may end at once."""
@@ -171,7 +176,7 @@ class Runner:
                 answer = None
                 if isinstance(effect, TimeLimit):
                     line_s = effect.size * self._link.byte_s if self._link is not None else 0.0
-                    self._limit = now + effect.seconds + line_s
+                    task.ends_at = now + effect.seconds + line_s
                 elif isinstance(effect, Send | Receive) and self._link is None:
                     answer = LinkLost("there is no link to the flight controller")
                 elif isinstance(effect, Transmit | Await) and self._mavlink is None:
@@ -206,10 +211,8 @@ class Runner:
             result = lost
         except Exception:
             self._current = None
-            self._limit = inf
             raise
         self._current = None
-        self._limit = inf
         # Conversations started by on_done run after it has returned, so that it sees a consistent state.
         self._busy = True
         try:

@@ -387,8 +387,8 @@ class MissionUploads:
             delivery = DeliveryResult(NO_LINK.ack, NO_LINK.text, None)
         self._tell(upload.station, verdict, delivery)
         if upload in self._uploads:
+            # A station that has announced another list would take this ack for that one's.
             if not upload.is_superseded:
-                # Its ground station would take this ack for the new list's.
                 self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
         accepted = delivery.ack is MissionResult.ACCEPTED
