@@ -86,13 +86,19 @@ def test_without_a_daemon_the_old_mission_is_kept(start: Starter) -> None:
     board.assert_was_treated_well()
 
 
-def test_a_daemon_goes_on_and_its_result_follows(start: Starter) -> None:
+def interrupted_push(start: Starter) -> tuple[Board, Terminal]:
+    """A push through a daemon, after the first Ctrl-C."""
     board = slow_board(start)
     daemon = start.daemon(f"{board.link},9600")
     daemon.wait()
     terminal = Terminal("push", LONG, "--state-dir", daemon.state_dir)
     terminal.wait_for(UNDER_WAY)
     terminal.type(CTRL_C)
+    return board, terminal
+
+
+def test_a_daemon_goes_on_and_its_result_follows(start: Starter) -> None:
+    board, terminal = interrupted_push(start)
     terminal.wait_for("naze-bridge: the daemon goes on with the mission")
     assert terminal.end() == 0
     assert "ACCEPTED" in terminal.printed
@@ -100,12 +106,7 @@ def test_a_daemon_goes_on_and_its_result_follows(start: Starter) -> None:
 
 
 def test_a_second_one_leaves(start: Starter) -> None:
-    board = slow_board(start)
-    daemon = start.daemon(f"{board.link},9600")
-    daemon.wait()
-    terminal = Terminal("push", LONG, "--state-dir", daemon.state_dir)
-    terminal.wait_for(UNDER_WAY)
-    terminal.type(CTRL_C)
+    _, terminal = interrupted_push(start)
     terminal.wait_for("press Ctrl-C again")
     terminal.type(CTRL_C)
     assert terminal.end() == 130

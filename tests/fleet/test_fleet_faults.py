@@ -7,7 +7,6 @@ import pty
 import re
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -23,7 +22,7 @@ from service.fleet.session import FleetError
 from service.zenoh_link.keys import UPLOAD
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.plan import judge, plain_plan, records_of
-from tests.support.programs import PATIENCE, until
+from tests.support.programs import NAZE_BRIDGE, PATIENCE, until
 from tests.support.zenoh_bench import ask, session
 
 #: 146 records at this speed take some seconds: time enough for something to go wrong.
@@ -31,7 +30,7 @@ _SLOW_BAUD = 9600
 _COUNT = 146
 #: On a metered link a vehicle that hangs is taken for alive for 30 s instead of 10.
 _PATIENT = f'{I_KNOW}profile = "metered"\n'
-_NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')", "fleet"]
+_FLEET = [*NAZE_BRIDGE, "fleet"]
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +60,7 @@ class Command:
 
     def __init__(self, fleet: Fleet, *arguments: str | Path) -> None:
         self.process = subprocess.Popen(
-            [*_NAZE_BRIDGE, *map(str, arguments), "--connect", fleet.router.endpoint],
+            [*_FLEET, *map(str, arguments), "--connect", fleet.router.endpoint],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -181,7 +180,7 @@ class Terminal:
         near, far = pty.openpty()
         environment = os.environ | {"TERM": "xterm", "COLUMNS": "120", "LINES": "40"}
         self.process = subprocess.Popen(
-            [*_NAZE_BRIDGE, "watch", "--connect", fleet.router.endpoint], stdout=far, stderr=far, env=environment
+            [*_FLEET, "watch", "--connect", fleet.router.endpoint], stdout=far, stderr=far, env=environment
         )
         os.close(far)
         self._near = near

@@ -21,6 +21,7 @@ from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encod
 from simulator.naze import SimulatedNaze
 from simulator.pipe_link import SimLink
 from tests.support.naze_bench import mission
+from tests.support.programs import control
 
 IDENT = request(100)
 PATIENCE = 10.0
@@ -73,10 +74,7 @@ class Simulator:
         self.greeting = self.process.stdout.readline()
 
     def control(self, line: str) -> str:
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.connect(str(self._control))
-            connection.sendall(f"{line}\n".encode())
-            return connection.makefile().readline().strip()
+        return control(self._control, line)
 
     def stats(self) -> dict[str, object]:
         found: dict[str, object] = json.loads(self.control("stats"))

@@ -5,7 +5,6 @@ import json
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,10 +16,9 @@ import serial
 from protocols.msp.frame import request
 from simulator.nav_waypoint import FLAG_LAST, Action
 from tests.support.msp_bench import Frame, take_apart, waypoint
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, control, free_port
 
 PATIENCE = 20.0
-REPOSITORY = Path(__file__).resolve().parents[2]
-NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')"]
 T = TypeVar("T")
 
 
@@ -32,17 +30,11 @@ def until(condition: Callable[[], T | None]) -> T:
     return found
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port: int = probe.getsockname()[1]
-        return port
-
-
 class Simulator:
     """A simulator of its own; on a socket at `port` unless it has a link."""
 
     def __init__(self, directory: Path, *options: str, link: Path | None = None) -> None:
-        self.port = free_port()
+        self.port = free_port(socket.SOCK_STREAM)
         self._control = directory / "control"
         place = ("--link", str(link)) if link else ("--tcp", f"127.0.0.1:{self.port}")
         arguments = ["sim", *place, "--control", str(self._control), *options]
@@ -51,11 +43,7 @@ class Simulator:
         self.greeting = self.process.stdout.readline()
 
     def line(self, line: str) -> str:
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.connect(str(self._control))
-            connection.sendall(f"{line}\n".encode())
-            with connection.makefile() as answers:
-                return answers.readline().strip()
+        return control(self._control, line)
 
     def client(self) -> "Client":
         return Client(self.port)

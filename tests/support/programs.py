@@ -40,7 +40,7 @@ def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | N
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
-    """Return a port that nobody has at this moment."""
+    """A port of 127.0.0.1 that is free at this moment."""
     with socket.socket(socket.AF_INET, kind) as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -88,6 +88,15 @@ class Program:
             raise
 
 
+def control(address: Path, line: str) -> str:
+    """The reply of a simulated board's control socket to one line."""
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(str(address))
+        connection.sendall(f"{line}\n".encode())
+        with connection.makefile() as answers:
+            return answers.readline().strip()
+
+
 class Board(Program):
     """`naze-bridge sim`. `line` obeys its control socket (simulator/control.py).
 
@@ -110,11 +119,7 @@ class Board(Program):
         assert self.is_alive, self.printed
 
     def line(self, line: str) -> str:
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.connect(str(self._control))
-            connection.sendall(f"{line}\n".encode())
-            with connection.makefile() as answers:
-                return answers.readline().strip()
+        return control(self._control, line)
 
     def set(self, line: str) -> None:
         answer = self.line(line)
