@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line, one module per command."""
+"""The command line, one module or folder per command."""

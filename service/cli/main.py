@@ -12,16 +12,16 @@ import click
 from service.cli.command_group import LazyCommand, LazyGroup
 
 _COMMANDS = {
-    "setup": LazyCommand("service.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
+    "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
     "run": LazyCommand("service.cli.run:run", "Run the bridge in the foreground."),
     "status": LazyCommand("service.cli.status:status", "Show how the bridge and the vehicle are."),
-    "doctor": LazyCommand("service.doctor.command:doctor", "Diagnose setup problems."),
+    "doctor": LazyCommand("service.cli.doctor.command:doctor", "Diagnose setup problems."),
     "check": LazyCommand("service.cli.check:check", "Show what would become of mission files, offline."),
     "push": LazyCommand("service.cli.mission_commands:push", "Write a mission file and verify it."),
     "pull": LazyCommand("service.cli.mission_commands:pull", "Read the mission from the flight controller."),
     "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
     "missions": LazyCommand("service.cli.stored_missions:missions", "List, show, compare and restore missions."),
-    "fleet": LazyCommand("service.fleet.command:fleet", "Serve many vehicles at once, over Eclipse zenoh."),
+    "fleet": LazyCommand("service.cli.fleet.command:fleet", "Serve many vehicles at once, over Eclipse zenoh."),
     "sim": LazyCommand("simulator.command:sim", "Simulate a flight controller."),
     "demo": LazyCommand("service.cli.demo:demo", "Show a mission written to a simulated Naze."),
 }

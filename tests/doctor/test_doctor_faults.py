@@ -12,15 +12,15 @@ from types import SimpleNamespace
 import pytest
 
 from bridge.fc.states.cli import Cli
+from service.cli.doctor.checked import Checked, Grade
+from service.cli.doctor.examination import examine
+from service.cli.doctor.flight_controller import check_flight_controller
+from service.cli.doctor.machine import check_clock, check_database, check_disk
+from service.cli.doctor.network import check_ports, check_wifi
+from service.cli.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
+from service.cli.doctor.zenoh import check_zenoh
 from service.control.client import ControlError
 from service.control.mission_data import Json
-from service.doctor.checked import Checked, Grade
-from service.doctor.examination import examine
-from service.doctor.flight_controller import check_flight_controller
-from service.doctor.machine import check_clock, check_database, check_disk
-from service.doctor.network import check_ports, check_wifi
-from service.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
-from service.doctor.zenoh import check_zenoh
 from service.settings import Settings
 from service.settings.addresses import AutoFc, SerialFc, parse_gcs
 from service.settings.zenoh import ZenohSettings

@@ -17,8 +17,8 @@ import pytest
 import zenoh
 
 from protocols.mission_file import write_qgc_wpl
-from service.fleet.roll_call import roll_call
-from service.fleet.session import FleetError
+from service.cli.fleet.roll_call import roll_call
+from service.cli.fleet.session import FleetError
 from service.zenoh_link.keys import UPLOAD
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.plan import judge, plain_plan, records_of

@@ -11,7 +11,7 @@ import pytest
 import zenoh
 
 from protocols.mission_file import write_qgc_wpl
-from service.fleet.watch import watching
+from service.cli.fleet.watch import watching
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import plain_plan
 from tests.support.programs import until

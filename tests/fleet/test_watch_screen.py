@@ -6,9 +6,9 @@ from typing import Any
 
 from rich.console import Console
 
-from service.fleet.vehicle import FleetVehicle, in_order
-from service.fleet.watch import Watch
-from service.fleet.watch_screen import ScreenRow, screen
+from service.cli.fleet.vehicle import FleetVehicle, in_order
+from service.cli.fleet.watch import Watch
+from service.cli.fleet.watch_screen import ScreenRow, screen
 
 
 def vehicle(number: int, **known: Any) -> FleetVehicle:

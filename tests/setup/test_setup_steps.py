@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from service.setup.change import Machine, Run, Step, WriteFile
-from service.setup.steps import SETTINGS_FILE, SetupChoices, missing_steps
+from service.cli.setup.change import Machine, Run, Step, WriteFile
+from service.cli.setup.steps import SETTINGS_FILE, SetupChoices, missing_steps
 from tests.support.faulty_machine import FaultyMachine
 from tests.support.programs import run_naze_bridge
 

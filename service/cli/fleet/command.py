@@ -10,12 +10,10 @@ import click
 
 from protocols.mission_file import MissionFileError, write_qgc_wpl
 from service.cli.command_group import CommandGroup
-from service.cli.mission_source import save_mission
-from service.cli.printing import fail, print_json, print_table
-from service.fleet.conditions import Condition, matching
-from service.fleet.enroll_command import enroll
-from service.fleet.fleet_table import complaints, fleet_table
-from service.fleet.options import (
+from service.cli.fleet.conditions import Condition, matching
+from service.cli.fleet.enroll_command import enroll
+from service.cli.fleet.fleet_table import complaints, fleet_table
+from service.cli.fleet.options import (
     INTERRUPTED,
     PATH,
     address_options,
@@ -24,11 +22,13 @@ from service.fleet.options import (
     vehicle_option,
     where_option,
 )
-from service.fleet.pull import Held, pull
-from service.fleet.push_command import push_mission, verify_mission
-from service.fleet.roll_call import alive, chosen, roll_call
-from service.fleet.watch import watching
-from service.fleet.watch_screen import print_changes, show_screen
+from service.cli.fleet.pull import Held, pull
+from service.cli.fleet.push_command import push_mission, verify_mission
+from service.cli.fleet.roll_call import alive, chosen, roll_call
+from service.cli.fleet.watch import watching
+from service.cli.fleet.watch_screen import print_changes, show_screen
+from service.cli.mission_source import save_mission
+from service.cli.printing import fail, print_json, print_table
 
 _STANDARD_OUTPUT = Path("-")
 
@@ -131,7 +131,7 @@ def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
     The vehicle must accept MAVLink (mavlink_in = true in its [zenoh] table); otherwise the station can only watch.
     """
     # Imported here, because the other commands do not need them.
-    from service.fleet.gcs_relay import GcsRelay
+    from service.cli.fleet.gcs_relay import GcsRelay
     from service.links.gcs_links import LinkError
     from service.settings.addresses import parse_gcs
 

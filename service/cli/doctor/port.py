@@ -6,7 +6,7 @@ import re
 import stat
 from pathlib import Path
 
-from service.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.checked import Checked, note, ok, problem
 from service.links.serial_ports import serial_ports
 from service.machine.documentation import page
 from service.machine.host import Host, Process

@@ -14,7 +14,7 @@ from typing import Any
 
 import zenoh
 
-from service.fleet.refusal import refusal
+from service.cli.fleet.refusal import refusal
 from service.settings.zenoh_config import connect_endpoints, in_short, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.keys import full

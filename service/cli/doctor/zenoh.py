@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from service.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.checked import Checked, note, ok, problem
 from service.settings.zenoh import ZenohSettings, ZenohSettingsError
 
 _CONNECT_TIMEOUT_MS = 2000

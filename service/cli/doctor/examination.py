@@ -7,12 +7,11 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from service.control.mission_data import Json
-from service.doctor.checked import Checked, Grade
-from service.doctor.flight_controller import check_flight_controller
-from service.doctor.machine import check_clock, check_database, check_disk, check_versions
-from service.doctor.network import check_ports, check_wifi
-from service.doctor.port import (
+from service.cli.doctor.checked import Checked, Grade
+from service.cli.doctor.flight_controller import check_flight_controller
+from service.cli.doctor.machine import check_clock, check_database, check_disk, check_versions
+from service.cli.doctor.network import check_ports, check_wifi
+from service.cli.doctor.port import (
     check_candidates,
     check_console,
     check_holder,
@@ -22,7 +21,8 @@ from service.doctor.port import (
     check_port,
     holder_of_port,
 )
-from service.doctor.zenoh import check_zenoh
+from service.cli.doctor.zenoh import check_zenoh
+from service.control.mission_data import Json
 from service.machine.host import Host
 from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress

@@ -10,10 +10,10 @@ from pathlib import Path
 import click
 
 from service.cli.daemon_client import SERVICE_STATE
+from service.cli.doctor.checked import Checked, Grade
 from service.cli.printing import print_json
 from service.control.client import STATUS, ControlError, ask_daemon
 from service.control.mission_data import Json
-from service.doctor.checked import Checked, Grade
 from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG
@@ -62,7 +62,7 @@ def diagnose(
 def _examine(
     config: Path | None, fc: str | None, state_dir: Path | None, ask_running: Callable[[], Json]
 ) -> Iterator[Checked]:
-    from service.doctor.examination import examine  # half the daemon: --help does without
+    from service.cli.doctor.examination import examine  # half the daemon: --help does without
 
     try:
         settings = load_settings(config, fc, (), state_dir)

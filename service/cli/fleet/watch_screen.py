@@ -10,13 +10,13 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
+from service.cli.fleet.conditions import Condition
+from service.cli.fleet.fleet_table import watch_table
+from service.cli.fleet.keyboard import scrolling, wait_for_scroll
+from service.cli.fleet.session import is_connected
+from service.cli.fleet.vehicle import FleetVehicle, in_order
+from service.cli.fleet.watch import Watch
 from service.cli.printing import print_json
-from service.fleet.conditions import Condition
-from service.fleet.fleet_table import watch_table
-from service.fleet.keyboard import scrolling, wait_for_scroll
-from service.fleet.session import is_connected
-from service.fleet.vehicle import FleetVehicle, in_order
-from service.fleet.watch import Watch
 
 _REFRESH_S = 0.5
 #: The slowest profile sends the state every 30 s; one may be lost.

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
-from service.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.checked import Checked, note, ok, problem
 from service.machine.host import Host
 from service.machine.version import version
 from service.recording.store_worker import DATABASE_NAME

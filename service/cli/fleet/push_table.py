@@ -11,10 +11,10 @@ from rich.progress import Progress as Bars
 from rich.table import Table
 from rich.text import Text
 
+from service.cli.fleet.payload import part, text, whole
+from service.cli.fleet.push import FleetPush, PushState
+from service.cli.fleet.trial import Trial
 from service.control.mission_data import Json
-from service.fleet.payload import part, text, whole
-from service.fleet.push import FleetPush, PushState
-from service.fleet.trial import Trial
 
 _ANSWERS = {
     True: Text("yes", style="green"),

@@ -7,7 +7,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from service.fleet.vehicle import FleetVehicle
+from service.cli.fleet.vehicle import FleetVehicle
 
 _UNKNOWN = "-"
 

@@ -9,10 +9,8 @@ import click
 import zenoh
 
 from protocols.mission_file import MissionFileError, read_mission_file
-from service.cli.mission_source import mission_bytes
-from service.cli.printing import print_json, print_table
-from service.fleet.conditions import Condition, matching
-from service.fleet.options import (
+from service.cli.fleet.conditions import Condition, matching
+from service.cli.fleet.options import (
     INTERRUPTED,
     PATH,
     address_options,
@@ -22,11 +20,13 @@ from service.fleet.options import (
     vehicle_option,
     where_option,
 )
-from service.fleet.push import FleetPush, push
-from service.fleet.push_table import progress_bars, push_data, push_summary, push_table, trial_table
-from service.fleet.roll_call import alive, chosen, roll_call
-from service.fleet.session import FleetError
-from service.fleet.trial import Trial, try_mission
+from service.cli.fleet.push import FleetPush, push
+from service.cli.fleet.push_table import progress_bars, push_data, push_summary, push_table, trial_table
+from service.cli.fleet.roll_call import alive, chosen, roll_call
+from service.cli.fleet.session import FleetError
+from service.cli.fleet.trial import Trial, try_mission
+from service.cli.mission_source import mission_bytes
+from service.cli.printing import print_json, print_table
 
 _UNREADABLE = 2
 _GOES_ON = "stopped; transfers that are under way go on there: `naze-bridge fleet list` shows what each vehicle holds"

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
+from service.cli.fleet.enrolment import EnrolmentError, FleetFolder, Role
+from service.cli.fleet.options import PATH
 from service.cli.printing import fail
-from service.fleet.enrolment import EnrolmentError, FleetFolder, Role
-from service.fleet.options import PATH
 from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettingsError
 
 

@@ -4,7 +4,7 @@
 import re
 from collections.abc import Sequence
 
-from service.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.checked import Checked, note, ok, problem
 from service.machine.documentation import page
 from service.machine.host import Host
 from service.settings.addresses import GcsAddress

@@ -8,7 +8,7 @@ from dataclasses import fields
 from fnmatch import fnmatchcase
 from typing import Any, get_args
 
-from service.fleet.vehicle import FleetVehicle
+from service.cli.fleet.vehicle import FleetVehicle
 
 Condition = Callable[[FleetVehicle], bool]
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import zenoh
 
+from service.cli.fleet.payload import decode, number
+from service.cli.fleet.session import send_query
+from service.cli.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
 from service.control.mission_data import Json
-from service.fleet.payload import decode, number
-from service.fleet.session import send_query
-from service.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
 from service.zenoh_link.keys import ALIVE, STATE, full, vehicle_in
 
 _STATE_TIMEOUT_S = 2.0

@@ -3,10 +3,10 @@
 
 import zenoh
 
+from service.cli.fleet.payload import decode_reply
+from service.cli.fleet.session import FleetError, ask
+from service.cli.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
 from service.control.mission_data import Json
-from service.fleet.payload import decode_reply
-from service.fleet.session import FleetError, ask
-from service.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
 from service.zenoh_link.keys import ALIVE, STATE, full
 
 #: After this a bridge without a reply is shown as not answering.

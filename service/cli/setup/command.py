@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
+from service.cli.doctor.command import diagnose
 from service.cli.printing import fail
-from service.doctor.command import diagnose
+from service.cli.setup.change import Machine, SetupError, Step, is_root
+from service.cli.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
-from service.setup.change import Machine, SetupError, Step, is_root
-from service.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
 from service.web.token import DEFAULT_NAME
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+from service.cli.setup.change import Change, Run, Step, WriteFile
 from service.links.port_memory import PORTS_FILE
 from service.machine.host import Host
 from service.machine.raspberry_pi import boot_file, pi_model
-from service.setup.change import Change, Run, Step, WriteFile
 
 SETTINGS_FILE = "/etc/naze-bridge/conf.d/setup.toml"
 KEY_FILE = "/etc/naze-bridge/gcs.key"

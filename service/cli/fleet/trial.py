@@ -7,8 +7,8 @@ from typing import Any
 
 import zenoh
 
-from service.fleet.payload import decode, part, text, whole
-from service.fleet.session import NO_COMMANDS, ask_each
+from service.cli.fleet.payload import decode, part, text, whole
+from service.cli.fleet.session import NO_COMMANDS, ask_each
 from service.zenoh_link.keys import CHECK, MISSION_CURRENT
 
 _TIMEOUT_S = 15.0
