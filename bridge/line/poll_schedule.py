@@ -74,11 +74,16 @@ NAV_POLL = Poll(Msp.NAV_STATUS, request(Msp.NAV_STATUS), 7, 0.5)
 
 @dataclass(slots=True)
 class _Slot:
-    """One poll in the schedule. `size`: bytes of its reply, estimated until one was seen."""
+    """One poll in the schedule.
+
+    `size`: bytes of its reply, estimated until one was seen. `least_cost`: the bytes that the line could carry while
+    the board serves a request.
+    """
 
     poll: Poll
     commands: frozenset[int]
     size: int
+    least_cost: float
     wanted_s: float = inf
     interval_s: float = inf
     asked_at: float = -inf
@@ -88,9 +93,9 @@ class _Slot:
     refusals: int = 0
 
     @property
-    def cost(self) -> int:
-        """The bytes of a request and its reply."""
-        return len(self.poll.frame) + self.size
+    def cost(self) -> float:
+        """The bytes of a request and its reply, or the board's time for them if that is longer."""
+        return max(len(self.poll.frame) + self.size, self.least_cost)
 
     def set_interval(self, interval_s: float) -> None:
         """Change the interval."""
@@ -131,13 +136,19 @@ class PollSchedule:
         """The factor that losses apply to the rates, 0.1..1."""
         return self._quality
 
-    def begin(self, baud: int | None, polls: Sequence[Poll] = POLLS) -> None:
-        """Start polling a flight controller: everything once, then at the requested intervals."""
-        self._budget = (baud or _ASSUMED_BAUD) / 10 * _LINE_SHARE
+    def begin(self, baud: int | None, polls: Sequence[Poll] = POLLS, turn_s: float = 0.0) -> None:
+        """Start polling a flight controller: everything once, then at the requested intervals.
+
+        `turn_s`: it serves one request in this time.
+        """
+        bytes_per_s = (baud or _ASSUMED_BAUD) / 10
+        self._budget = bytes_per_s * _LINE_SHARE
         self._quality = 1.0
         self._lost_before = 0
         self._slots = {
-            poll.command: _Slot(poll, frozenset((poll.command,)), frame_size(poll.command, poll.reply_payload))
+            poll.command: _Slot(
+                poll, frozenset((poll.command,)), frame_size(poll.command, poll.reply_payload), turn_s * bytes_per_s
+            )
             for poll in polls
         }
         self._fit()

@@ -87,7 +87,6 @@ class MissionService:
         self._refusal = NO_LINK
         self._owner: object | None = None
         self._closed = False
-        #: False until the present flight controller's list was read, and after an interrupted push.
         self._is_settled = False
         self._told_unloaded = False
         #: Missions to compare with the list when it is next read.
@@ -301,16 +300,27 @@ class MissionService:
             self.held = held
         return held
 
-    def watch(self) -> Conversation[MissionChange | None]:
-        """Check that the flight controller still holds the last known list; returns the text for the pilot if not.
+    @property
+    def is_settled(self) -> bool:
+        """False until the present flight controller's list was read, and after an interrupted push."""
+        return self._is_settled
+
+    def is_outdated(self) -> Conversation[bool]:
+        """True if the list must be read, because it is unknown or was changed on the board."""
+        if not self._has_asked_store:
+            self._has_asked_store = True
+            self._pending += yield from find_pending()
+        if self._dialect is None:
+            return False
+        return not self._is_settled or bool(self._pending) or not (yield from self._dialect.is_current())
+
+    def catch_up(self) -> Conversation[MissionChange | None]:
+        """Read the list; returns the text for the pilot if it is another one.
 
         After connecting or an interrupted push, the flight controller loads its saved mission if it holds none.
         """
         dialect, is_first, before = self._dialect, not self._is_settled, self.held
-        if not self._has_asked_store:
-            self._has_asked_store = True
-            self._pending += yield from find_pending()
-        if dialect is None or (not is_first and not self._pending and (yield from dialect.is_current())):
+        if dialect is None:
             return None
         is_reloaded = (yield from dialect.reload()) if is_first else False
         held = yield from self.read_back()

@@ -8,6 +8,9 @@ from bridge.line.conversation import LinkLost
 from bridge.missions.mission_service import MissionChange
 from bridge.vehicle.mission_context import MissionContext
 
+#: The least pause between two checks, as a part of the time that the first one took.
+_PAUSE = 0.25
+
 
 class MissionWatch:
     """Checks as often as the store needs it, while no transfer runs."""
@@ -23,7 +26,7 @@ class MissionWatch:
         self._due = now + self._interval_s
         if not self._is_looking:
             self._is_looking, self._began_at = True, now
-            self._context.runner.start(self._context.missions.watch(), self._looked, now, in_background=True)
+            self._context.runner.start(self._context.missions.is_outdated(), self._looked, now, in_background=True)
 
     def tick(self, now: float) -> None:
         """Check if it is time."""
@@ -45,10 +48,18 @@ class MissionWatch:
         """The time of the next `tick`."""
         return self._due
 
-    def _looked(self, news: MissionChange | LinkLost | None, now: float) -> None:
+    def _looked(self, is_outdated: bool | LinkLost, now: float) -> None:
+        if is_outdated is True:
+            missions = self._context.missions
+            # Telemetry makes room while a changed list is read, but not for the first reading: that is not urgent.
+            self._context.runner.start(missions.catch_up(), self._caught_up, now, in_background=not missions.is_settled)
+        else:
+            self._caught_up(None, now)
+
+    def _caught_up(self, news: MissionChange | LinkLost | None, now: float) -> None:
         self._is_looking = False
-        # On a slow line, half of the time is left to others.
-        self._due = max(self._due, 2 * now - self._began_at)
+        # On a slow line, some of the time is left to others.
+        self._due = max(self._due, now + (now - self._began_at) * _PAUSE)
         if not isinstance(news, MissionChange):
             return
         self._context.post.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)

@@ -257,6 +257,37 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
     assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("streams_hz", [0, 50])
+def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_hz: int) -> None:
+    """The board serves one request in 10 ms, and a ground station wants all telemetry at once."""
+    board, world, station = board_with(serial_task_ms=10.0)
+    assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
+    for stream in range(1, 13) if streams_hz else ():
+        station.send(messages.MAVLink_request_data_stream_message(1, 1, stream, streams_hz, 1))
+    world.run(3)
+    other = packed(plan(CAPACITY + 1, 3))
+    mission = board._firmware._mission  # type: ignore[union-attr]
+    for number, record in enumerate(other, 1):
+        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+    world.run(2.0)
+    assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
+    assert [record.pack() for record in world.bridge.missions.held.records] == other  # type: ignore[union-attr]
+
+
+def test_one_other_record_in_the_longest_list_is_noticed_by_the_upload_itself() -> None:
+    board, world, station = board_with(serial_task_ms=10.0)
+    assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
+    world.run(3)
+    records = packed(plan(CAPACITY + 1))
+    records[0] = packed(plan(CAPACITY + 1, 3))[0]
+    mission = board._firmware._mission  # type: ignore[union-attr]
+    for number, record in enumerate(records, 1):
+        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+        world.run(0.01)
+    world.run(2.0)
+    assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
+
+
 def test_a_list_that_another_client_is_writing_is_told_once_it_is_complete() -> None:
     bench = Bench(9)
     before = len(bench.station.texts())

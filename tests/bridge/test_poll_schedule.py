@@ -26,10 +26,12 @@ def answer_all(command: int) -> int | None:
 class Line:
     """A flight controller that answers after `delay_s`, or does not."""
 
-    def __init__(self, baud: int | None = 115200, delay_s: float = 0.004, answer: Answer = answer_all) -> None:
+    def __init__(
+        self, baud: int | None = 115200, delay_s: float = 0.004, answer: Answer = answer_all, turn_s: float = 0.0
+    ) -> None:
         self.now = 0.0
         self.schedule = PollSchedule()
-        self.schedule.begin(baud)
+        self.schedule.begin(baud, turn_s=turn_s)
         self.link = MspLink(baud, 0.0)
         self.asked: list[tuple[float, int]] = []
         self.answer = answer
@@ -134,16 +136,20 @@ def test_over_a_slow_line_a_question_waits_for_its_answer(delay_s: float) -> Non
     wishes=st.dictionaries(st.sampled_from([poll.command for poll in POLLS]), st.floats(0.01, 100.0)),
     baud=st.sampled_from([1200, 2400, 9600, 57600, 115200, None]),
     beside_missions=st.booleans(),
+    turn_s=st.sampled_from([0.0, 0.01]),
 )
 @settings(max_examples=60, deadline=None)
-def test_any_wishes_fit_the_line(wishes: Mapping[Msp, float], baud: int | None, beside_missions: bool) -> None:
-    line = Line(baud)
+def test_any_wishes_fit_the_line_and_the_board(
+    wishes: Mapping[Msp, float], baud: int | None, beside_missions: bool, turn_s: float
+) -> None:
+    line = Line(baud, turn_s=turn_s)
     line.beside_missions = beside_missions
     line.schedule.want(wishes)
     line.run(5)
     asked = line.run(20)
     used = sum(count * (REPLY_PAYLOADS[command] + 2 * FRAME_OVERHEAD) for command, count in asked.items()) / 20
     assert used <= (baud or 115200) / 10 * 0.6 * 1.1
+    assert asked.total() / 20 * turn_s <= 0.6 * 1.1
     # Nothing that is wanted is forgotten, and arming is noticed.
     wanted = {poll.command for poll in POLLS if poll.needed_s < 100} | {c for c, s in wishes.items() if s <= 5}
     assert set(asked) >= {command for command in wanted if wishes.get(command, 0) <= 5}

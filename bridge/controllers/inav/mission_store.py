@@ -86,13 +86,16 @@ class InavMissions(NavMissions):
     def is_current(self) -> Conversation[bool]:
         """Read GETINFO, the selected mission and some records: the sticks or another client may have changed them.
 
-        A list that is incomplete, with another size each time, is still being written: what becomes of it shows later.
+        A list that is incomplete, with another size each time, is still being written; once it is complete, it is read.
         """
-        seen, before = (yield from self._look()), self._last_look
-        self._last_look = seen
-        if seen is not None and not seen[0].is_valid and seen != before:
+        seen = yield from self._look()
+        if seen is None:
             return True
-        return (yield from self._is_unchanged(seen))
+        before, self._last_look = self._last_look, seen
+        if not seen[0].is_valid and seen != before:
+            return True
+        was_written = before is not None and not before[0].is_valid and seen[0].is_valid
+        return not was_written and (yield from self._is_unchanged(seen))
 
     def _is_unchanged(self, seen: tuple[NavInfo, int] | None) -> Conversation[bool]:
         if seen is None or seen != self._seen:

@@ -37,7 +37,9 @@ from protocols.msp.telemetry import decode_status
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
 _STATUS_PAYLOAD = 11
 _TRIES = 5
-_COMPARED = 4
+#: Records compared in one check: more of a long list, but not too many, because a transfer has to wait until it ends.
+_LEAST_COMPARED, _MOST_COMPARED = 4, 8
+_PART_COMPARED = 7
 #: Restarts of one push after a read-back mismatch.
 _MAX_BEGINS = 3
 
@@ -56,7 +58,6 @@ class NavMissions(OneMission, ABC):
 
     #: True if storing a record stalls it.
     _stores_slowly = False
-    #: With _COMPARED records each time, another list of up to 32 records is noticed within two seconds.
     watch_s = 0.25
     #: The number of the record that was compared last.
     _compared = 0
@@ -228,7 +229,7 @@ class NavMissions(OneMission, ABC):
 
     def _has_same_records(self, known: Sequence[NavRecord], before: int = 0) -> Conversation[bool]:
         """Compare some records, the next ones each time; `before`: records in the store before the first."""
-        for _ in known[:_COMPARED]:
+        for _ in known[: max(_LEAST_COMPARED, min(len(known) // _PART_COMPARED, _MOST_COMPARED))]:
             self._compared = self._compared % len(known) + 1
             held = yield from self.read(before + self._compared)
             if held is not None and held != known[self._compared - 1]:

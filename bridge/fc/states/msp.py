@@ -180,7 +180,7 @@ class Polling(MspLine):
             self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
         self.link.any_byte = controller.profile.accepts_any_byte
         self.link.turn_s = controller.profile.turn_s
-        port.polls.begin(event.found.speed, controller.profile.polls)
+        port.polls.begin(event.found.speed, controller.profile.polls, controller.profile.turn_s)
         port.meet(controller)
         self._check_interval_s = _FIRST_CHECK_S
         self._check_at = now + _FIRST_CHECK_S if controller.profile.open_store is None else inf
