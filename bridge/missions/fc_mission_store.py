@@ -5,10 +5,11 @@ A dialect is one kind of flight controller: its rules, and how a list is written
 `bridge.controllers.harakiri.mission_store` and `bridge.controllers.harakiri.mavlink_missions` are two.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, Generic
 
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import MissionRules
@@ -59,6 +60,15 @@ LIST_IS_GONE = frozenset(
 )
 
 
+class PushFailed(Exception):
+    """An attempt to write has failed; `is_final`: a retry would not help."""
+
+    def __init__(self, failure: PushFailure, *, is_final: bool = True) -> None:
+        super().__init__(failure.value)
+        self.failure = failure
+        self.is_final = is_final
+
+
 @dataclass(frozen=True, slots=True)
 class PushResult:
     """`failure` is None if the list was verified. `unchanged`: the same list was already there."""
@@ -71,78 +81,64 @@ class PushResult:
 PushProgress = Callable[[int], None]
 
 
-class FcMissionStore(Protocol[RecordT]):
-    """The operations of a flight controller that stores missions."""
+class FcMissionStore(ABC, Generic[RecordT]):
+    """A flight controller that stores missions; by default only one, which only the bridge changes."""
+
+    #: True if its list can be read while the craft is armed.
+    reads_armed: bool = False
+    #: The interval at which `is_current` should be asked.
+    watch_s: float = 1.0
 
     @property
     def wp_radius_cm(self) -> int | None:
         """The minimum waypoint radius as last heard, cm; None if it cannot be read or set."""
+        return None
 
+    @abstractmethod
     def report(self) -> Conversation[StoreReport | None]:
         """Ask the flight controller; None if it does not answer."""
 
+    @abstractmethod
     def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list and verify it. The empty list clears."""
 
+    @abstractmethod
     def pull(self) -> Conversation[tuple[RecordT, ...] | None]:
         """Read the list and verify the reading; None if that fails."""
 
+    @abstractmethod
     def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
         """A list as a ground station reads it, home first; `sent_as`: remembered commands, by record number."""
 
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
-        """Set gps_wp_radius, 0..2000 cm; None if it is in force now."""
-
-    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""
-
+    @abstractmethod
     def seq_of(self, records: Sequence[RecordT], number: int) -> int:
         """The seq of the item for record `number` (as NAV_STATUS counts, from 1); 0: none."""
 
-    @property
-    def reads_armed(self) -> bool:
-        """True if its list can be read while the craft is armed."""
+    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
+        """Set gps_wp_radius, 0..2000 cm; None if it is in force now."""
+        yield from ()
+        return PushFailure.REFUSED
 
-    @property
-    def watch_s(self) -> float:
-        """The interval at which `is_current` should be asked."""
+    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+        """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""
+        return items
 
     @property
     def others(self) -> tuple[tuple[RecordT, ...], ...]:
         """Further missions in its store, as last read. Only one mission at a time is loaded and flown."""
+        return ()
 
     def erased_by(self, records: Sequence[RecordT]) -> tuple[tuple[RecordT, ...], ...]:
         """The `others` that do not fit alongside a new list; writing it erases them."""
+        return ()
 
     def is_current(self) -> Conversation[bool]:
         """True if it still holds the list that was last read or written, or does not answer."""
-
-    def reload(self) -> Conversation[bool | None]:
-        """Make it load its saved mission if it holds none. True: done, False: no need, None: not while armed."""
-
-
-class OneMission:
-    """Part of the interface for a board with one mission, which only the bridge changes."""
-
-    reads_armed = False
-    watch_s = 1.0
-
-    @property
-    def others(self) -> tuple[tuple[Any, ...], ...]:
-        """None."""
-        return ()
-
-    def erased_by(self, records: Sequence[Any]) -> tuple[tuple[Any, ...], ...]:
-        """None."""
-        return ()
-
-    def is_current(self) -> Conversation[bool]:
-        """Always."""
         yield from ()
         return True
 
     def reload(self) -> Conversation[bool | None]:
-        """No need: the mission survives a restart."""
+        """Make it load its saved mission if it holds none. True: done, False: no need, None: not while armed."""
         yield from ()
         return False
 

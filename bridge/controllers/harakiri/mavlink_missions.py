@@ -9,15 +9,15 @@ of its serial port; an item that cannot be sent safely rejects the list.
 A written list is read back, item by item. The rules make places of which single precision loses nothing more.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.harakiri.records import items_from_records
+from bridge.controllers.harakiri.records import HarakiriStore, items_from_records
 from bridge.controllers.harakiri.rules import MAV_COMMANDS
 from bridge.controllers.harakiri.single_precision import degrees_read_e7, degrees_to_send
 from bridge.line.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
-from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from bridge.model.vehicle import Vehicle
 from protocols.mavlink.codec import MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
@@ -46,26 +46,13 @@ _FAILURES = {
 }
 
 
-class _Failed(Exception):
-    """An attempt has failed."""
-
-    def __init__(self, failure: PushFailure, *, is_final: bool = False) -> None:
-        super().__init__(failure.value)
-        self.failure = failure
-        self.is_final = is_final
-
-
-class HarakiriMavlinkMissions(OneMission):
+class HarakiriMavlinkMissions(HarakiriStore):
     """The mission store of one Harakiri in MAVLink mode."""
 
     def __init__(self, vehicle: Vehicle, rules: HarakiriRules) -> None:
         self._vehicle = vehicle
         self._rules = replace(rules, is_single_precision=True)
         self._decoder = MavlinkDecoder()
-
-    @property
-    def wp_radius_cm(self) -> None:
-        """gps_wp_radius cannot be read over Harakiri's MAVLink."""
 
     def report(self) -> Conversation[StoreReport | None]:
         """Its state from telemetry; the stored list is unknown until it is read."""
@@ -88,11 +75,11 @@ class HarakiriMavlinkMissions(OneMission):
                     try:
                         yield from self._write(items, progress)
                     except Stopped:
-                        raise _Failed(PushFailure.STOPPED, is_final=True) from None
+                        raise PushFailed(PushFailure.STOPPED) from None
                     yield from pause(_WRITTEN_AFTER_S)
                     held = yield from self.pull()
                     return PushResult(None if held == records else PushFailure.UNCERTAIN)
-                except _Failed as failed:
+                except PushFailed as failed:
                     failure = failed.failure
                     restored = yield from self._restore()
                     if not restored:
@@ -117,44 +104,27 @@ class HarakiriMavlinkMissions(OneMission):
         # No answer means an empty store; a lost line would have ended the conversation.
         return () if count is None else None
 
-    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """A list as a ground station reads it."""
-        return tuple(items_from_records(records, sent_as))
-
-    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Unchanged: home is stored with the list."""
-        return items
-
-    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
-        """The same number: each record is an item, home too."""
-        return number if number < len(records) else 0
-
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
-        """Not supported: Harakiri has the parameter under another name and scale."""
-        yield from pause(0.0)
-        return PushFailure.REFUSED
-
     def _write(self, items: Sequence[Message], progress: PushProgress) -> Conversation[None]:
         """Send the list, up to its MISSION_ACK."""
         answer = yield from self._ask(m.MAVLink_mission_count_message(*_TARGET, len(items)), 0)
         for seq, item in enumerate(items):
             if answer.msgid == _ACK or self._seq_of(answer) != seq:
-                raise _Failed(PushFailure.NO_ANSWER)
+                raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
             answer = yield from self._ask(item, seq + 1)
             if answer.msgid == _ACK and self._result_of(answer) == m.MAV_MISSION_ACCEPTED:
                 if len(items) - seq > 1 and items is not _NOTHING:
-                    raise _Failed(PushFailure.NO_ANSWER)
+                    raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
                 return
             progress(seq + 1)
-        raise _Failed(PushFailure.NO_ANSWER)
+        raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
 
     def _ask(self, message: Message, expected: int) -> Conversation[MavlinkFrame]:
-        """Send, and wait for the request for item `expected` or a MISSION_ACK; _Failed if it refuses."""
+        """Send, and wait for the request for item `expected` or a MISSION_ACK; PushFailed if it refuses."""
         for _ in range(_TRIES):
             is_safe: bool = yield Transmit(pack(message))
             if not is_safe:
                 # Only the pilot can help, by moving the waypoint by a metre.
-                raise _Failed(PushFailure.UNSAFE, is_final=True)
+                raise PushFailed(PushFailure.UNSAFE)
             while True:
                 answer: MavlinkFrame | None = yield Await(frozenset((_REQUEST, _ACK)), _TIMEOUT_S)
                 if answer is None:
@@ -164,10 +134,10 @@ class HarakiriMavlinkMissions(OneMission):
                     if result == m.MAV_MISSION_ACCEPTED:
                         return answer
                     failure = _FAILURES.get(result, PushFailure.NO_ANSWER)
-                    raise _Failed(failure, is_final=failure in (PushFailure.NO_SPACE, PushFailure.REFUSED))
+                    raise PushFailed(failure, is_final=failure in (PushFailure.NO_SPACE, PushFailure.REFUSED))
                 if self._seq_of(answer) == expected:
                     return answer
-        raise _Failed(PushFailure.NO_ANSWER)
+        raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
 
     def _restore(self) -> Conversation[bool]:
         """Make it reload the old list; True if it confirms that."""

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The companion's side of Harakiri's mission extension (docs/msp-mission.md)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from typing import TypeVar
 
 from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.harakiri.records import items_from_records
+from bridge.controllers.harakiri.records import HarakiriStore
 from bridge.line.conversation import (
     Conversation,
     LinkLost,
@@ -18,12 +19,11 @@ from bridge.line.conversation import (
     receive,
     send,
 )
-from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
-from protocols.mission_item import MissionItem
+from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
-from protocols.msp.mission import Info, InfoFlag, MissionCommand, ReplyStatus, Staged, Stored
+from protocols.msp.mission import Info, InfoFlag, MissionCommand, Radius, ReplyStatus, Staged, Stored
 from protocols.wp_record import RECORD_SIZE, WpRecord
 
 _SHORT_REPLY_SIZE = 7
@@ -54,24 +54,10 @@ _FAILURES = {
     ReplyStatus.FLASH: PushFailure.FLASH,
 }
 
-
-class _Retry(Exception):
-    """Restart the transfer."""
-
-    def __init__(self, failure: PushFailure) -> None:
-        super().__init__(failure.value)
-        self.failure = failure
+AnswerT = TypeVar("AnswerT", Staged, Radius)
 
 
-class _GiveUp(Exception):
-    """End the push."""
-
-    def __init__(self, failure: PushFailure) -> None:
-        super().__init__(failure.value)
-        self.failure = failure
-
-
-class HarakiriMissions(OneMission):
+class HarakiriMissions(HarakiriStore):
     """The mission store of one Harakiri. `takeoff_max_m`: the highest take-off that the rules allow."""
 
     def __init__(self, info: Info, takeoff_max_m: int) -> None:
@@ -117,11 +103,11 @@ class HarakiriMissions(OneMission):
                         continue
                     yield from self._transfer(records, begun, progress)
                     return PushResult(None)
-                except _Retry as retry:
-                    failure = retry.failure
+                except PushFailed as failed:
+                    failure = failed.failure
+                    if failed.is_final:
+                        break
                     yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1)
-        except _GiveUp as end:
-            failure = end.failure
         except OutOfTime:
             # The transfer stays open for 5 s: the same list continues where this one ended.
             failure = PushFailure.OUT_OF_TIME
@@ -147,31 +133,13 @@ class HarakiriMissions(OneMission):
                 return records
         return None
 
-    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """A list as a ground station reads it."""
-        return tuple(items_from_records(records, sent_as))
-
-    def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Unchanged: home is stored with the list."""
-        return items
-
-    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
-        """The same number: each record is an item, home too."""
-        return number if number < len(records) else 0
-
     def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
         """Set gps_wp_radius, 0..2000 cm; INFO gives the result, as a reply may belong to an earlier value."""
-        frame = ext.encode_radius(wp_radius_cm)
-        waited_s = 0.0
-        while True:
-            reply = yield from ask(frame, MissionCommand.RADIUS, 3)
-            answer = None if reply is None else ext.decode_radius(reply.payload)
-            if answer is None:
-                return PushFailure.NO_ANSWER
-            if answer.status is not ReplyStatus.BUSY or waited_s >= _BUSY_TIMEOUT_S:
-                break
-            yield from pause(_BUSY_INTERVAL_S)
-            waited_s += _BUSY_INTERVAL_S
+        answer = yield from self._ask_until_free(
+            ext.encode_radius(wp_radius_cm), MissionCommand.RADIUS, 3, ext.decode_radius
+        )
+        if answer is None:
+            return PushFailure.NO_ANSWER
         info = yield from self._read_info()
         if info is None:
             return PushFailure.NO_ANSWER
@@ -188,23 +156,37 @@ class HarakiriMissions(OneMission):
         return None if reply is None else ext.decode_info(reply.payload)
 
     def _begin(self, wanted: ListIdentity) -> Conversation[Staged]:
+        answer = yield from self._ask_until_free(
+            ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, ext.decode_progress, exclusive=True
+        )
+        if answer is None:
+            raise PushFailed(PushFailure.NO_ANSWER)
+        if answer.status is ReplyStatus.BUSY:
+            info = yield from self._read_info()
+            is_spent = info is not None and InfoFlag.WRITES_SPENT in info.flags
+            raise PushFailed(PushFailure.WRITES_SPENT if is_spent else PushFailure.BUSY)
+        if answer.status not in (ReplyStatus.OK, ReplyStatus.SAME):
+            raise _again(answer.status)
+        return answer
+
+    def _ask_until_free(
+        self,
+        frame: bytes,
+        command: MissionCommand,
+        size: int,
+        decode: Callable[[bytes], AnswerT | None],
+        *,
+        exclusive: bool = False,
+    ) -> Conversation[AnswerT | None]:
+        """Ask again for a second while it is busy writing its configuration; None if it does not answer."""
         waited_s = 0.0
         while True:
-            reply = yield from ask(ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, exclusive=True)
-            answer = None if reply is None else ext.decode_progress(reply.payload)
-            if answer is None:
-                raise _GiveUp(PushFailure.NO_ANSWER)
-            if answer.status is ReplyStatus.BUSY:
-                if waited_s >= _BUSY_TIMEOUT_S:
-                    info = yield from self._read_info()
-                    is_spent = info is not None and InfoFlag.WRITES_SPENT in info.flags
-                    raise _GiveUp(PushFailure.WRITES_SPENT if is_spent else PushFailure.BUSY)
-                yield from pause(_BUSY_INTERVAL_S)
-                waited_s += _BUSY_INTERVAL_S
-                continue
-            if answer.status not in (ReplyStatus.OK, ReplyStatus.SAME):
-                raise _again(answer.status)
-            return answer
+            reply = yield from ask(frame, command, size, exclusive=exclusive)
+            answer = None if reply is None else decode(reply.payload)
+            if answer is None or answer.status is not ReplyStatus.BUSY or waited_s >= _BUSY_TIMEOUT_S:
+                return answer
+            yield from pause(_BUSY_INTERVAL_S)
+            waited_s += _BUSY_INTERVAL_S
 
     def _transfer(self, records: Sequence[WpRecord], begun: Staged, progress: PushProgress) -> Conversation[None]:
         """Keep the window full and send COMMIT right behind the last chunk: the line never waits for a reply.
@@ -253,12 +235,12 @@ class HarakiriMissions(OneMission):
                 if answer.status is not ReplyStatus.OK:
                     raise _again(answer.status)
                 if answer.stored != wanted:
-                    raise _Retry(PushFailure.FLASH)
+                    raise PushFailed(PushFailure.FLASH, is_final=False)
                 return
             # A frame was lost. A bad line loses long frames most.
             vain += 1
             if vain > _MAX_VAIN:
-                raise _GiveUp(PushFailure.NO_ANSWER)
+                raise PushFailed(PushFailure.NO_ANSWER)
             in_flight, stale = [], behind
             sent = acked
             committing = False
@@ -316,7 +298,7 @@ class HarakiriMissions(OneMission):
     def _confirmed(self, records: Sequence[WpRecord], answer: Staged) -> int:
         """The number of correct records on the flight controller; restarts if it has other ones."""
         if answer.next > len(records) or identify(records[: answer.next]).checksum != answer.checksum:
-            raise _Retry(PushFailure.NO_ANSWER)
+            raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
         return answer.next
 
 
@@ -326,6 +308,6 @@ def _decode_answer(reply: MspFrame) -> Staged | Stored | None:
     return decode(reply.payload)
 
 
-def _again(status: ReplyStatus) -> _Retry:
+def _again(status: ReplyStatus) -> PushFailed:
     """Retry after any refusal: on a bad line one in a hundred is a damaged reply that the XOR missed."""
-    return _Retry(_FAILURES.get(status, PushFailure.NO_ANSWER))
+    return PushFailed(_FAILURES.get(status, PushFailure.NO_ANSWER), is_final=False)

@@ -1,15 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts a Harakiri's records to items for ground stations."""
+"""A Harakiri's records as items for ground stations."""
 
-from collections.abc import Iterable, Mapping
+from abc import ABC
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 from bridge.controllers.harakiri.rules import MAV_COMMANDS
+from bridge.missions.fc_mission_store import FcMissionStore
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.wp_record import WpRecord
 
 _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
 _UNKNOWN_COMMAND = 0
+
+
+class HarakiriStore(FcMissionStore[WpRecord], ABC):
+    """The mission store of a Harakiri, over either protocol: each record is an item, home too."""
+
+    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """A list as a ground station reads it."""
+        return tuple(items_from_records(records, sent_as))
+
+    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
+        """The same number."""
+        return number if number < len(records) else 0
 
 
 def items_from_records(records: Iterable[WpRecord], sent_as: Mapping[int, int] = _NONE_KNOWN) -> list[MissionItem]:

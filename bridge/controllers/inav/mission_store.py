@@ -10,10 +10,10 @@ from contextlib import suppress
 from itertools import chain
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.mission_store import NOTHING, Failed, NavMissions
+from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
 from bridge.line.conversation import Conversation, LinkLost, ask
-from bridge.missions.fc_mission_store import PushFailure, PushProgress, PushResult
+from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult
 from protocols.msp.frame import Direction, request
 from protocols.msp.nav import (
     INFO_SIZE,
@@ -137,25 +137,25 @@ class InavMissions(NavMissions):
     def _prove(self, count: int) -> Conversation[None]:
         info = yield from self._info()
         if info is None:
-            raise Failed(PushFailure.NO_ANSWER)
+            raise PushFailed(PushFailure.NO_ANSWER)
         if not info.is_valid or info.count != count:
-            raise Failed(PushFailure.REFUSED, is_final=False)
+            raise PushFailed(PushFailure.REFUSED, is_final=False)
 
     def _keep(self) -> Conversation[None]:
         """SAVE, then verify again: the flight controller stalls meanwhile, and may have restarted."""
         before = yield from self._info()
         if before is None:
-            raise Failed(PushFailure.UNCERTAIN)
+            raise PushFailed(PushFailure.UNCERTAIN)
         for _ in range(_MAX_SAVES):
             reply = yield from ask(SAVE_REQUEST, Nav.SAVE, 0, tries=1, exclusive=True)
             after = yield from self._info_after_save()
             if after != before:
-                raise Failed(PushFailure.UNCERTAIN)
+                raise PushFailed(PushFailure.UNCERTAIN)
             if reply is not None:
                 break
         last = yield from self.read(before.count)
         if reply is None or reply.direction is Direction.ERROR or last is None:
-            raise Failed(PushFailure.NOT_SAVED)
+            raise PushFailed(PushFailure.NOT_SAVED)
         yield from self._load_first(before)
 
     def _load_first(self, saved: NavInfo) -> Conversation[None]:
@@ -163,7 +163,7 @@ class InavMissions(NavMissions):
         if self._kept:
             reply = yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             if reply is None or reply.direction is Direction.ERROR or (yield from self._info()) != saved:
-                raise Failed(PushFailure.UNCERTAIN)
+                raise PushFailed(PushFailure.UNCERTAIN)
         self._seen = yield from self._look()
 
     def _confirm(self, before: Mission | None) -> Conversation[Mission | None]:

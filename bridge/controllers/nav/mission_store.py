@@ -14,8 +14,16 @@ from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
 from bridge.controllers.nav.rules import NavProfile
 from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, pause, receive, send
-from bridge.missions.fc_mission_store import OneMission, PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.line.conversation import Conversation, LinkLost, Stopped, ask, receive, send
+from bridge.missions.fc_mission_store import (
+    FcMissionStore,
+    PushFailed,
+    PushFailure,
+    PushProgress,
+    PushResult,
+    StoreReport,
+    StoreState,
+)
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionItem
 from protocols.msp.commands import Msp
@@ -44,16 +52,7 @@ _PART_COMPARED = 7
 _MAX_BEGINS = 3
 
 
-class Failed(Exception):
-    """An attempt has failed; `is_final`: a retry would not help."""
-
-    def __init__(self, failure: PushFailure, *, is_final: bool = True) -> None:
-        super().__init__(failure.value)
-        self.failure = failure
-        self.is_final = is_final
-
-
-class NavMissions(OneMission, ABC):
+class NavMissions(FcMissionStore[NavRecord], ABC):
     """The mission store of one flight controller."""
 
     #: True if storing a record stalls it.
@@ -69,16 +68,6 @@ class NavMissions(OneMission, ABC):
         self._arm_mask = 1 << controller.arm_bit
         #: The flight controller's list, as last read; None: unknown, or one that cannot be flown.
         self._known: tuple[NavRecord, ...] | None = None
-
-    @property
-    def wp_radius_cm(self) -> int | None:
-        """Not supported."""
-        return None
-
-    def set_wp_radius(self, wp_radius_cm: int) -> Conversation[PushFailure | None]:
-        """Not supported."""
-        yield from pause(0.0)
-        return PushFailure.REFUSED
 
     def report(self) -> Conversation[StoreReport | None]:
         """Its state from telemetry; the stored list is unknown until it is read."""
@@ -136,7 +125,7 @@ class NavMissions(OneMission, ABC):
             return PushResult(failure)
         except LinkLost:
             return PushResult(failure)
-        except Failed as failed:
+        except PushFailed as failed:
             if failure is PushFailure.NO_ANSWER:
                 self._known = before
             elif writing and not (yield from self._restore(before)):
@@ -154,7 +143,7 @@ class NavMissions(OneMission, ABC):
 
     @abstractmethod
     def _keep(self) -> Conversation[None]:
-        """Make the list permanent after the last record; raises Failed."""
+        """Make the list permanent after the last record; raises PushFailed."""
 
     def _store_content(self, records: tuple[NavRecord, ...]) -> tuple[NavRecord, ...]:
         """All records to write so that `records` are flown, and nothing else is lost."""
@@ -175,7 +164,7 @@ class NavMissions(OneMission, ABC):
             try:
                 yield from self._write(wanted, progress)
                 return
-            except Failed as failed:
+            except PushFailed as failed:
                 if failed.is_final or begins == _MAX_BEGINS:
                     raise
 
@@ -185,7 +174,7 @@ class NavMissions(OneMission, ABC):
             if done == len(order) > 1:
                 yield from self._make_sure_disarmed()
             elif self._vehicle.armed:
-                raise Failed(PushFailure.ARMED)
+                raise PushFailed(PushFailure.ARMED)
             frame = _frame(number, record)
             if self._stores_slowly and (yield from self.read(number)) == record:
                 # A ground station that timed out may send the same list again: then this is quick.
@@ -193,15 +182,15 @@ class NavMissions(OneMission, ABC):
                 continue
             reply = yield from ask(frame, Nav.SET_WP, 0, tries=_TRIES, exclusive=self._stores_slowly)
             if reply is None:
-                raise Failed(PushFailure.NO_ANSWER)
+                raise PushFailed(PushFailure.NO_ANSWER)
             if reply.direction is Direction.ERROR:
-                raise Failed(PushFailure.REFUSED)
+                raise PushFailed(PushFailure.REFUSED)
             yield from self._compare(number, record)
             progress(done)
         yield from self._prove(len(wanted))
 
     def _prove(self, count: int) -> Conversation[None]:
-        """Verify what single records do not show; raises Failed."""
+        """Verify what single records do not show; raises PushFailed."""
         yield from ()
 
     def _compare(self, number: int, record: NavRecord) -> Conversation[None]:
@@ -209,10 +198,10 @@ class NavMissions(OneMission, ABC):
         for _ in range(2):
             held = yield from self.read(number)
             if held is None:
-                raise Failed(PushFailure.NO_ANSWER)
+                raise PushFailed(PushFailure.NO_ANSWER)
             if held == record:
                 return
-        raise Failed(PushFailure.REFUSED, is_final=False)
+        raise PushFailed(PushFailure.REFUSED, is_final=False)
 
     def read(self, number: int) -> Conversation[NavRecord | None]:
         """Read one record; ignores replies about other ones (telemetry polls home)."""
@@ -243,7 +232,7 @@ class NavMissions(OneMission, ABC):
         try:
             yield from self._make_sure_disarmed()
             yield from self._write(before, lambda _done: None)
-        except (Failed, LinkLost):
+        except (PushFailed, LinkLost):
             return False
         self._known = before
         return True
@@ -251,9 +240,9 @@ class NavMissions(OneMission, ABC):
     def _make_sure_disarmed(self) -> Conversation[None]:
         armed = yield from self._ask_armed()
         if armed is None:
-            raise Failed(PushFailure.NO_ANSWER)
+            raise PushFailed(PushFailure.NO_ANSWER)
         if armed:
-            raise Failed(PushFailure.ARMED)
+            raise PushFailed(PushFailure.ARMED)
 
     def _ask_armed(self) -> Conversation[bool | None]:
         reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
@@ -266,7 +255,7 @@ def _frame(number: int, record: NavRecord) -> bytes:
     try:
         return encode_set_wp(number, record)
     except UnsafeRecord as unsafe:
-        raise Failed(PushFailure.UNSAFE) from unsafe
+        raise PushFailed(PushFailure.UNSAFE) from unsafe
 
 
 #: The failures to report instead if the old list is lost.
