@@ -48,6 +48,8 @@ INSTALL = if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 demo: $(VENV)/.demo-ready
 	$(BIN)/naze-bridge demo $(if $(ONCE),--once)
 
+# Each program that a test starts would compile all its modules again.
+test: export PYTHONDONTWRITEBYTECODE =
 test: $(VENV)/.test-ready
 	@$(BROWSER) || { $(call INSTALL,$(BROWSER_PACKAGES)); } || true
 	@$(BROWSER) || echo 'The status page: NOT TESTED in a browser: none here (apt-get install $(BROWSER_PACKAGES))'

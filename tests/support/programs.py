@@ -10,9 +10,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from service.control.client import ControlError, ask_daemon
+from tests.support.forked import Forked
 from tests.support.plan import PlanRow
 
 #: Seconds after which something that must come at all counts as not coming.
@@ -48,12 +50,21 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
 
 
 def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run a subcommand to its end; `options` are those of subprocess.run."""
-    usual: dict[str, Any] = {"cwd": REPOSITORY, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    command = [*NAZE_BRIDGE, *map(str, arguments)]
+    """Run a subcommand to its end; with `options`, those of subprocess.run, in an interpreter of its own."""
+    words = list(map(str, arguments))
     ended: subprocess.CompletedProcess[str]
-    ended = subprocess.run(command, timeout=PATIENCE, check=False, **usual | options)
-    return ended
+    if options:
+        usual: dict[str, Any] = {"cwd": REPOSITORY, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        ended = subprocess.run([*NAZE_BRIDGE, *words], timeout=PATIENCE, check=False, **usual | options)
+        return ended
+    with TemporaryDirectory() as folder:
+        output, error = Path(folder, "output"), Path(folder, "error")
+        process = Forked(words, REPOSITORY, output, error)
+        try:
+            code = process.wait(PATIENCE)
+        finally:
+            process.kill()
+        return subprocess.CompletedProcess(words, code, output.read_text(), error.read_text())
 
 
 class Program:
@@ -62,11 +73,11 @@ class Program:
     def __init__(self, output: Path, *arguments: str) -> None:
         self._output = output
         self._arguments = arguments
+        output.touch()
         self.process = self._start()
 
-    def _start(self) -> subprocess.Popen[bytes]:
-        with self._output.open("ab") as file:
-            return subprocess.Popen([*NAZE_BRIDGE, *self._arguments], cwd=REPOSITORY, stdout=file, stderr=file)
+    def _start(self) -> Forked | subprocess.Popen[bytes]:
+        return Forked(self._arguments, REPOSITORY, self._output, self._output)
 
     @property
     def printed(self) -> str:

@@ -193,7 +193,6 @@ def test_one_address_does_not_lock_out_another(web: WebBench) -> None:
 def test_without_the_setting_there_is_no_page(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
-    assert "uvicorn" not in Path(f"/proc/{daemon.process.pid}/maps").read_text()
     assert daemon.has_logged("web.listening") is None
 
 

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`naze-bridge` as a process forked from one that has imported it: imports are most of what a short command costs.
+
+It has its own pid, exit status, environment and output, like any other program. What depends on a fresh interpreter
+(memory, which modules are loaded) is tested with `programs.NAZE_BRIDGE`.
+"""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+_IMPORTED = (
+    "service.cli.check",
+    "service.cli.daemon_client",
+    "service.cli.demo",
+    "service.cli.direct_bridge",
+    "service.cli.mission_commands",
+    "service.cli.mission_table",
+    "service.cli.serve",
+    "service.cli.status",
+    "service.cli.stored_missions",
+    "service.doctor.command",
+    "service.doctor.examination",
+    "service.fleet.command",
+    "service.setup.command",
+    "service.web.server",
+    "service.zenoh_link.node",
+    "rich.console",
+    "rich.progress",
+    "simulator.command",
+    "tests.support.forked",
+    "uvicorn",
+)
+
+_context = multiprocessing.get_context("forkserver")
+_context.set_forkserver_preload(list(_IMPORTED))
+
+
+class Forked:
+    """A running `naze-bridge`, with the methods of subprocess.Popen. What it prints is appended to files."""
+
+    def __init__(self, arguments: Sequence[str], directory: Path, output: Path, error: Path) -> None:
+        self._arguments = arguments
+        what = (arguments, directory, dict(os.environ), output, error)
+        self._process = _context.Process(target=_run, args=what, daemon=True)
+        self._process.start()
+        assert self._process.pid is not None
+        self.pid = self._process.pid
+
+    def poll(self) -> int | None:
+        return self._process.exitcode
+
+    def wait(self, timeout: float | None = None) -> int:
+        self._process.join(timeout)
+        code = self.poll()
+        if code is None:
+            raise subprocess.TimeoutExpired(list(self._arguments), timeout or 0)
+        return code
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+
+def _run(arguments: Sequence[str], directory: Path, environment: dict[str, str], output: Path, error: Path) -> None:
+    from service.cli.main import main
+
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(directory)
+    for stream, path, mode in ((0, os.devnull, os.O_RDONLY), (1, output, os.O_WRONLY), (2, error, os.O_WRONLY)):
+        descriptor = os.open(path, mode | os.O_CREAT | os.O_APPEND, 0o644)
+        os.dup2(descriptor, stream)
+        os.close(descriptor)
+    sys.stdin, sys.stdout = open(0), open(1, "w")  # noqa: SIM115
+    sys.stderr = open(2, "w", buffering=1, errors="backslashreplace")  # noqa: SIM115
+    main(list(arguments), prog_name="naze-bridge")
