@@ -122,7 +122,7 @@ def _cpu_s(pid: int) -> float:
 
 
 def resident_mb(pid: int) -> float:
-    """The present memory of a process, megabytes."""
+    """The current memory of a process, megabytes."""
     return _rss_mb(Path(f"/proc/{pid}/status").read_text())
 
 

@@ -69,7 +69,7 @@ def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[Tlo
 
 
 def heartbeat_type(frame: bytes) -> int | None:
-    """Return the MAV_TYPE that a whole frame announces; None if it is no HEARTBEAT."""
+    """Return the MAV_TYPE that a whole frame announces; None if it is not a HEARTBEAT."""
     found = MavlinkFrame(frame)
     if found.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
         return None

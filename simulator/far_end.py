@@ -9,7 +9,7 @@ class FarEnd(Protocol):
 
     @property
     def baud(self) -> int:
-        """Its present speed."""
+        """Its current speed."""
 
     def power_on_booted(self, now: float) -> None:
         """Begin."""

@@ -86,7 +86,7 @@ class MavlinkSender:
         self._writer = FrameWriter(_SYSID, _COMPID)
 
     def telemetry(self, message: Stream, craft: Craft, uptime: float) -> bytes:
-        """Encode a message with the present values; `uptime` in seconds."""
+        """Encode a message with the current values; `uptime` in seconds."""
         _, msgid, layout = message.value
         payload = struct.pack(layout, *_fields(message, craft, round(uptime * 1000)))
         return self.frame(Packed(msgid, payload, payload))

@@ -59,7 +59,7 @@ class MspBoard:
         self._firmware: MspFirmware | None = None
         self._receiver = MspReceiver()
         self._boots_at = self._next_task = self._next_look = 0.0
-        # The extra time of the present run of the task.
+        # The extra time of the current run of the task.
         self._busy = 0.0
         # An unserved '#' or 'R', and when the last byte was read.
         self._pending: str | None = None

@@ -141,7 +141,7 @@ class MspReceiver:
 
 
 class MspAnswers:
-    """The replies to the stock commands. `craft` returns the present state."""
+    """The replies to the stock commands. `craft` returns the current state."""
 
     def __init__(self, craft: Callable[[], Craft], tree: Tree) -> None:
         self._craft = craft

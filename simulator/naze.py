@@ -61,7 +61,7 @@ class SimulatedNaze:
 
     @property
     def baud(self) -> int:
-        """The present speed of the UART."""
+        """The current speed of the UART."""
         return self._uart.baud
 
     @property

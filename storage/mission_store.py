@@ -311,5 +311,5 @@ def _damaged_line(number: int) -> MissionSummary:
 
 
 def _text(text: str) -> str:
-    r"""What SQLite can hold: the lone surrogates of a file name that is no UTF-8 become \udcXX."""
+    r"""What SQLite can hold: the lone surrogates of a file name that is not UTF-8 become \udcXX."""
     return text.encode(errors="backslashreplace").decode()

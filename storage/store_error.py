@@ -19,7 +19,7 @@ _REASONS = {
     sqlite3.SQLITE_CANTOPEN: "it cannot be opened or made; look at the directory's owner, mode and mount",
     sqlite3.SQLITE_BUSY: "another process keeps it locked; end that one",
     sqlite3.SQLITE_CORRUPT: "it is damaged; a restart keeps it aside and makes a new one",
-    sqlite3.SQLITE_NOTADB: "it is no database any more; a restart keeps it aside and makes a new one",
+    sqlite3.SQLITE_NOTADB: "it is not a database any more; a restart keeps it aside and makes a new one",
 }
 
 

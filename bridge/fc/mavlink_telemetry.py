@@ -35,7 +35,7 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
-#: 2020: a time before that is no time of a GPS.
+#: 2020: no GPS reports an earlier time.
 _EARLIEST_UNIX_S = 1_577_836_800
 #: The autopilot field of a heartbeat's payload. Cameras and gimbals send INVALID.
 _AUTOPILOT_AT = 5

@@ -21,7 +21,7 @@ _SIK_SENDER = (51, 68)
 
 
 class OtherDeviceWatch:
-    """Feed bytes; `what` names the device once it has shown that it is no flight controller."""
+    """Feed bytes; `what` names the device once it has shown that it is not a flight controller."""
 
     def __init__(self) -> None:
         self.what = ""

@@ -142,7 +142,7 @@ class FcSession:
             self._handle(event, now)
 
     def tick(self, now: float) -> None:
-        """Run the timers of the present state."""
+        """Run the timers of the current state."""
         event = self.state.tick(now)
         if event is not None:
             self._handle(event, now)

@@ -160,7 +160,7 @@ class PollSchedule:
             self._fit()
 
     def interval_s(self, command: Msp) -> float | None:
-        """The present interval of a poll, seconds; None if it is not polled."""
+        """The current interval of a poll, seconds; None if it is not polled."""
         slot = self._slots.get(command)
         return None if slot is None or slot.interval_s == inf else slot.interval_s
 

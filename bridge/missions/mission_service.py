@@ -75,7 +75,7 @@ OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
 class MissionService:
-    """Holds the transfer lock, the dialect of the present flight controller, and its list.
+    """Holds the transfer lock, the dialect of the current flight controller, and its list.
 
     `on_ending` is called with the result of each mission.
     """
@@ -117,7 +117,7 @@ class MissionService:
 
     @property
     def dialect(self) -> AnyFcMissionStore | None:
-        """The mission store of the present flight controller; None if it has none."""
+        """The mission store of the current flight controller; None if it has none."""
         return self._dialect
 
     def home_item(self) -> MissionItem | None:
@@ -183,7 +183,7 @@ class MissionService:
             return NO_LINK
 
     def rules(self) -> Conversation[MissionRules | Refusal]:
-        """The rules of the present flight controller, armed or not."""
+        """The rules of the current flight controller, armed or not."""
         if self._dialect is None:
             return self._refusal
         try:

@@ -297,7 +297,7 @@ class Vehicle:
         return news
 
     def home_or_position(self) -> Home | None:
-        """Home; before it is known, the present position."""
+        """Home; before it is known, the current position."""
         position = self.last(GlobalPosition)
         if self.home is not None or position is None:
             return self.home

@@ -49,8 +49,8 @@ class Position:
     climb_m_s: Annotated[float | None, "upwards is positive"] = None
     north_m_s: Annotated[float | None, "speed over ground, northward part"] = None
     east_m_s: Annotated[float | None, "speed over ground, eastward part"] = None
-    home_lat_deg: Annotated[float | None, "home: where the vehicle was armed; before that, where it stands"] = None
-    home_lon_deg: Annotated[float | None, "home: where the vehicle was armed; before that, where it stands"] = None
+    home_lat_deg: Annotated[float | None, "home: where the vehicle was armed; before that, its current position"] = None
+    home_lon_deg: Annotated[float | None, "home: where the vehicle was armed; before that, its current position"] = None
     home_distance_m: Annotated[float | None, "way to home"] = None
     home_direction_deg: Annotated[float | None, "direction of home, clockwise from north"] = None
     age_s: Age = None

@@ -83,7 +83,7 @@ class LocalMissions:
     def check(
         self, items: Sequence[MissionItem], on_done: Callable[[Verdict[Any] | Refusal], None], now: float
     ) -> None:
-        """Check a list by the rules of the present flight controller, without writing it."""
+        """Check a list by the rules of the current flight controller, without writing it."""
 
         def conversation() -> Conversation[Verdict[Any] | Refusal]:
             rules = yield from self._missions.rules()

@@ -203,7 +203,7 @@ class OwnVehicle:
                 self.set_interval(peer, msgid, interval_s)
 
     def interval_s(self, peer: Peer, msgid: int) -> float | None:
-        """The present interval of a message for a ground station; infinity: never, None: no such message."""
+        """The current interval of a message for a ground station; infinity: never, None: no such message."""
         if msgid == messages.MAVLINK_MSG_ID_HEARTBEAT:
             return _TICK_S
         if not self._rates.knows(msgid):

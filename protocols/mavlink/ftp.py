@@ -13,7 +13,7 @@ _EOPNOTSUPP = 95
 
 
 def refuse(payload: Sequence[int]) -> list[int] | None:
-    """Return the payload of the refusal of a request's payload; None if that is no request."""
+    """Return the payload of the refusal of a request's payload; None if that is not a request."""
     request = bytes(payload)
     if len(request) < _HEADER.size:
         return None

@@ -47,7 +47,7 @@ class Timestamps:
         self.last = min(at_least, _MAX_TIMESTAMP)
 
     def now(self) -> int:
-        """Return the present timestamp, without using it up."""
+        """Return the current timestamp, without using it up."""
         return max(self.last, ticks(self._clock()))
 
     def take(self) -> int:

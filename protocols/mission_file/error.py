@@ -31,7 +31,7 @@ def no_note(_text: str) -> None:
 
 
 def refuse_other_plans(commands: Iterable[int], name: str) -> None:
-    """Refuse a list that is no mission: Mission Planner and QGroundControl keep fences and rally points like one."""
+    """Refuse a list that is not a mission: Mission Planner and QGroundControl keep fences and rally points like one."""
     kinds = {_OTHER_PLANS.get(command, "") for command in commands}
     if kinds and "" not in kinds:
         raise MissionFileError(

@@ -29,7 +29,7 @@ def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionIte
     """Return the items, home first; MissionFileError names the file and the entry of mission.items, from 1."""
     plan = _parse(text, name)
     if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None):
-        what = 'this is no QGroundControl plan, its fileType is not "Plan"'
+        what = 'this is not a QGroundControl plan, its fileType is not "Plan"'
         raise MissionFileError(name, "", what, _SAVE_AGAIN)
     _refuse_unknown_version(plan.get("version", _VERSIONS[0]), _VERSIONS, "the plan", name)
     mission = plan.get("mission")

@@ -81,7 +81,7 @@ class NavRecord:
 
 @dataclass(frozen=True, slots=True)
 class NavInfo:
-    """MSP_WP_GETINFO: how many records fit, whether the present list may be flown, how many it has."""
+    """MSP_WP_GETINFO: how many records fit, whether the current list may be flown, how many it has."""
 
     capacity: int
     is_valid: bool

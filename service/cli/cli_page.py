@@ -12,7 +12,7 @@ _WIDTH = 100
 _HEAD = """\
 # The command line
 
-What every command says to `--help`. Common exit codes: 0 done, 1 refused or failed, 2 wrong usage or an unreadable
+The `--help` text of every command. Common exit codes: 0 done, 1 refused or failed, 2 wrong usage or an unreadable
 file, 74 the output cannot be written, 130 interrupted.
 """
 

@@ -21,7 +21,7 @@ class CommandGroup(click.Group):
         if name not in known and not name.startswith("-"):
             near = difflib.get_close_matches(name.lower(), known, n=1)
             hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-            ctx.fail(f"{name!r} is no command: {hint}")
+            ctx.fail(f"{name!r} is not a command: {hint}")
         return super().resolve_command(ctx, args)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a command of the command line reaches a bridge: the running daemon's, or one of its own with `--fc`."""
+"""Connects a command to a bridge: the running daemon's, or one of its own with `--fc`."""
 
 import asyncio
 import signal
@@ -18,8 +18,8 @@ from service.settings.addresses import AddressError, parse_fc
 from storage.store_error import StoreError
 
 _INTERRUPTED = 130  # as shells have it: 128 + SIGINT
-_GOES_ON = "the daemon goes on with the mission, and the result follows; to leave, press Ctrl-C again"
-_LEFT = "interrupted; the daemon goes on with the mission: see `naze-bridge missions list`"
+_GOES_ON = "the daemon continues with the mission, and the result follows; to exit now, press Ctrl-C again"
+_LEFT = "interrupted; the daemon continues with the mission: see `naze-bridge missions list`"
 _WRITES = ("push", "restore")
 #: The service's state directory.
 SERVICE_STATE = Path("/var/lib/naze-bridge")
@@ -118,8 +118,8 @@ def _read_store(state_dir: Path | None, request: Json) -> Json:
     try:
         path = next((path for folder in folders if (path := folder / DATABASE_NAME).exists()), None)
     except PermissionError as error:
-        raise ControlError(f"{SERVICE_STATE} is closed to you: use sudo") from error
+        raise ControlError(f"{SERVICE_STATE} cannot be read: use sudo") from error
     if path is None:
-        raise ControlError(f"no missions are stored in {' or '.join(map(str, folders))}: name the folder, --state-dir")
+        raise ControlError(f"no missions are stored in {' or '.join(map(str, folders))}: use --state-dir")
     with read_store(path) as store:
         return listed(store, request["limit"]) if request["do"] == "missions" else shown(store, request["number"])

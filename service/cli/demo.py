@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge demo`: the main job on a simulated Naze, from a mission file to the proof."""
+"""`naze-bridge demo`: writes a mission to a simulated Naze and verifies it."""
 
 import shutil
 import signal
@@ -25,7 +25,7 @@ from service.cli.printing import fail, print_table
 from service.control.client import ControlError, ask_daemon
 from service.control.mission_data import Json, mission_items
 
-#: A link to examples/ in the repository, a file in what is installed.
+#: A link to examples/ in the repository, a file in the installed package.
 _EXAMPLE = Path(__file__).parent / "naze-field.waypoints"
 _CONNECT_TIMEOUT_S = 15.0
 
@@ -69,7 +69,7 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, cons
     if result is not MissionResult.ACCEPTED:
         raise ClientError(f"the mission was not accepted: {'; '.join(client.texts)}")
     if held != mission_items(received["stored_items"]):
-        raise ClientError("what was read back is not what was stored")
+        raise ClientError("the mission read back differs from the stored one")
     console.print(
         f"\nSent {len(items)} items; the flight controller holds {len(held)}, read back from it and compared."
     )
@@ -78,7 +78,7 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, cons
 def _stay(port: int, process: subprocess.Popen[bytes], state_dir: Path, console: Console) -> None:
     addresses = ", ".join(_own_addresses()) or "this machine's address"
     console.print(
-        f"\nThe bridge stays up. In Mission Planner choose UDPCl, host {addresses}, port {port}, and press Connect"
+        f"\nThe bridge keeps running. In Mission Planner choose UDPCl, host {addresses}, port {port}, and press Connect"
         "\n(QGroundControl, MAVProxy and MAVSDK: udpout / udp client to the same address). Ctrl-C ends.\n"
         f"The daemon's log: {state_dir / 'daemon.log'}"
     )
@@ -111,10 +111,10 @@ def _free_port(wanted: int, console: Console) -> int:
     """`wanted`, or another port if a ground station on this machine uses it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.bind(("0.0.0.0", wanted))  # noqa: S104  # the port is to be reached over Wi-Fi
+            probe.bind(("0.0.0.0", wanted))  # noqa: S104  # reachable over Wi-Fi
         except OSError:
             probe.bind(("0.0.0.0", 0))  # noqa: S104
-            console.print(f"UDP port {wanted} is in use here; taking another one.")
+            console.print(f"UDP port {wanted} is in use; using another one.")
         port: int = probe.getsockname()[1]
         return port
 

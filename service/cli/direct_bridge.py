@@ -42,7 +42,7 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
         if daemon.bridge.session.controller is None:
             where = daemon.fc_where
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
-        # Who it is comes before what it tells of itself, and some controllers never tell all of it.
+        # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:
             await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
         job = asyncio.ensure_future(jobs.do(request, lambda answer: progress(answer["progress"])))

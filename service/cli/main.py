@@ -14,16 +14,16 @@ from service.cli.command_group import LazyCommand, LazyGroup
 _COMMANDS = {
     "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
     "run": LazyCommand("service.cli.run:run", "Run the bridge in the foreground."),
-    "status": LazyCommand("service.cli.status:status", "Show how the bridge and the vehicle are."),
+    "status": LazyCommand("service.cli.status:status", "Show the state of the bridge and the vehicle."),
     "doctor": LazyCommand("service.cli.doctor.command:doctor", "Diagnose setup problems."),
-    "check": LazyCommand("service.cli.check:check", "Show what would become of mission files, offline."),
+    "check": LazyCommand("service.cli.check:check", "Show how mission files would be stored, offline."),
     "push": LazyCommand("service.cli.mission_commands:push", "Write a mission file and verify it."),
     "pull": LazyCommand("service.cli.mission_commands:pull", "Read the mission from the flight controller."),
     "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
     "missions": LazyCommand("service.cli.stored_missions:missions", "List, show, compare and restore missions."),
-    "fleet": LazyCommand("service.cli.fleet.command:fleet", "Serve many vehicles at once, over Eclipse zenoh."),
+    "fleet": LazyCommand("service.cli.fleet.command:fleet", "Manage many vehicles over Eclipse zenoh."),
     "sim": LazyCommand("simulator.command:sim", "Simulate a flight controller."),
-    "demo": LazyCommand("service.cli.demo:demo", "Show a mission written to a simulated Naze."),
+    "demo": LazyCommand("service.cli.demo:demo", "Demonstrate a mission upload to a simulated Naze."),
 }
 
 #: Libraries and their optional dependencies, 12 MB together, that the daemon does not need: OpenSSL, coloured logs.
@@ -34,10 +34,10 @@ _INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 
 class _Main(LazyGroup):
     def main(self, *args: Any, **kwargs: Any) -> NoReturn:
-        """Run to the end of the program. Every failure is one sentence behind the program's name.
+        """Run the program. Every failure is one sentence after the program's name.
 
-        A full disk behind standard output is status 74 (EX_IOERR). Click itself is silent about a reader who has seen
-        enough (`| head`).
+        The status is 74 (EX_IOERR) if standard output cannot be written, as on a full disk. Click itself ignores a
+        closed pipe (`| head`).
         """
         try:
             code = super().main(*args, **kwargs | {"standalone_mode": False})
@@ -51,7 +51,7 @@ class _Main(LazyGroup):
             if error.errno not in _UNWRITABLE:
                 raise
             click.echo(f"naze-bridge: the output cannot be written: {error.strerror}", err=True)
-            # The unwritten buffer would fail once more at the interpreter's exit.
+            # The unwritten buffer would fail again at the interpreter's exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(os.EX_IOERR)
         sys.exit(code if isinstance(code, int) else 0)

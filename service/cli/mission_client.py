@@ -64,7 +64,7 @@ class MissionClient:
 
 @contextmanager
 def connect(host: str, port: int, patience_s: float) -> Iterator[MissionClient]:
-    """Connect to the vehicle behind a UDP port; ClientError if no heartbeat arrives in time."""
+    """Connect to the vehicle on a UDP port; ClientError if no heartbeat arrives in time."""
     from pymavlink import mavutil  # with numpy and every dialect: --help does without
 
     link = mavutil.mavlink_connection(f"udpout:{host}:{port}", source_system=255, source_component=190)
@@ -76,6 +76,6 @@ def connect(host: str, port: int, patience_s: float) -> Iterator[MissionClient]:
             if linked:
                 yield MissionClient(link, heartbeat.get_srcSystem(), heartbeat.get_srcComponent())
                 return
-        raise ClientError(f"no vehicle with a flight controller behind UDP port {port} within {patience_s:.0f} s")
+        raise ClientError(f"no vehicle with a flight controller on UDP port {port} within {patience_s:.0f} s")
     finally:
         link.close()

@@ -24,7 +24,7 @@ _STANDARD_OUTPUT = Path("-")
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--erase", is_flag=True, help="Do not ask before a file of which no item can be stored erases.")
+@click.option("--erase", is_flag=True, help="Erase without asking if no item of the file can be stored.")
 @bridge_options
 def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     """Write a mission file to the flight controller and verify it there.
@@ -54,15 +54,15 @@ def _would_erase(delivery: Json) -> bool:
 @click.option("--all", "with_others", is_flag=True, help="Also read the missions in INAV's store that are not loaded.")
 @bridge_options
 def pull(file: Path | None, with_others: bool, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
-    """Read the mission that the flight controller holds: into FILE, or as a table.
+    """Read the flight controller's mission, into FILE or as a table.
 
-    FILE is written as QGC WPL 110, as a QGroundControl plan if it ends with .plan; - is standard output.
+    FILE is written as QGC WPL 110, or as a QGroundControl plan if its name ends with .plan; - is standard output.
 
     With --all, further missions go to FILE-2, FILE-3 and so on. Exit code 0: read, 1: there is no link, or FILE cannot
     be written.
     """
     if as_json and file == _STANDARD_OUTPUT:
-        raise click.UsageError("the file and --json cannot both go to standard output: leave one of them away")
+        raise click.UsageError("the file and --json cannot both go to standard output: omit one of them")
     if with_others and file == _STANDARD_OUTPUT:
         raise click.UsageError("--all cannot write several missions to standard output: name a file")
     held = ask(state_dir, fc, {"do": "pull"})
@@ -100,7 +100,7 @@ def _show_held(held: Json, file: Path | None, *, is_quiet: bool) -> str:
 @click.command()
 @bridge_options
 def clear(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
-    """Clear the mission on the flight controller and verify that."""
+    """Clear the mission on the flight controller and verify the result."""
     show_delivery(ask(state_dir, fc, {"do": "push", "items": [], "source": "clear"}), as_json=as_json)
 
 

@@ -41,9 +41,9 @@ def save_mission(path: Path, text: str) -> None:
     try:
         target = path.resolve()
         if target.exists() and not target.is_file():
-            raise MissionFileError(name, "", "this is no regular file", "name a file for the mission")
+            raise MissionFileError(name, "", "it is not a regular file", "name a file for the mission")
         draft = target.with_name(f".naze-bridge-{os.getpid()}")
-        with draft.open("x", encoding="utf-8") as file:  # "x": what is there already, a link above all, is not ours
+        with draft.open("x", encoding="utf-8") as file:  # "x": an existing file, above all a link, is not ours
             try:
                 file.write(text)
                 file.flush()

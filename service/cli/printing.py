@@ -15,7 +15,7 @@ _BLANK_END = re.compile(r"(?: |\x1b\[[\d;]*m)+$", re.MULTILINE)
 
 
 def print_table(table: "RenderableType") -> None:
-    """Print a table as wide as the terminal lets it, 80 columns into a file; no blanks at the ends of lines."""
+    """Print a table as wide as the terminal, or 80 columns in a file, without trailing blanks."""
     from rich.console import Console
 
     console = Console(highlight=False)

@@ -39,7 +39,7 @@ def run(
     except SettingsError as error:
         raise click.UsageError(str(error)) from error
     if check_config:
-        click.echo("The settings can be used.")
+        click.echo("The settings are valid.")
         return
     from service.cli.serve import serve  # the whole daemon: --help does without
 

@@ -20,7 +20,7 @@ _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 @click.command()
 @bridge_options
 def status(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
-    """Show how the bridge and the vehicle are: who is connected, where, for how long; mode, fix, battery, mission."""
+    """Show the state of the bridge and the vehicle: connections, mode, GPS fix, battery, mission."""
     facts = ask(state_dir, fc, STATUS)
     if as_json:
         print_json(facts)
@@ -36,7 +36,7 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
     yield "Bridge", f"naze-bridge {facts['version']}, running for {duration(facts['uptime_s'])}"
     yield "Flight controller", _flight_controller(facts)
     if facts["flight_controller"] is not None:
-        armed = {True: "ARMED", False: "disarmed", None: "armed or not is unknown"}[facts["armed"]]
+        armed = {True: "ARMED", False: "disarmed", None: "arming state unknown"}[facts["armed"]]
         yield "Vehicle", ", ".join(filter(None, (armed, facts["mode"])))
         yield "GPS", _gps(facts)
         yield "Battery", "unknown" if facts["battery_v"] is None else f"{facts['battery_v']:.1f} V"
@@ -96,7 +96,7 @@ def _mission(facts: Json) -> str:
 
 
 def _reachable(link: str, addresses: list[str]) -> str:
-    """What to enter in a ground station for a link that listens; other links as they are written."""
+    """The address to enter in a ground station for a link that listens; other links as configured."""
     address = parse_gcs(link)
     protocol = {"udpin": "UDP", "tcpin": "TCP"}.get(address.kind)
     if protocol is None:

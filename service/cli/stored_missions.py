@@ -22,23 +22,23 @@ _NUMBER = click.IntRange(1, MOST)
 
 @click.group(cls=CommandGroup)
 def missions() -> None:
-    """List, show, compare and restore the missions that came in, accepted or not.
+    """List, show, compare and restore the received missions, accepted or not.
 
     All but restore also work without a daemon.
     """
 
 
 @missions.command("list")
-@click.option("--limit", type=_NUMBER, default=20, show_default=True, help="Newest first, so many.")
+@click.option("--limit", type=_NUMBER, default=20, show_default=True, help="The maximum number of missions.")
 @daemon_options
 def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
-    """List the missions that came in, newest first."""
+    """List the received missions, newest first."""
     found = ask_store(state_dir, {"do": "missions", "limit": limit})["missions"]
     if as_json:
         print_json(found)
         return
     if not found:
-        click.echo("No mission has come in yet.")
+        click.echo("No mission has been received yet.")
         return
     table = Table("No.", "Received", "From", "Items", "Changes", "Outcome", "Detail", box=None, pad_edge=False)
     for mission in found:
@@ -53,7 +53,7 @@ def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
 @click.argument("number", type=_NUMBER)
 @daemon_options
 def show(number: int, state_dir: Path | None, as_json: bool) -> None:
-    """Show mission NUMBER: as sent beside as stored, and why."""
+    """Show mission NUMBER as sent and as stored, with the reasons."""
     mission = _fetch(state_dir, number)
     if as_json:
         print_json(mission)
@@ -88,7 +88,7 @@ def diff(first: int, second: int, state_dir: Path | None, as_json: bool) -> None
 @click.argument("number", type=_NUMBER)
 @bridge_options
 def restore(number: int, state_dir: Path | None, fc: str | None, as_json: bool) -> None:
-    """Write mission NUMBER to the flight controller again, as it was sent then."""
+    """Write mission NUMBER to the flight controller again, as originally sent."""
     items = _fetch(state_dir, number)["received"]["items"]
     request: Json = {"do": "restore", "number": number}
     if fc is not None:

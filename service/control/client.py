@@ -13,12 +13,12 @@ from pathlib import Path
 from service.control.mission_data import Json, to_json
 from service.control.socket_path import find_socket
 
-#: The request for how the bridge stands.
+#: The request for the bridge's status.
 STATUS = {"do": "status"}
 
 
 class ControlError(Exception):
-    """The daemon refused, or is not there; one sentence."""
+    """The daemon refused or is not running; one sentence."""
 
 
 class Interrupted(Exception):

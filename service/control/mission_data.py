@@ -12,7 +12,7 @@ from protocols.mission_record import identify
 
 Json = dict[str, Any]
 
-#: The greatest number that a request may hold.
+#: The greatest number allowed in a request.
 MOST = 2**31 - 1
 
 _WHOLE = {"seq": 65535, "command": 65535, "frame": 255}

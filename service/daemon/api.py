@@ -51,7 +51,7 @@ class MissionJobs:
         self._loop = asyncio.get_running_loop()
 
     async def do(self, request: Json, tell: Callable[[Json], None]) -> Json:
-        """Do what a request asks for; `tell` takes the progress. ControlError, StoreError or ValueError say why not."""
+        """Handle a request; `tell` takes the progress. ControlError, StoreError or ValueError on failure."""
         match request.get("do"):
             case "push":
                 source = str(request.get("source"))[:_MAX_SOURCE]
@@ -68,7 +68,7 @@ class MissionJobs:
             case "restore":
                 return await self.restore(whole_number(request, "number", 0, MOST), tell)
             case other:
-                raise ControlError(f"{other!r} is no request")
+                raise ControlError(f"{other!r} is not a request")
 
     async def push(
         self, items: list[MissionItem], source: str, progress: Callable[[Json], None], *, may_erase: bool = True
@@ -96,7 +96,7 @@ class MissionJobs:
         return await future
 
     async def check(self, items: list[MissionItem]) -> Json:
-        """The verdict on a list for the present flight controller."""
+        """The verdict on a list for the current flight controller."""
         local = self._daemon.bridge.local
         return verdict_data(await self._answer(lambda answered, now: local.check(items, answered, now)))
 
@@ -166,7 +166,7 @@ class MissionJobs:
         return await self._daemon.store.ask(lambda store: shown(store, number))
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:
-        """Push a stored mission again, as it was sent; the present rules apply."""
+        """Push a stored mission again, as it was sent; the current rules apply."""
         data = await self.show_mission(number)
         return await self.push(mission_items(data["received"]["items"]), f"restore of mission {number}", progress)
 
@@ -184,7 +184,7 @@ def shown(store: MissionStore, number: int) -> Json:
     """Answer the request "mission"; ControlError if there is none of that number."""
     mission = store.get(number)
     if mission is None:
-        raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows which there are")
+        raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows the numbers")
     received = mission.received
     as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
     return _fields(mission) | {"received": _fields(received) | as_text}
@@ -202,7 +202,7 @@ class ControlServer:
     async def start(self) -> None:
         """Listen; ControlError if that fails.
 
-        A socket that a killed daemon left behind is replaced: the state lock says that it is dead.
+        A socket that a killed daemon left behind is replaced: the state lock proves that it is dead.
         """
         try:
             if not self._path.parent.exists():
@@ -210,14 +210,14 @@ class ControlServer:
             if self._path.parent.stat().st_uid not in (os.getuid(), 0):
                 raise PermissionError(f"{self._path.parent} belongs to another user")
             self._path.unlink(missing_ok=True)
-            # The backlog is also how many connections asyncio takes in one turn of the loop.
+            # The backlog also limits the connections that asyncio accepts in one turn of the loop.
             self._server = await asyncio.start_unix_server(
                 self._serve, self._path, limit=_MAX_LINE, backlog=_MAX_CLIENTS
             )
             self._path.chmod(0o660)
         except OSError as error:
             reason = error.strerror or str(error)
-            raise ControlError(f"the control socket {self._path} cannot be made: {reason}") from error
+            raise ControlError(f"the control socket {self._path} cannot be created: {reason}") from error
 
     async def close(self) -> None:
         """Stop listening, and tell waiting clients that they get no reply."""
@@ -257,7 +257,7 @@ class ControlServer:
             tell({"result": await self._jobs.do(_request(line), tell)})
             await _send_all(writer)
         except TimeoutError:
-            tell({"error": f"no whole request came within {_REQUEST_TIMEOUT_S:.0f} s"})
+            tell({"error": f"no complete request within {_REQUEST_TIMEOUT_S:.0f} s"})
         except (ControlError, StoreError) as error:
             tell({"error": str(error)})
         except ValueError as error:

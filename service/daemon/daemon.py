@@ -132,7 +132,7 @@ class Daemon:
 
     @property
     def fc_trouble(self) -> str:
-        """Why the flight controller cannot be used: its port, or the state that it is in; empty if it can be."""
+        """Why the flight controller cannot be used: its port, or its state; empty if it can be."""
         return self._port.trouble or self.bridge.session.trouble
 
     @property
@@ -173,7 +173,7 @@ class Daemon:
                 port.cancel()
                 with suppress(asyncio.CancelledError):
                     await port
-                # The sender of a mission that ended with the port gets its answer once that is stored.
+                # The sender of a mission that ended with the port gets its reply once the outcome is stored.
                 await self.is_at_rest(_STORE_TIMEOUT_S)
             for timer in (self._timer, self._search_report):
                 if timer is not None:
@@ -249,14 +249,14 @@ class Daemon:
             traffic.bytes_sent += len(data)
 
     async def finish(self) -> None:
-        """Start no more transfers; the present one finishes soon, or is aborted cleanly."""
+        """Start no more transfers; the current one finishes soon, or is aborted cleanly."""
         self.bridge.stop_missions(self._loop.time())
         self.flush()
         if not await self.is_at_rest(_FINISH_S):
             await self.abort()
 
     async def abort(self) -> None:
-        """Abort the present transfer cleanly."""
+        """Abort the current transfer cleanly."""
         self.bridge.runner.stop(self._loop.time())
         self.flush()
         await self.is_at_rest(_ABORT_S)

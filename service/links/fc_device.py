@@ -66,8 +66,8 @@ def open_serial(path: str) -> serial.Serial:
     console = find_console(path)
     if console is not None:
         raise PortError(
-            f"{path} is taken by a login console: sudo systemctl disable --now serial-getty@{console}.service,"
-            " and take console=... for it out of cmdline.txt"
+            f"{path} is used by a login console: sudo systemctl disable --now serial-getty@{console}.service,"
+            " and remove its console=... from cmdline.txt"
         )
     try:
         # VMIN 1, which pyserial calls inter_byte_timeout: with 0 an empty read returns as if the other end had closed
@@ -76,7 +76,7 @@ def open_serial(path: str) -> serial.Serial:
     except (serial.SerialException, OSError) as error:
         raise PortError(explain_port_error(path, error)) from error
     except termios.error as error:
-        raise PortError(f"{path} is no serial port") from error
+        raise PortError(f"{path} is not a serial port") from error
     os.set_blocking(port.fileno(), False)
     return port
 

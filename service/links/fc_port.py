@@ -62,7 +62,7 @@ class FcPort:
         self._gathered_rate = 0.0
 
     async def run(self) -> None:
-        """Open the port, and reopen it for ever; cancel to end."""
+        """Open the port and keep reopening it; cancel to end."""
         try:
             while True:
                 try:
@@ -96,7 +96,7 @@ class FcPort:
             self._shut(str(error))
 
     def write(self, data: bytes) -> None:
-        """Write without waiting; the rest is sent when the port takes it."""
+        """Write without blocking; the rest is sent when the port is writable."""
         if self._device is None:
             return
         if self._unsent:
@@ -178,7 +178,7 @@ class FcPort:
             self._shut(error.strerror or str(error))
             return b""
         if not data:
-            self._shut("the other end hung up")
+            self._shut("the other end closed the connection")
         else:
             acknowledge(self._device)
         return data

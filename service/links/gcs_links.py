@@ -11,9 +11,9 @@ from service.links.udp_link import UdpLink
 from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress
 
 _HINTS = {
-    errno.EADDRINUSE: "stop the program that has it, or name another port",
-    errno.EADDRNOTAVAIL: "this machine has no such address; 0.0.0.0 is all that it has",
-    errno.EACCES: "ports below 1024 are for root; name another port",
+    errno.EADDRINUSE: "stop the program that uses it, or choose another port",
+    errno.EADDRNOTAVAIL: "this machine has no such address; 0.0.0.0 means all of its addresses",
+    errno.EACCES: "ports below 1024 need root; choose another port",
 }
 
 
@@ -27,7 +27,7 @@ class GcsLink(Protocol):
     name: str
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send without waiting; drop what the socket does not take."""
+        """Send without blocking; drop data that the socket does not accept."""
 
     def close(self) -> None:
         """Close the sockets."""

@@ -103,7 +103,7 @@ class _UdpShare(asyncio.DatagramProtocol):
         self._transport: asyncio.DatagramTransport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        # Before Python 3.12 the event loop's transport is no subclass of it.
+        # Before Python 3.12 the event loop's transport is not a subclass of it.
         self._transport = cast("asyncio.DatagramTransport", transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -114,7 +114,7 @@ class _UdpShare(asyncio.DatagramProtocol):
             if self._transport is not None:
                 self._transport.sendto(frame.encode(), addr)
 
-        # Whole requests only: the rest of a cut one may have been lost.
+        # Complete requests only: the rest of a truncated one may be lost.
         for frame in MspParser(takes_low_v2=True).feed(data):
             if frame.direction is Direction.REQUEST:
                 self._requested(frame, answer, may_write=self._may_write)

@@ -39,7 +39,7 @@ _log = structlog.get_logger()
 class PortFinder:
     """Opens ports (`open`), follows the daemon's events, and moves on if no flight controller is found.
 
-    `move_on()` must close the present port, so that `open` is called again.
+    `move_on()` must close the current port, so that `open` is called again.
     """
 
     def __init__(self, host: Host, state_dir: Path | None) -> None:
@@ -74,7 +74,7 @@ class PortFinder:
         await asyncio.sleep(_RETRY_S)
         if self._passed:
             raise PortError("; ".join(self._reasons()))
-        raise PortError("there is no serial port: plug the flight controller in, or switch the UART on the header on")
+        raise PortError("there is no serial port: plug the flight controller in, or enable the UART on the header")
 
     def received(self, data: bytes) -> None:
         """Examine bytes while the port is unidentified: a GPS receiver may just have been switched on."""
@@ -164,7 +164,7 @@ class PortFinder:
                 device.close()
 
     async def _listen(self, device: serial.Serial) -> str:
-        """The other device that shows itself on the port; empty if none does. Sends nothing."""
+        """The other device recognised on the port; empty if none. Sends nothing."""
         listener = PortListener(self._loop.time())
         readable = asyncio.Event()
         self._loop.add_reader(device.fileno(), readable.set)

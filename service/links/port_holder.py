@@ -17,7 +17,7 @@ def explain_port_error(path: str, error: OSError) -> str:
     code = error.errno
     cause = error.__cause__ or error.__context__
     if code is None and isinstance(cause, OSError | termios.error):
-        # pyserial hides the number; termios.error has one, too, but is no OSError.
+        # pyserial hides the number; termios.error has one, too, but is not an OSError.
         code = cause.args[0]
     if not Path(path).exists():
         return f"{path} is missing: plug the flight controller in, or name another port (fc)"
@@ -25,9 +25,9 @@ def explain_port_error(path: str, error: OSError) -> str:
         return f"{path}: no permission; add the user to the group that owns it: sudo usermod -aG dialout $USER"
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
         holder = find_holder(path)
-        return f"{path} is busy: {holder or 'another program'} has it open; stop that, or name another port"
+        return f"{path} is busy: {holder or 'another program'} has it open; stop it, or name another port"
     if code in (errno.ENOTTY, errno.EISDIR):
-        return f"{path} is no serial port"
+        return f"{path} is not a serial port"
     return f"{path} cannot be opened: {error.strerror or error}"
 
 

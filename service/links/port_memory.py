@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each serial port was found to be, kept in the state directory: the flight controller, or another device."""
+"""Remembers in the state directory what each serial port is connected to: the flight controller or another device."""
 
 import asyncio
 import json

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames that a TCP client has not read yet; if they are too many, the oldest telemetry is dropped first."""
+"""Frames that a TCP client has not read yet; above a limit the oldest telemetry is dropped first."""
 
 from collections import deque
 
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkSplitter
 
-#: Never dropped, because no peer repeats them unasked: a transfer, command or parameter would fail. Files and logs are
+#: Never dropped, because they are not sent again: a transfer, command or parameter would fail. Files and logs are
 #: not among them: they fill the queue at once, and their reader asks again for missing parts.
 _KEPT = frozenset(
     {

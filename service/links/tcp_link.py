@@ -83,7 +83,7 @@ class TcpLink:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
         peer = Peer(self.name, sender)
         if (former := self._clients.pop(peer, None)) is not None:
-            # Its end was never reported: a laptop that was switched off, and connects from the same port.
+            # The old connection's end was never reported: a laptop was switched off and reconnects from the same port.
             former.close()
             self._events.gcs_gone(peer)
         # A TCP client hears the vehicle from the start: it may wait for a heartbeat before it speaks.
@@ -128,7 +128,7 @@ class _TcpClient:
             return
         if self._unsent:
             if not self._unsent.add(data):
-                # So many replies are unread that the next one would be of no use.
+                # With so many unread replies, another one is useless.
                 self._hang_up()
             return
         sent = self._try_send(memoryview(data))
@@ -145,7 +145,7 @@ class _TcpClient:
         self._socket.close()
 
     def _hang_up(self) -> None:
-        """Close soon, not now: the caller is in a loop over all clients."""
+        """Close soon, not now: the caller iterates over all clients."""
         if self._hanging_up is None:
             self._hanging_up = self._loop.call_soon(self._end)
 

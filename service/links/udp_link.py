@@ -106,6 +106,6 @@ class UdpLink:
             except BlockingIOError:
                 return
             except OSError:
-                # An ICMP "port unreachable" for something we sent: the ground station is not running yet.
+                # An ICMP "port unreachable" for a sent datagram: the ground station is not running yet.
                 continue
             self._events.gcs_data(Peer(self.name, sender), data, datagram=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files named by a person: read to their end, but bounded in size."""
+"""Reads user-supplied files, up to a maximum size."""
 
 import errno
 from pathlib import Path

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import structlog
 
-#: How much is lost if the process is killed.
+#: The maximum loss if the process is killed.
 _FLUSH_S = 1.0
 #: For the last write: a hanging disk must not keep the daemon from ending.
 _CLOSE_TIMEOUT_S = 1.0
@@ -48,7 +48,7 @@ class DiskWriter:
             self._waiting += data
             return
         if not self.dropped:
-            _log.warning("disk.too_slow", writing=self._name, why="the disk does not keep up; some is left out")
+            _log.warning("disk.too_slow", writing=self._name, why="the disk does not keep up; some data is dropped")
         self.dropped += len(data)
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ TLOG_FOLDER = "logs"
 
 
 class Recording:
-    """The recordings that `settings` asks for. Raises UartFileError if the UART cannot be recorded."""
+    """The recordings requested by `settings`. Raises UartFileError if the UART cannot be recorded."""
 
     def __init__(self, settings: Settings) -> None:
         self._uart = None if settings.record_uart is None else UartRecorder(settings.record_uart)

@@ -72,13 +72,13 @@ class StoreWorker:
         try:
             opened = open_store(directory / DATABASE_NAME, time.time())
         except StoreError as error:
-            _log.error("store.unavailable", why=str(error), what="missions are kept in memory, until the end")
+            _log.error("store.unavailable", why=str(error), what="missions are kept in memory until the daemon exits")
             self._store = store_in_memory()
             self._tell(self._on_trouble, str(error))
             return
         self._store = opened.store
         if opened.set_aside is not None:
-            what = f"a new mission store was made with the {opened.salvaged} missions that could be read"
+            what = f"a new mission store was created with the {opened.salvaged} missions that could be read"
             _log.error("store.damaged", kept_as=str(opened.set_aside), what=what)
 
     def _close(self) -> None:

@@ -22,7 +22,7 @@ _NAME_PATTERN = re.compile(r"\d{4}-\d\d-\d\d \d\d-\d\d-\d\d( flight)?\.tlog")
 _FLIGHT = " flight"
 #: The pause after a failure: a full or read-only disk rarely recovers at once.
 _RETRY_S = 60.0
-#: How much a power cut may lose; syncing more often wears out an SD card.
+#: The maximum loss in a power cut; syncing more often wears out an SD card.
 _SYNC_S = 5.0
 #: Disk space that logs never use: a mission must still fit.
 LEFT_FREE = 32 << 20

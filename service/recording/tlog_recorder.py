@@ -16,7 +16,7 @@ _CLOCK_STEP_US = 10_000_000
 
 
 class TlogRecorder:
-    """Offers `on_frames`. Within a file time runs on evenly; after the clock is set a new file begins.
+    """Offers `on_frames`. Within a file time advances evenly; when the clock is set a new file begins.
 
     A file begins without ground stations' heartbeats: Mission Planner shows the system whose HEARTBEAT comes first in a
     log, and recognizes only the systems 255 and 253 as ground stations. They are left out until a vehicle's HEARTBEAT.
@@ -51,7 +51,7 @@ class TlogRecorder:
 
     def describe(self) -> str:
         """The file in use, or the reason why there is none, for the status."""
-        dropped = f", {self._writer.dropped} bytes left out" if self._writer.dropped else ""
+        dropped = f", {self._writer.dropped} bytes dropped" if self._writer.dropped else ""
         return self._folder.describe() + dropped
 
     def close(self) -> None:

@@ -38,14 +38,14 @@ class UartRecorder:
         self._put(capture_header(started))
 
     def note(self, deed: UartDeed, speed: int | None, data: bytes = b"", text: str = "") -> None:
-        """Record an event with the present time."""
+        """Record an event with the current time."""
         if not self._over_because:
             self._put(capture_line(UartEvent(time.monotonic() - self._began_at, speed, deed, data, text)))
 
     def describe(self) -> str:
         """The file in use, or the reason why recording stopped, for the status."""
         ended = f", ended: {self._over_because}" if self._over_because else ""
-        dropped = f", {self._writer.dropped} bytes left out" if self._writer.dropped else ""
+        dropped = f", {self._writer.dropped} bytes dropped" if self._writer.dropped else ""
         return f"{self._path}, {self._size / 1e6:.1f} of {self._max_size / 1e6:.0f} MB{dropped}{ended}"
 
     def close(self) -> None:
@@ -54,7 +54,7 @@ class UartRecorder:
 
     def _put(self, line: bytes) -> None:
         if self._size + len(line) > self._max_size:
-            self._end(f"it has {self._size >> 20} MB, which is enough")
+            self._end(f"it has {self._size >> 20} MB, the maximum")
             return
         self._size += len(line)
         with self._writer.lock:
@@ -121,14 +121,14 @@ def _open(path: Path) -> tuple[int, int]:
     try:
         if path.exists() and not path.is_file():
             # Never write to a device: a serial port may lead to an aircraft.
-            raise UartFileError(f"{path} is no file: name a new file for --record-uart")
+            raise UartFileError(f"{path} is not a file: name a new file for --record-uart")
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
     except OSError as error:
         raise UartFileError(f"cannot record into {path}: {error.strerror}") from error
     size = os.fstat(descriptor).st_size
     if size and not is_capture(os.pread(descriptor, 64, 0)):
         os.close(descriptor)
-        raise UartFileError(f"{path} is no UART capture: name a new file for --record-uart")
+        raise UartFileError(f"{path} is not a UART capture: name a new file for --record-uart")
     if size and os.pread(descriptor, 1, size - 1) != b"\n":
         # The daemon was killed in the middle of a line: keep the next one apart.
         os.write(descriptor, b"\n")

@@ -78,8 +78,8 @@ _GCS_ALIASES = {
     "tcps": "tcpin",
 }
 _EVERY_ADDRESS = ("", "0.0.0.0", "[::]")  # noqa: S104  # ground stations may come over any network
-_FC_FORMS = "write auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:"
-_GCS_FORMS = "write udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT or tcpin:HOST:PORT"
+_FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:"
+_GCS_FORMS = "use udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT or tcpin:HOST:PORT"
 _PORT_NAMES = ("tty", "serial", "rfcomm", "naze")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
 _NEXT_LINK = re.compile(r",\s*(?=[A-Za-z]+:)")
@@ -111,7 +111,7 @@ def _parse_serial(text: str, port: str) -> SerialFc:
             separator = ""
     if not path.startswith("/"):
         hint = f"did you mean /dev/{port}? Else " if path.startswith(_PORT_NAMES) else ""
-        raise AddressError(f"{text!r} is no flight controller connection: {hint}{_FC_FORMS}")
+        raise AddressError(f"{text!r} is not a flight controller connection: {hint}{_FC_FORMS}")
     if not separator:
         return SerialFc(path, None)
     if not baud.isdecimal() or not _MIN_BAUD <= int(baud) <= _MAX_BAUD:
@@ -138,7 +138,7 @@ def parse_gcs(text: str) -> GcsAddress:
             raise AddressError(f"{text!r}: write {sending}{kind}in:0.0.0.0:{port} to listen for ground stations")
         kind += "in"
     if not colon or kind not in _GCS_KINDS:
-        raise AddressError(f"{text!r} is no ground station connection: {_GCS_FORMS}")
+        raise AddressError(f"{text!r} is not a ground station connection: {_GCS_FORMS}")
     if kind in ("udpin", "tcpin") and not host and port.isdecimal():
         host = "0.0.0.0"  # noqa: S104  # as above
     return GcsAddress(kind, *parse_host_port(text, f"{host}:{port}" if host else rest, _GCS_FORMS))
@@ -169,9 +169,9 @@ def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
     if not colon or not host:
         raise AddressError(f"{text!r} needs a host and a port: {forms}")
     if not port.isdecimal() or not 0 < int(port) < 65536:
-        raise AddressError(f"{text!r}: {port!r} is no port number (1..65535)")
+        raise AddressError(f"{text!r}: {port!r} is not a port number (1..65535)")
     try:
         host.encode("idna")
     except UnicodeError:
-        raise AddressError(f"{text!r}: {host!r} can be no host's name: {forms}") from None
+        raise AddressError(f"{text!r}: {host!r} is not a host name: {forms}") from None
     return host, int(port)

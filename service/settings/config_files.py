@@ -16,7 +16,7 @@ from service.settings.table import KEYS, TABLES
 
 DROP_INS = "conf.d"
 _MAX_BYTES = 1 << 20
-#: Reported per file; another program's file, named by mistake, needs no longer list.
+#: Reported per file, in case another program's file was named by mistake.
 _MOST_UNKNOWN = 20
 _NAMES = frozenset(key.name for key in KEYS)
 
@@ -58,7 +58,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
     if path.is_fifo():
         # It may never have a writer, and at a reload it would be empty.
-        problems.append(Problem(str(path), "this is a pipe: name a file, which can be read again at a reload"))
+        problems.append(Problem(str(path), "this is a pipe: name a file, so that it can be read again at a reload"))
         return {}
     try:
         text = read_bounded(path, _MAX_BYTES).decode("utf-8-sig")
@@ -67,7 +67,7 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
         problems.append(Problem(str(path), f"this cannot be read: {error.strerror}"))
         return {}
     except (ValueError, RecursionError) as error:
-        problems.append(Problem(str(path), f"this is no valid TOML: {error}"))
+        problems.append(Problem(str(path), f"this is not valid TOML: {error}"))
         return {}
     lines = key_lines(text)
     found: dict[str, Given] = {}
@@ -83,9 +83,9 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
         else:
             unknown.append((where, name))
     for where, name in unknown[:_MOST_UNKNOWN]:
-        problems.append(Problem(where, f"{short(name)} is no setting; {nearest(name, _NAMES)}"))
+        problems.append(Problem(where, f"{short(name)} is not a setting; {nearest(name, _NAMES)}"))
     if len(unknown) > _MOST_UNKNOWN:
-        text = f"{len(unknown) - _MOST_UNKNOWN} more are no settings: name a file that is naze-bridge's"
+        text = f"{len(unknown) - _MOST_UNKNOWN} more are not settings: is this naze-bridge's file?"
         problems.append(Problem(str(path), text))
     return found
 

@@ -25,7 +25,7 @@ class Reader(ABC):
         """Read a value of the file in `folder`."""
 
     def from_text(self, text: str) -> object:
-        """Convert text from the environment or a flag to the form of the file; most readers take it as it is."""
+        """Convert text from the environment or a flag to the form of the file; most readers use it unchanged."""
         return text
 
 
@@ -151,7 +151,7 @@ class Several(Reader):
         if not isinstance(value, list):
             raise _wrong(value, f"a list in brackets, {self.wanted}")
         if not value and not self.may_be_empty:
-            raise Unfit(f"is empty: write {self.wanted}, or leave it away")
+            raise Unfit(f"is empty: write {self.wanted}, or omit it")
         return tuple(self.parse(entry, folder) for entry in value)
 
     def from_text(self, text: str) -> object:

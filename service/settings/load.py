@@ -111,7 +111,7 @@ def _read_environment(environment: Mapping[str, str], problems: list[Problem]) -
             if dot:
                 given[table] = Given(True, variable)
         elif variable.startswith(_PREFIX) and variable != CONFIG_VARIABLE:
-            problems.append(Problem(variable, f"this is no setting; {nearest(variable, keys)}"))
+            problems.append(Problem(variable, f"this is not a setting; {nearest(variable, keys)}"))
     return given
 
 

@@ -41,10 +41,10 @@ def port_conflicts(
             uses.append(_Use(f"zenoh.listen {endpoint}", transport, host.strip("[]"), int(port)))
     for address, count in Counter(address for address in gcs if address.kind in ("udpout", "udpbcast")).items():
         if count > 1:
-            yield f"gcs {address} is named {count} times: once is enough"
+            yield f"gcs {address} is listed {count} times: remove the others"
     if isinstance(fc, TcpFc):
         yield from (
-            f"fc {fc} is {use.user}, so the bridge would be its own flight controller: change one"
+            f"fc {fc} is {use.user}, so the bridge would connect to itself: change one"
             for use in uses
             if (use.transport, use.port) == ("TCP", fc.port) and _reaches(fc.host, use.host)
         )

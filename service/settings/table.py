@@ -34,13 +34,13 @@ def _name(key: str) -> Text:
 
 def _endpoint(entry: object, _folder: Path) -> str:
     if not isinstance(entry, str) or "/" not in entry:
-        raise Unfit(f'holds {entry!r}, which is no endpoint: write one like "tcp/192.168.4.1:7447"')
+        raise Unfit(f'holds {entry!r}, which is not an endpoint: write one like "tcp/192.168.4.1:7447"')
     return entry
 
 
 def _host_name(entry: object, _folder: Path) -> str:
     if not isinstance(entry, str) or re.fullmatch(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*", entry) is None:
-        raise Unfit(f'holds {entry!r}, which is no host name: write one like "naze-1.example.ts.net"')
+        raise Unfit(f'holds {entry!r}, which is not a host name: write one like "naze-1.example.ts.net"')
     return entry.lower()
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from service.settings.addresses import parse_host_port
 
 DEFAULT_LISTEN = "127.0.0.1:8080"
-_FORMS = 'write "0.0.0.0:8080" for everybody on the network, "127.0.0.1:8080" for this machine alone'
+_FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this machine only'
 
 
 @dataclass(frozen=True, slots=True)

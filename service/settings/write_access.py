@@ -59,7 +59,7 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
     address = parse_gcs(entry["address"])
     for key in entry:
         if key not in _KEYS:
-            raise WriteAccessError(f"gcs {address}: {key!r} is no setting of a link; known are {', '.join(_KEYS)}")
+            raise WriteAccessError(f"gcs {address}: {key!r} is not a setting of a link; known are {', '.join(_KEYS)}")
     key_file, writers = entry.get("key_file"), entry.get("writers")
     if key_file is not None and (not isinstance(key_file, str) or not key_file):
         raise WriteAccessError(f"gcs {address}: key_file must be the name of a file that holds the passphrase")
@@ -74,22 +74,22 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
 def read_key(path: Path) -> bytes:
     """The key made from a passphrase: the only line of a file that other users cannot read."""
     try:
-        # Not blocking: a FIFO without a writer would hold the daemon up.
+        # Not blocking: a FIFO without a writer would hang the daemon.
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise WriteAccessError(f"key_file {path} is no file")
+                raise WriteAccessError(f"key_file {path} is not a file")
             if status.st_mode & stat.S_IRWXO:
-                raise WriteAccessError(f"key_file {path} is open to every user of this machine: run chmod 600 {path}")
+                raise WriteAccessError(f"key_file {path} is readable for other users: run chmod 600 {path}")
             passphrase = file.read(_MAX_PASSPHRASE + 1).decode()
     except OSError as error:
         raise WriteAccessError(f"key_file {path} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError:
         # Not "from" the error, which quotes the passphrase.
-        raise WriteAccessError(f"key_file {path} holds no text: write the passphrase into it, in one line") from None
+        raise WriteAccessError(f"key_file {path} holds no text: write the passphrase into it, on one line") from None
     passphrase = passphrase.removesuffix("\n").removesuffix("\r")
     if not passphrase or "\n" in passphrase or len(passphrase) > _MAX_PASSPHRASE:
-        raise WriteAccessError(f"key_file {path} must hold the passphrase in one line, and nothing else")
+        raise WriteAccessError(f"key_file {path} must hold the passphrase on one line, and nothing else")
     return key_from_passphrase(passphrase)
 
 

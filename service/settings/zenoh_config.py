@@ -108,7 +108,7 @@ def _require_authentication(settings: ZenohSettings, config: zenoh.Config) -> No
 
 
 def _without_authentication(config: zenoh.Config) -> str | None:
-    """A way into the session without authentication; None if there is none."""
+    """How a session can be reached without authentication; None if it cannot."""
 
     def setting(key: str) -> Any:
         return json.loads(config.get_json(key))

@@ -41,7 +41,7 @@ _HOST = re.compile(r"(?P<name>\[[^\]]*\]|[^:\[\]]+)(:[0-9]*)?")
 _WRONG_NAME = (
     "Open this page by the Pi's address in numbers or its local name, or add this name to the setting web.hosts."
 )
-_FAILED = "The daemon has failed to answer; its log says more."
+_FAILED = "The daemon failed to answer; see its log."
 _log = structlog.get_logger()
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page's requests: JSON over GET; writing a mission and fetching logs need the token.
 
-GET  /api/state                          the present state; an open page asks once a second
+GET  /api/state                          the current state, requested once a second by an open page
 GET  /api/held                           the mission that the flight controller holds
 GET  /api/link                           the serial line over the last minutes
 GET  /api/connect                        where ground stations and other browsers connect
@@ -10,7 +10,7 @@ GET  /api/missions                       the latest missions received, newest fi
 GET  /api/missions/N                     one of them, as sent and as stored
 GET  /api/missions/N/difference/M        two of them as sent
 POST /api/missions/N/restore             write it again; its progress is in the state (token)
-POST /api/check?name=NAME                the body is a mission file: what would be stored of it
+POST /api/check?name=NAME                the body is a mission file: the mission as it would be stored
 POST /api/write?name=NAME                the body is a mission file: write it (token)
 GET  /api/logs                           the telemetry logs (token)
 GET  /api/logs/NAME?start=N              one piece of a log (token)

@@ -10,7 +10,7 @@ from protocols.mavlink.command_name import command_name
 from protocols.mission_item import MissionItem
 from service.control.mission_data import Json, mission_items
 
-#: No flight controller holds more; a longer list was rejected, and its end is of no interest.
+#: No flight controller holds more: a longer list was rejected.
 MAX_ROWS = 500
 
 _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")

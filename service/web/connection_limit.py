@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits the connections to the status page, so that a hostile browser costs the flight controller nothing.
+"""Limits the connections to the status page, so that a hostile browser cannot affect the flight controller.
 
-A connection carries one request and is cut off after a few seconds, so that a slow peer holds nothing for long. The
+A connection carries one request and is closed after a few seconds, so that a slow peer occupies nothing for long. The
 number of connections is limited, per address and in total; one too many is reset. The rate is limited, too, but there
 a connection waits for its turn: a page that is loaded twice in a second must not lose one of its files.
 """

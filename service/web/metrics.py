@@ -46,7 +46,7 @@ class Metrics:
         self._labelled = CollectorRegistry()
         self._labelled.register(_OfVehicle(self._registry, host_name() if settings is None else settings.vehicle))
         self._events = self._counter("events", "Events of the log (docs/events.md).", "event", "level")
-        self._missions = self._counter("missions", "Missions that came in, by their final ack.", "ack")
+        self._missions = self._counter("missions", "Missions received, by their final ack.", "ack")
         self._findings = self._counter("findings", "Values that were changed or items dropped, by field.", "field")
         self._durations = Histogram(
             f"{_PREFIX}mission_transfer_seconds",
@@ -143,7 +143,7 @@ class _State(Collector):
             yield sizes
             yield pieces
         bridge = self._daemon.bridge
-        yield _gauge("ground_stations", "Ground stations that are heard.", {}, len(bridge.ground.peers()))
+        yield _gauge("ground_stations", "Ground stations currently heard.", {}, len(bridge.ground.peers()))
         frames = _counters(
             "ground_received_frames", "Frames of ground stations, by MAVLink message id.", "link", "msgid"
         )
@@ -153,14 +153,14 @@ class _State(Collector):
         damaged = _counters("ground_damaged_frames", "Frames of ground stations with a wrong checksum.")
         damaged.add_metric([], bridge.ground.bad_frames)
         yield damaged
-        refused = _counters("refused_frames", "Frames of ground stations that may not write.", "link", "why")
+        refused = _counters("refused_frames", "Frames of ground stations without write access.", "link", "why")
         for (link, why), count in bridge.guard.refused.items():
             refused.add_metric([link, why], count)
         yield refused
 
     def _flight_controller(self) -> Iterator[Metric]:
         session = self._daemon.bridge.session
-        state = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the state that the link is in.", labels=["state"])
+        state = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the link's current state.", labels=["state"])
         for each in TRANSITIONS:
             state.add_metric([each.name], float(type(session.state) is each))
         yield state
@@ -182,7 +182,7 @@ class _State(Collector):
             "battery_volts": ("Battery.", report.battery.voltage_v),
             "latitude_degrees": ("By GPS, WGS 84.", report.position.lat_deg),
             "longitude_degrees": ("By GPS, WGS 84.", report.position.lon_deg),
-            "height_meters": ("Above the place of the launch.", report.position.height_m),
+            "height_meters": ("Above the launch point.", report.position.height_m),
             "gps_fix": ("0, 2 or 3 dimensions.", _FIXES.get(report.gps.fix or "")),
             "satellites": ("Satellites in use.", report.gps.satellites),
             "mission_records": ("Records that the flight controller holds.", records),

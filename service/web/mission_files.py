@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission file sent by the browser: checked by the rules of the present flight controller, or written to it.
+"""A mission file sent by the browser: checked by the rules of the current flight controller, or written to it.
 
 The check needs no token, because it changes nothing. It costs the flight controller one request and this machine some
 milliseconds, so checks run one at a time with a pause after each.
@@ -59,13 +59,13 @@ async def _read(request: Request) -> tuple[str, list[MissionItem]]:
     try:
         body = await request.body()
     except ClientDisconnect as error:
-        raise Refused(HTTPStatus.BAD_REQUEST, "The file did not arrive completely.") from error
+        raise Refused(HTTPStatus.BAD_REQUEST, "The file was not received completely.") from error
     try:
         items = await asyncio.to_thread(read_mission_file, body, name)
     except MissionFileError as error:
         raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
     if len(items) > MAX_ROWS:
-        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; {MAX_ROWS} is the limit here.")
+        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
     if not items:
         raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
     return name, items

@@ -21,7 +21,7 @@ from service.web.connection_limit import BoundedConnection, Door
 from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
 
-#: An access point's address may come up after the daemon: binding is retried.
+#: An access point's address may appear after the daemon's start: binding is retried.
 _RETRY_S = 2.0
 #: New connections are accepted a few at a time; in between the links are served.
 _BACKLOG = 16
@@ -29,7 +29,7 @@ _log = structlog.get_logger()
 
 
 class WebServer:
-    """The page of one daemon. If it cannot be served, that is logged and retried while the bridge goes on.
+    """The page of one daemon. If it cannot be served, that is logged and retried while the bridge continues.
 
     Only the protocol of uvicorn is used: its server would handle signals and run the loop itself.
     """
@@ -77,7 +77,7 @@ class WebServer:
             except OSError as error:
                 why = error.strerror or str(error)
                 if why != said:
-                    _log.error("web.unavailable", address=str(self._address), why=why, what="it is tried again")
+                    _log.error("web.unavailable", address=str(self._address), why=why, what="it is retried")
                 said = why
                 await asyncio.sleep(_RETRY_S)
         _log.info("web.listening", address=str(self._address))
@@ -108,7 +108,7 @@ def _token(daemon: Daemon, settings: WebSettings) -> Token | TokenError:
     path = settings.token_file or (None if state_dir is None else state_dir / DEFAULT_NAME)
     try:
         if path is None:
-            raise TokenError("there is no state directory: name a token_file under [web]")
+            raise TokenError("there is no state directory: set token_file under [web]")
         return Token(path)
     except TokenError as error:
         _log.error("web.no_token", why=str(error), what="the page is read-only")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The token that every request except reading must carry."""
+"""The token required by every request except reading."""
 
 import hmac
 import secrets
@@ -39,9 +39,9 @@ def _read(path: Path) -> bytes | None:
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            raise TokenError(f"{path} is no file: name another token_file")
+            raise TokenError(f"{path} is not a file: name another token_file")
         if status.st_mode & 0o007:
-            raise TokenError(f"everybody can read the token in {path}: chmod 600 {path}")
+            raise TokenError(f"other users can read the token in {path}: chmod 600 {path}")
         secret = read_bounded(path, _MAX_FILE).strip()
     except FileNotFoundError:
         return None
@@ -57,5 +57,5 @@ def _make(path: Path) -> bytes:
     try:
         replace_file(path, secret + b"\n")
     except OSError as error:
-        raise TokenError(f"no token can be written to {path}: {error.strerror}") from error
+        raise TokenError(f"a token cannot be written to {path}: {error.strerror}") from error
     return secret

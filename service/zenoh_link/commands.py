@@ -51,7 +51,7 @@ class CommandQueries:
     async def _restore(self, question: Question) -> None:
         number = question.parameter("number")
         if number is None or not number.isascii() or not number.isdigit() or not 0 < int(number) <= MOST:
-            raise QueryRefused("say which mission: restore?number=3; mission/list has the numbers")
+            raise QueryRefused("add the mission's number: restore?number=3; mission/list has the numbers")
         data = await self._jobs.show_mission(int(number))
         count = len(data["received"]["items"])
         _end(question, await self._jobs.restore(int(number), _teller(question, count)))
@@ -80,7 +80,7 @@ async def _items(question: Question) -> list[MissionItem]:
     if not items:
         raise QueryRefused(f"{_PAYLOAD} holds no mission; mission/clear clears the one on the craft")
     if len(items) > _MAX_ITEMS:
-        raise QueryRefused(f"{_PAYLOAD} holds {len(items)} items, more than any flight controller takes: shorten it")
+        raise QueryRefused(f"{_PAYLOAD} holds {len(items)} items, more than any flight controller stores: shorten it")
     return items
 
 

@@ -27,7 +27,7 @@ def endpoint_trouble(endpoints: Sequence[str], files: TlsFiles) -> str:
 def _trouble(endpoint: str, files: TlsFiles) -> str:
     match = _ENDPOINT.fullmatch(endpoint)
     if match is None:
-        return 'this is no endpoint, which looks like "tcp/192.168.4.1:7447"'
+        return 'this is not an endpoint, which looks like "tcp/192.168.4.1:7447"'
     if match["protocol"] not in _OVER_TCP:
         return "no answer"
     host, port = match["host"].strip("[]"), int(match["port"])
@@ -47,7 +47,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
         return "a port is at most 65535"
     except OSError as error:
         return (error.strerror or str(error)).lower()
-    return "a program listens there but refused the session: check user and password, and that it is a zenoh router"
+    return "a program listens there but rejected the session: check user and password, and that it is a zenoh router"
 
 
 def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
@@ -71,7 +71,7 @@ def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
             return "it accepted our certificate but refused the session: check user and password, and the router's log"
         except ssl.SSLError as error:
             return f"the router refuses our certificate: {_words(error)}"
-    return "the router hangs up: is it a zenoh router?"
+    return "the router closes the connection: is it a zenoh router?"
 
 
 def _words(error: ssl.SSLError) -> str:

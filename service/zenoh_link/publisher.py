@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples that are sent at once or dropped: telemetry, the state and MAVLink frames. Runs on the event loop.
 
-zenoh's put() with DROP and a `wait_before_drop` of 0 does not wait, whatever a receiver does: docs/zenoh.md, "Limits".
+zenoh's put() with DROP and a `wait_before_drop` of 0 never waits for a receiver: docs/zenoh.md, "Limits".
 """
 
 import asyncio

@@ -75,7 +75,7 @@ class SampleRates:
         self._due_at.pop(name, None)
 
     def describe(self, now: float) -> dict[str, float | None]:
-        """The present maximum rate of each name, Hz; None: as fast as the flight controller is polled."""
+        """The current maximum rate of each name, Hz; None: as fast as the flight controller is polled."""
         names = [group.value for group in Group] + [STATE_NAME]
         return {name: round(1 / self._current_s(name, now), 3) if name in self._interval_s else None for name in names}
 

@@ -53,7 +53,7 @@ def schemas() -> dict[str, Json]:
         "others_of_this_name": {"type": "integer", "minimum": 0, "description": "more bridges that use the name"},
         "time_source": {
             "type": "string",
-            "description": "gps: the flight controller's; ntp: the clock was set over the network; pi: it was not",
+            "description": "gps: the flight controller's; ntp: the clock was set over the network; pi: neither",
         },
         **_fields(VehicleReport),
     }
@@ -80,7 +80,7 @@ def schemas() -> dict[str, Json]:
         "positions": {"type": "array", "items": _object({"time_s": _ENVELOPE["time_s"]} | place)},
         "logs_from_s": {"type": ["number", "null"], "description": "start of the oldest telemetry log that was read"},
     }
-    made["mission_report"] = upload | {"source": {"type": "string", "description": "who sent it"}}
+    made["mission_report"] = upload | {"source": {"type": "string", "description": "the sender"}}
     files = {name: _file(name, _ENVELOPE | body) for name, body in made.items()}
     files["command_reply"] = _reply(_object(upload, required=("ack", "text")), items, findings)
     return {name: numbered(schema, _published(name)) for name, schema in files.items()}
@@ -127,7 +127,7 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
     status = {"type": "object", "required": ["state"], "description": "as `naze-bridge status --json`"}
     rates = _object({"rates_hz": {"type": "object", "additionalProperties": {"type": ["number", "null"]}}})
     count = {"type": "integer", "minimum": 0}
-    error = {"type": "string", "description": "one sentence: why not"}
+    error = {"type": "string", "description": "the reason, one sentence"}
     return {
         "$schema": _DIALECT,
         "title": "@cmd",

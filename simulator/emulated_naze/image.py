@@ -35,7 +35,9 @@ def load_image(path: Path) -> Image:
     try:
         return Image(*_parse(data))
     except (struct.error, IndexError, ValueError) as error:
-        raise ImageError(f"{path} is no ELF file of a 32-bit ARM program for flash at {FLASH_BASE:#010x}") from error
+        raise ImageError(
+            f"{path} is not an ELF file of a 32-bit ARM program for flash at {FLASH_BASE:#010x}"
+        ) from error
 
 
 def _parse(data: bytes) -> tuple[bytes, dict[str, int]]:

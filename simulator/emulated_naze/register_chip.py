@@ -16,13 +16,13 @@ class RegisterChip:
         self._awaits_number = not is_read
 
     def read(self) -> int:
-        """The byte in the present register."""
+        """The byte in the current register."""
         number = self._number
         self._number = (number + 1) & 0xFF
         return self.get(number)
 
     def write(self, byte: int) -> None:
-        """Take the register number, or a byte for the present register."""
+        """Take the register number, or a byte for the current register."""
         if self._awaits_number:
             self._number = byte
             self._awaits_number = False

@@ -214,7 +214,7 @@ def test_a_file_request_is_refused_at_once(flying: tuple[World, GroundStation]) 
     assert list(answer.payload[:6]) == [8, 0, 3, 129, 2, 4]
     # FailErrno: Mission Planner ignores "unknown command" and goes on asking for 70 s.
     assert list(answer.payload[12:14]) == [2, 95]
-    # A refusal is no request: nobody answers it.
+    # A refusal is not a request: nobody answers it.
     assert answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(answer.payload))) == []
 
 

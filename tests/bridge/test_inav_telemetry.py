@@ -58,7 +58,7 @@ def test_its_platform_is_shown(platform: int, kind: int, by_hand: int) -> None:
 
 @pytest.mark.parametrize(("platform", "pitot"), [(1, True), (1, False), (0, True), (0, False)])
 def test_airspeed_is_measured_or_not_told(platform: int, pitot: bool) -> None:
-    """Ground speed is no airspeed for a wing; for a copter ArduCopter shows it as one."""
+    """Ground speed is not airspeed for a wing; for a copter ArduCopter shows it as one."""
     _, world, station = introduced(platform=platform, pitot=pitot, faults=Faults(boxes=0))
     world.run(2)
     hud = station.said("VFR_HUD")[-1]

@@ -29,7 +29,7 @@ def run(*arguments: object) -> Result:
 
 def objects(result: Result) -> list[dict[str, Any]]:
     def refuse(token: str) -> None:
-        raise AssertionError(f"{token} is no JSON")
+        raise AssertionError(f"{token} is not JSON")
 
     return [json.loads(line, parse_constant=refuse) for line in result.stdout.splitlines()]
 

@@ -30,10 +30,10 @@ def test_a_byte_order_mark_is_taken(tmp_path: Path) -> None:
 
 
 WRONG = {
-    "no TOML": (b"\nsysid = x", ["no valid TOML", "line 2"]),
-    "no text": (b"\xff\xfes", ["no valid TOML"]),
-    "digits without end": (b"sysid = %b" % (b"9" * 5000), ["no valid TOML"]),
-    "brackets without end": (b"gcs = %b" % (b"[" * 5000), ["no valid TOML"]),
+    "no TOML": (b"\nsysid = x", ["not valid TOML", "line 2"]),
+    "no text": (b"\xff\xfes", ["not valid TOML"]),
+    "digits without end": (b"sysid = %b" % (b"9" * 5000), ["not valid TOML"]),
+    "brackets without end": (b"gcs = %b" % (b"[" * 5000), ["not valid TOML"]),
     "too large": (b"#" * ((1 << 20) + 1), ["larger than 1 MB"]),
     "a number in quotes": (b'sysid = "1"', ["sysid", "a whole number", "1..255"]),
     "a number that is none": (b"sysid = true", ["sysid", "a whole number"]),

@@ -99,7 +99,7 @@ def interrupted_push(start: Starter) -> tuple[Board, Terminal]:
 
 def test_a_daemon_goes_on_and_its_result_follows(start: Starter) -> None:
     board, terminal = interrupted_push(start)
-    terminal.wait_for("naze-bridge: the daemon goes on with the mission")
+    terminal.wait_for("naze-bridge: the daemon continues with the mission")
     assert terminal.end() == 0
     assert "ACCEPTED" in terminal.printed
     assert len(board.records()) == 146
@@ -110,4 +110,4 @@ def test_a_second_one_leaves(start: Starter) -> None:
     terminal.wait_for("press Ctrl-C again")
     terminal.type(CTRL_C)
     assert terminal.end() == 130
-    assert "naze-bridge: interrupted; the daemon goes on" in terminal.printed
+    assert "naze-bridge: interrupted; the daemon continues" in terminal.printed

@@ -54,7 +54,7 @@ def strict(text: str) -> Any:
     """Read JSON as other languages do, which know no NaN."""
 
     def refuse(token: str) -> None:
-        raise AssertionError(f"{token} is no JSON")
+        raise AssertionError(f"{token} is not JSON")
 
     return json.loads(text, parse_constant=refuse)
 
@@ -212,7 +212,7 @@ def test_pull_replaces_nothing_but_files(daemon: Daemon, tmp_path: Path, make: o
     path = tmp_path / "in the way"
     make(path)
     kind = stat.S_IFMT(path.stat().st_mode)
-    assert_one_sentence(ask(daemon, "pull", path), 1, str(path), "no regular file")
+    assert_one_sentence(ask(daemon, "pull", path), 1, str(path), "not a regular file")
     assert stat.S_IFMT(path.stat().st_mode) == kind
 
 
@@ -327,5 +327,5 @@ def test_a_list_of_nothing_says_so(tmp_path: Path) -> None:
     with ExitStack() as stack:
         daemon = Starter(tmp_path, stack).daemon("sim:")
         daemon.wait_up()
-        assert ask(daemon, "missions", "list").stdout == "No mission has come in yet.\n"
+        assert ask(daemon, "missions", "list").stdout == "No mission has been received yet.\n"
         assert strict(ask(daemon, "missions", "list", "--json").stdout) == []

@@ -172,7 +172,7 @@ def test_the_daemon_on_the_port_is_no_fault_and_is_left_alone(pi: FaultyMachine,
         raise AssertionError("the port was opened beside the daemon")
 
     found = list(examine(pi, Settings(PORT, GCS, tmp_path), nobody, never))
-    assert [each.found for each in found if each.check == "flight controller"] == ["/dev/serial0 was not listened to"]
+    assert [each.found for each in found if each.check == "flight controller"] == ["/dev/serial0 was not checked"]
 
 
 def test_modem_manager(pi: FaultyMachine) -> None:
@@ -181,9 +181,9 @@ def test_modem_manager(pi: FaultyMachine) -> None:
     assert_ok(check_modem_manager(pi, usb), "does not run")
     pi.runs(77, "/usr/sbin/ModemManager")
     assert_note(check_modem_manager(pi, usb), "sends modem commands to /dev/ttyUSB0")
-    assert_ok(check_modem_manager(pi, PORT), "looks at USB only")
+    assert_ok(check_modem_manager(pi, PORT), "probes USB only")
     pi.write("/usr/lib/udev/rules.d/60-naze-bridge.rules")
-    assert_ok(check_modem_manager(pi, usb), "kept off by 60-naze-bridge.rules")
+    assert_ok(check_modem_manager(pi, usb), "ignores it because of 60-naze-bridge.rules")
 
 
 # -- the flight controller -----------------------------------------------------------------------------------
@@ -274,14 +274,14 @@ def test_the_clock(pi: FaultyMachine) -> None:
 def test_the_disk(tmp_path: Path) -> None:
     state = tmp_path / "not made yet" / "state"
     assert_ok(check_disk(state, lambda _: 1 << 30), "1024 MB free")
-    assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove what is not needed")
+    assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove unneeded files")
 
 
 def test_a_state_directory_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     assert_problem(check_disk(tmp_path / "file" / "state"), f"{tmp_path}/file is a file", "name another state_dir")
     monkeypatch.setattr(os, "access", lambda _path, _mode: False)
-    assert_note(check_disk(tmp_path), "is not yours to write")
+    assert_note(check_disk(tmp_path), "is not writable for you")
     monkeypatch.setattr(os, "statvfs", lambda _path: SimpleNamespace(f_flag=os.ST_RDONLY))
     assert_problem(check_disk(tmp_path, lambda _: 1 << 30), "on a disk that is read-only", "remount,rw")
 

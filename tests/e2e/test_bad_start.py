@@ -20,12 +20,12 @@ from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until
 UNKNOWN = {
     "no such device name": (["--fc", "naze"], "/dev/serial0"),
     "a device without its folder": (["--fc", "ttyUSB0,57600"], "did you mean /dev/ttyUSB0,57600?"),
-    "a host that cannot be": (["--fc", "tcp:naze..local:5760"], "no host's name"),
+    "a host that cannot be": (["--fc", "tcp:naze..local:5760"], "not a host name"),
     "no speed": (["--fc", "/dev/ttyUSB0,fast"], "not a baud rate"),
     "tcp without a port": (["--fc", "tcp:naze.local"], "needs a host and a port"),
     "no such link": (["--fc", "sim:", "--gcs", "serial:/dev/ttyS0"], "udpin:0.0.0.0:14550"),
-    "a port of words": (["--fc", "sim:", "--gcs", "udpin:0.0.0.0:mavlink"], "no port number"),
-    "a port out of range": (["--fc", "sim:", "--gcs", "udpout:10.0.0.1:70000"], "no port number"),
+    "a port of words": (["--fc", "sim:", "--gcs", "udpin:0.0.0.0:mavlink"], "not a port number"),
+    "a port out of range": (["--fc", "sim:", "--gcs", "udpout:10.0.0.1:70000"], "not a port number"),
 }
 
 
@@ -149,7 +149,7 @@ def test_a_port_that_is_missing_is_taken_when_it_appears(start: Starter) -> None
 
 @pytest.mark.parametrize("path", ["/dev/null", __file__])
 def test_a_port_that_is_no_port(start: Starter, path: str) -> None:
-    assert "is no serial port" in complaint(start, Path(path))
+    assert "is not a serial port" in complaint(start, Path(path))
 
 
 def test_a_port_that_another_program_has(start: Starter, terminal: Path) -> None:

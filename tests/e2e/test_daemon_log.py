@@ -38,7 +38,7 @@ def test_start_search_and_stop(start: Starter, number: signal.Signals) -> None:
     assert started["version"]
     assert stopping is not None
     assert stopping["signal"] == number.name
-    # A stop is no loss.
+    # A stop is not a loss.
     assert not [event for event in events if event["event"] in LOSSES]
 
 

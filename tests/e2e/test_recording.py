@@ -234,8 +234,12 @@ def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: St
 @pytest.mark.parametrize(
     ("arguments", "status", "complaint"),
     [
-        (("run", "--fc", "sim:", "--record-uart", "{dir}"), 1, "{dir} is no file: name a new file for --record-uart"),
-        (("run", "--fc", "sim:", "--record-uart", "{dir}/notes.txt"), 1, "notes.txt is no UART capture"),
+        (
+            ("run", "--fc", "sim:", "--record-uart", "{dir}"),
+            1,
+            "{dir} is not a file: name a new file for --record-uart",
+        ),
+        (("run", "--fc", "sim:", "--record-uart", "{dir}/notes.txt"), 1, "notes.txt is not a UART capture"),
         (("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt"), 1, "notes.txt holds no UART capture"),
         (("sim", "--link", "{dir}/naze", "--play", "{dir}/nothing"), 2, "does not exist"),
         (

@@ -225,7 +225,7 @@ def test_commands_are_off(fleet: Fleet, tmp_path: Path) -> None:
     try:
         fleet.wait("deaf")
         pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=8)), "--vehicle", "deaf", code=1)
-        assert "takes no commands" in pushed["deaf"]["error"]
+        assert "accepts no commands" in pushed["deaf"]["error"]
     finally:
         deaf.end()
 

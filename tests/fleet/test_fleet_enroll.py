@@ -117,7 +117,7 @@ def test_errors_say_which(enrolled: Enrolled, tmp_path: Path) -> None:
     refused = run_naze_bridge("fleet", "list", "--zenoh-config", wrong)
     assert (refused.returncode, "does not accept this user and password" in refused.stderr) == (1, True), refused
     nobody = run_naze_bridge("fleet", "list", "--connect", enrolled.endpoint)
-    assert "wants a user and a password" in nobody.stderr, nobody
+    assert "requires a user and a password" in nobody.stderr, nobody
 
 
 def test_a_router_without_room_says_so(tmp_path: Path) -> None:
@@ -129,4 +129,4 @@ def test_a_router_without_room_says_so(tmp_path: Path) -> None:
     first.insert_json5("connect/endpoints", json.dumps([endpoint]))
     with running_router(tmp_path, endpoint, config), zenoh.open(first):
         refused = run_naze_bridge("fleet", "list", "--connect", endpoint)
-        assert "takes no more sessions: raise transport/unicast/max_sessions" in refused.stderr, refused
+        assert "accepts no more sessions: raise transport/unicast/max_sessions" in refused.stderr, refused

@@ -146,8 +146,8 @@ def test_ctrl_c_in_the_middle_of_a_push(fleet: Fleet) -> None:
         snail.send_signal(signal.SIGCONT)
     assert code == 130
     assert re.search(r"kite +verified", output), output
-    assert re.search(r"snail +under way", output), output
-    assert error.startswith("naze-bridge: stopped; transfers that are under way go on there: "), error
+    assert re.search(r"snail +in progress", output), output
+    assert error.startswith("naze-bridge: stopped; transfers in progress continue: "), error
     assert len(error.splitlines()) == 1
 
 

@@ -38,7 +38,7 @@ def test_a_trial_tells_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path
     file = plan_file(tmp_path, [*plain_plan(4, start=90), PlanRow(178, p2=5.0)])
     tried = fleet.ask("push", file, "--all", "--dry-run")
     assert tried.returncode == 0, tried
-    assert tried.stdout.endswith("3 of 3 vehicles would take the mission; nothing was written\n")
+    assert tried.stdout.endswith("3 of 3 vehicles would accept the mission; nothing was written\n")
     assert tried.stdout.count("WP 4: ") == 3
     assert [fleet.daemons[name].held() for name in NAMES] == before
     bad = fleet.ask("push", plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]), "--all", "--dry-run")
@@ -64,7 +64,7 @@ def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) 
     bad = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
     pushed = fleet.pushed(bad, "--all", "--staged", code=1)
     assert "LAND must be last" in pushed["kite"]["error"]
-    assert [pushed[name]["error"] for name in NAMES[1:]] == ["not begun: kite had failed"] * 2
+    assert [pushed[name]["error"] for name in NAMES[1:]] == ["not started: kite had failed"] * 2
     assert [fleet.daemons[name].held()["records"] for name in NAMES] == before
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(5)), "--all", "--staged", code=0)
     assert [pushed[name]["ok"] for name in NAMES] == [True] * 3

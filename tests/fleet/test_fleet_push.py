@@ -43,7 +43,7 @@ def test_silence_has_three_reasons() -> None:
     fleet.ended("b", is_alive=False)
     fleet.refused("c", None)
     reasons = [str(each.error) for each in fleet.failed]
-    words = ("takes no commands", "disconnected", "no result after")
+    words = ("accepts no commands", "disconnected", "no result after")
     assert [word in reason for word, reason in zip(words, reasons, strict=True)] == [True] * 3
 
 

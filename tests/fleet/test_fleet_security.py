@@ -104,7 +104,7 @@ def test_a_push_is_the_pilots(secured: Fleet) -> None:
         assert push("pilot").returncode == 0
         denied = push("guest")
     assert denied.returncode == 1, denied
-    assert "the router denies you" in " ".join(denied.stdout.split())
+    assert "the router denies access" in " ".join(denied.stdout.split())
 
 
 def test_a_vehicle_cannot_be_another_one(secured: Fleet) -> None:
@@ -131,7 +131,7 @@ def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
 def refused(listed: subprocess.CompletedProcess[str]) -> str:
     assert (listed.returncode, listed.stdout) == (1, ""), listed
     (sentence,) = listed.stderr.splitlines()
-    assert sentence.startswith("naze-bridge: no way into the fleet; "), sentence
+    assert sentence.startswith("naze-bridge: cannot join the fleet:  "), sentence
     return sentence
 
 

@@ -51,7 +51,7 @@ def test_the_daemons_own_file_says_where(router: Router, tmp_path: Path) -> None
 def test_no_router() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     sentence = sentence_of("list", "--connect", endpoint)
-    assert sentence == f"naze-bridge: no way into the fleet; {endpoint}: connection refused"
+    assert sentence == f"naze-bridge: cannot join the fleet:  {endpoint}: connection refused"
 
 
 def test_somebody_else_listens_there() -> None:
@@ -86,7 +86,7 @@ def test_zenoh_files_that_cannot_be_used(tmp_path: Path) -> None:
     broken = tmp_path / "broken.json5"
     for text in ("{", '{mode: "aeroplane"}', '{no_such_key: 1, "', "\0\0"):
         broken.write_text(text)
-        assert f"{broken} is no zenoh configuration" in sentence_of("list", "--zenoh-config", broken)
+        assert f"{broken} is not a zenoh configuration" in sentence_of("list", "--zenoh-config", broken)
     broken.write_text('{mode: "client"}')
     assert "names no connect/endpoints" in sentence_of("list", "--zenoh-config", broken)
 

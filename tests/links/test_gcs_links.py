@@ -273,9 +273,9 @@ def test_other_programs_words_are_understood(text: str, meant: str) -> None:
     [
         ("udp:192.168.4.20:14550", "write udpout:192.168.4.20:14550 to send there, udpin:0.0.0.0:14550 to listen"),
         ("tcp:192.168.4.20:5760", "write tcpin:0.0.0.0:5760 to listen"),
-        ("udpin", "write udpin:0.0.0.0:14550"),
+        ("udpin", "use udpin:0.0.0.0:14550"),
         ("udpout:14550", "needs a host and a port"),
-        ("/dev/ttyUSB0:57600", "is no ground station connection: write udpin"),
+        ("/dev/ttyUSB0:57600", "is not a ground station connection: use udpin"),
     ],
 )
 def test_what_could_mean_two_things_is_answered_with_its_spelling(text: str, words: str) -> None:

@@ -137,12 +137,12 @@ def test_a_capture_is_bounded_over_all_recordings(tmp_path: Path) -> None:
 def test_nothing_else_is_written_into(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("mine")
-    with pytest.raises(UartFileError, match=r"notes\.txt is no UART capture"):
+    with pytest.raises(UartFileError, match=r"notes\.txt is not a UART capture"):
         UartRecorder(path)
     assert path.read_text() == "mine"
     near, far = os.openpty()
     for no_file in (tmp_path, Path(os.ttyname(far))):
-        with pytest.raises(UartFileError, match="is no file: name a new file"):
+        with pytest.raises(UartFileError, match="is not a file: name a new file"):
             UartRecorder(no_file)
     os.set_blocking(near, False)
     with pytest.raises(BlockingIOError):

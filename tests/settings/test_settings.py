@@ -70,7 +70,7 @@ def test_the_environment_goes_over_files_and_flags_over_it(folder: Path, monkeyp
             "maybe",
             "NAZE_BRIDGE_RECORD_TLOG: record_tlog is 'maybe', but must be true or false",
         ),
-        ("NAZE_BRIDGE_SYSIDD", "1", "NAZE_BRIDGE_SYSIDD: this is no setting; did you mean 'NAZE_BRIDGE_SYSID'?"),
+        ("NAZE_BRIDGE_SYSIDD", "1", "NAZE_BRIDGE_SYSIDD: this is not a setting; did you mean 'NAZE_BRIDGE_SYSID'?"),
     ],
 )
 def test_a_wrong_variable_is_named(
@@ -96,9 +96,9 @@ encodings = "json"
 """
     told = problems(folder, text, late="tlog_days = 'all'")
     wanted = [
-        "naze.toml:8: 'takeof_max_m' is no setting; did you mean 'takeoff_max_m'?",
-        "naze.toml:11: 'zenoh.encodings' is no setting; did you mean 'zenoh.encoding'?",
-        "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: write udpin:0.0.0.0:14550",
+        "naze.toml:8: 'takeof_max_m' is not a setting; did you mean 'takeoff_max_m'?",
+        "naze.toml:11: 'zenoh.encodings' is not a setting; did you mean 'zenoh.encoding'?",
+        "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: use udpin:0.0.0.0:14550",
         "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
         "conf.d/late.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
         "naze.toml:10: zenoh.vehicle is 'a/b', with '/' in it: make a name of letters, digits and dashes",
@@ -117,7 +117,7 @@ def test_a_table_that_is_none(folder: Path) -> None:
         ('gcs = ["tcpin:[::]:5760", "tcpin:[::]:5760"]', "would both listen on TCP port 5760"),
         ('gcs = ["tcpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]', "zenoh.listen tcp/0.0.0.0:7447"),
         ('gcs = ["udpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["quic/0.0.0.0:7447"]', "UDP port 7447: change one"),
-        ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is named 2 times: once is enough"),
+        ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is named 2 times: remove the others"),
     ],
 )
 def test_two_users_of_one_port(folder: Path, text: str, words: str) -> None:
@@ -142,8 +142,8 @@ def test_ports_that_are_different_ones(folder: Path, text: str) -> None:
 @pytest.mark.parametrize(
     ("fc", "more", "words"),
     [
-        ("tcp:127.0.0.1:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would be its own flight controller"),
-        ("tcp:localhost:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would be its own flight controller"),
+        ("tcp:127.0.0.1:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would connect to itself"),
+        ("tcp:localhost:5760", 'gcs = ["tcpin:0.0.0.0:5760"]', "would connect to itself"),
         ("tcp:127.0.0.1:8080", "[web]", "fc tcp:127.0.0.1:8080 is web.listen 127.0.0.1:8080"),
         ("/dev/ttyUSB0,57600", 'record_uart = "/dev/ttyUSB0"', "is the flight controller's port: name a file"),
     ],
@@ -166,10 +166,10 @@ def test_another_flight_controller_on_a_port_of_that_number(folder: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('"zenoh.prefix" = "x"', """'"zenoh.prefix"' is no setting; did you mean 'zenoh.prefix'?"""),
+        ('"zenoh.prefix" = "x"', """'"zenoh.prefix"' is not a setting; did you mean 'zenoh.prefix'?"""),
         ("sysid = 0x" + "f" * 8000, "sysid is far too large, but must be 1..255"),
         (f'log_level = "{"x" * 100_000}"', "xxx', but must be "),
-        ("x" * 100_000 + " = 1", "xxx' is no setting"),
+        ("x" * 100_000 + " = 1", "xxx' is not a setting"),
     ],
 )
 def test_odd_values_make_one_short_sentence(folder: Path, text: str, words: str) -> None:
@@ -181,9 +181,9 @@ def test_odd_values_make_one_short_sentence(folder: Path, text: str, words: str)
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"fc = ", "this is no valid TOML: Invalid value (at end of document)"),
-        (b"\xff\xfef\0c\0", "this is no valid TOML"),
-        (b"a = " + b"[" * 5000, "this is no valid TOML"),
+        (b"fc = ", "this is not valid TOML: Invalid value (at end of document)"),
+        (b"\xff\xfef\0c\0", "this is not valid TOML"),
+        (b"a = " + b"[" * 5000, "this is not valid TOML"),
         (b"#" * (2 << 20), "this cannot be read: it is larger than 1 MB"),
     ],
 )
@@ -199,7 +199,7 @@ def test_what_is_no_file(folder: Path) -> None:
     (folder / "conf.d" / "c.toml").symlink_to("/dev/null")
     (folder / "conf.d" / "d.toml").symlink_to("nowhere")
     assert problems(folder, "") == [
-        "conf.d/a.toml: this is a pipe: name a file, which can be read again at a reload",
+        "conf.d/a.toml: this is a pipe: name a file, so that it can be read again at a reload",
         "conf.d/b.toml: this cannot be read: Is a directory",
         "conf.d/d.toml: this cannot be read: No such file or directory",
     ]
@@ -215,15 +215,15 @@ def test_drop_ins_that_cannot_be_listed_are_not_left_out(folder: Path) -> None:
 def test_the_file_of_another_program(folder: Path) -> None:
     told = problems(folder, "\n".join(f"option{number} = 1" for number in range(5000)))
     assert len(told) == 21
-    assert told[19].startswith("naze.toml:20: 'option19' is no setting")
-    assert told[20] == "naze.toml: 4980 more are no settings: name a file that is naze-bridge's"
+    assert told[19].startswith("naze.toml:20: 'option19' is not a setting")
+    assert told[20] == "naze.toml: 4980 more are not settings: is this naze-bridge's file?"
 
 
 def test_check_config_says_that_it_is_well_or_what_is_not(folder: Path) -> None:
     config = folder / "naze.toml"
     config.write_text('fc = "/dev/serial0"')
     ended = run_naze_bridge("run", "--check-config", "--config", config)
-    assert (ended.returncode, ended.stdout) == (0, "The settings can be used.\n")
+    assert (ended.returncode, ended.stdout) == (0, "The settings are valid.\n")
     config.write_text('fc = "/dev/serial0"\nsysid = 0\ntlog_days = 0\n')
     ended = run_naze_bridge("run", "--check-config", "--config", config)
     assert ended.returncode == 2

@@ -145,7 +145,7 @@ def test_the_last_word_of_config_txt_counts(tmp_path: Path, given: str, is_on: b
     pi = FreshPi(tmp_path, "4")
     pi.write(CONFIG, given)
     purposes = [step.purpose for step in missing_steps(pi, SetupChoices())]
-    assert ("switch the UART on the header on" not in purposes) is is_on
+    assert ("enable the UART on the header" not in purposes) is is_on
 
 
 def test_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
@@ -184,8 +184,8 @@ def test_the_command_shows_what_it_would_do(tmp_path: Path, model: str) -> None:
     ("options", "words"),
     [
         (["--hotspot", "naze"], "a hotspot needs a password"),
-        (["--hotspot", "n" * 33, "--password-file", "{}"], "can be no network's name"),
-        (["--fc", "naze"], "is no flight controller connection"),
+        (["--hotspot", "n" * 33, "--password-file", "{}"], "is not a network name"),
+        (["--fc", "naze"], "is not a flight controller connection"),
     ],
 )
 def test_answers_that_cannot_be_used(tmp_path: Path, options: list[str], words: str) -> None:

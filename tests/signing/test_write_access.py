@@ -94,8 +94,8 @@ def test_no_writers_at_all(tmp_path: Path) -> None:
         ("7", "neither text nor a table"),
         ("{}", "neither text nor a table"),
         ("{address = 7}", "neither text nor a table"),
-        ('{address = "radio:x"}', "is no ground station connection"),
-        (f'{{address = "{LINK}", keyfile = "k"}}', "'keyfile' is no setting of a link; known are address, key_file"),
+        ('{address = "radio:x"}', "is not a ground station connection"),
+        (f'{{address = "{LINK}", keyfile = "k"}}', "'keyfile' is not a setting of a link; known are address, key_file"),
         (f'{{address = "{LINK}", key_file = 7}}', "key_file must be the name of a file"),
         (f'{{address = "{LINK}", key_file = ""}}', "key_file must be the name of a file"),
         (f'{{address = "{LINK}", key_file = "none"}}', "cannot be read: No such file"),
@@ -112,7 +112,7 @@ def test_what_is_said_of_a_table_that_cannot_be_used(tmp_path: Path, entry: str,
 @pytest.mark.parametrize("mode", [0o604, 0o602, 0o644, 0o777])
 def test_a_key_file_that_others_may_open_is_refused(key_file: Path, mode: int) -> None:
     key_file.chmod(mode)
-    with pytest.raises(AddressError, match="is open to every user of this machine: run chmod 600"):
+    with pytest.raises(AddressError, match="is readable for other users: run chmod 600"):
         read_key(key_file)
 
 
@@ -128,7 +128,7 @@ def test_the_passphrase_is_all_but_the_end_of_the_line(key_file: Path, content: 
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"x" * 5000])
 def test_what_is_no_passphrase(key_file: Path, content: bytes) -> None:
     key_file.write_bytes(content)
-    with pytest.raises(AddressError, match="must hold the passphrase in one line"):
+    with pytest.raises(AddressError, match="must hold the passphrase on one line"):
         read_key(key_file)
 
 
@@ -142,5 +142,5 @@ def test_what_is_no_text(key_file: Path) -> None:
 def test_a_fifo_does_not_hang_it(tmp_path: Path) -> None:
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo, 0o600)
-    with pytest.raises(AddressError, match="is no file"):
+    with pytest.raises(AddressError, match="is not a file"):
         read_key(fifo)

@@ -65,7 +65,7 @@ def test_power_goes_in_the_middle_of_an_operation(operation: int) -> None:
     rig.run(0.1)
     assert rig.board.power is EmulatedPower.OFF
     assert rig.board.flash_operations == operation
-    # The half-words programmed before are whole, those after were not begun.
+    # The half-words programmed before are whole, those after were not started.
     done = 2 * max(operation - 2, 0)
     assert bytes(flash[PAGE : PAGE + done]) == bytes(done)
     assert bytes(flash[PAGE + done + 2 : PAGE + 1024]) == b"\xff" * (1022 - done)

@@ -56,7 +56,7 @@ def test_the_second_daemon_is_told_who_the_first_is(tmp_path: Path) -> None:
             )
         assert first.poll() is None
         first.kill()
-    with start(directory) as third:  # the dead one's lock is no lock
+    with start(directory) as third:  # the dead one's lock is not a lock
         assert said_by(third) == "2"
     with StateLock(directory), open_store(directory / "missions.db", now=0.0).store as store:
         assert [summary.number for summary in store.list(9)] == [2, 1]

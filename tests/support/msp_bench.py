@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A test bench: a simulated board that is no Naze, a client at its port, and a clock that only the test moves."""
+"""A test bench: a simulated board that is not a Naze, a client at its port, and a clock that only the test moves."""
 
 from dataclasses import replace
 from functools import reduce

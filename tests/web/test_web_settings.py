@@ -37,8 +37,8 @@ def test_one_word_in_the_environment_is_enough(tmp_path: Path, monkeypatch: pyte
         ("[web]\nlisten = 8080", ["web.listen is 8080", '"HOST:PORT"']),
         ("[web]\nlisten = '8080'", ["web.listen 8080", "needs a host and a port", "0.0.0.0:8080"]),
         ("[web]\nlisten = ':::80'", ["brackets"]),
-        ("[web]\nlisten = '0.0.0.0:99999'", ["99999", "no port number"]),
-        ("[web]\nhosts = ['naze.example:8080']", ["web.hosts holds 'naze.example:8080'", "no host name"]),
+        ("[web]\nlisten = '0.0.0.0:99999'", ["99999", "not a port number"]),
+        ("[web]\nhosts = ['naze.example:8080']", ["web.hosts holds 'naze.example:8080'", "not a host name"]),
         ("[web]\ntoken_file = ''", ["web.token_file is ''", "text in quotes"]),
         (
             "gcs = ['tcpin:127.0.0.1:8080']\n[web]",
@@ -81,11 +81,11 @@ def test_files_that_hold_no_token(tmp_path: Path) -> None:
     (tmp_path / "long").touch(0o600)
     (tmp_path / "long").write_bytes(bytes(5000))
     for path, said in {
-        tmp_path / "open": f"everybody can read the token in {tmp_path}/open: chmod 600 {tmp_path}/open",
+        tmp_path / "open": f"other users can read the token in {tmp_path}/open: chmod 600 {tmp_path}/open",
         tmp_path / "empty": "is shorter than 12 letters",
         tmp_path / "long": "cannot be read: it is larger than",
-        tmp_path: "is no file",
-        tmp_path / "nowhere" / "token": "no token can be written to",
+        tmp_path: "is not a file",
+        tmp_path / "nowhere" / "token": "a token cannot be written to",
         tmp_path / "open" / "token": "cannot be read: Not a directory",
     }.items():
         with pytest.raises(TokenError, match=said):

@@ -49,7 +49,7 @@ _NO_THROTTLE = (0, -1, -2)
 
 @dataclass(frozen=True, slots=True)
 class NavRules:
-    """The rules of one flight controller. former: its present list. others: the other missions in its store."""
+    """The rules of one flight controller. former: its current list. others: the other missions in its store."""
 
     profile: NavProfile
     former: Mission = ()

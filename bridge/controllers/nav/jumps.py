@@ -43,7 +43,7 @@ class Jumps:
         if target >= len(records):
             return f"nothing is kept from item {wanted} on"
         if records[target].action not in LEGS:
-            return f"item {wanted} is no waypoint"
+            return f"item {wanted} is not a waypoint"
         if self.back_only:
             return None if target < place else "it can only jump back"
         if place == 0 or abs(target - place) < _NEAREST:

@@ -29,7 +29,7 @@ def check_flight_controller(
         return [
             note(
                 "flight controller",
-                f"{fc} was not listened to",
+                f"{fc} was not checked",
                 "fix its port first, then run `sudo naze-bridge doctor`",
             )
         ]

@@ -40,13 +40,17 @@ def check_clock(host: Host, now: datetime) -> Checked:
     """Check the clock, which logs and signatures depend on."""
     told = f"{now:%Y-%m-%d %H:%M} UTC"
     if now < _EPOCH:
-        return problem("clock", f"it is {told}, years ago", f"set it: sudo date --set '{_EPOCH:%Y-%m-%d} 12:00'")
+        return problem(
+            "clock", f"it is {told}, years in the past", f"set it: sudo date --set '{_EPOCH:%Y-%m-%d} 12:00'"
+        )
     if host.path(_SYNCED).exists():
         return ok("clock", f"{told}, set by the network")
     keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
     if keeper is not None:
         return ok("clock", f"{told}, kept by {keeper}")
-    remedy = "in the field nothing sets it: connect to the Internet once, or sudo date --set '...' before the flight"
+    remedy = (
+        "without a network nothing sets it: connect to the Internet once, or sudo date --set '...' before the flight"
+    )
     return note("clock", f"{told}, not set by the network since the start", remedy)
 
 
@@ -58,19 +62,19 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
             folder = folder.parent
         if not folder.is_dir():
             remedy = f"move {folder} away, or name another state_dir"
-            return problem("disk", f"{state_dir} cannot be made, because {folder} is a file", remedy)
+            return problem("disk", f"{state_dir} cannot be created, because {folder} is a file", remedy)
         free = free_of(folder)
     except PermissionError:
-        return note("disk", f"{state_dir} is closed to you", "ask again with sudo")
+        return note("disk", f"{state_dir} is not readable for you", "run doctor with sudo")
     if not os.access(folder, os.W_OK):
         read_only = os.statvfs(folder).f_flag & os.ST_RDONLY
         if read_only:
             remedy = "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /"
             return problem("disk", f"{folder} is on a disk that is read-only", remedy)
-        return note("disk", f"{folder} is not yours to write", "ask again with sudo")
+        return note("disk", f"{folder} is not writable for you", "run doctor with sudo")
     told = f"{free >> 20} MB free for {state_dir}"
     if free < _LEAST_FREE:
-        return problem("disk", told, f"remove what is not needed, say old logs: ls -l {state_dir}/logs")
+        return problem("disk", told, f"remove unneeded files, such as old logs: ls -l {state_dir}/logs")
     return ok("disk", told)
 
 
@@ -82,20 +86,20 @@ def check_database(state_dir: Path) -> list[Checked]:
         exists = path.exists()
         aside = sorted(state_dir.glob(f"{DATABASE_NAME}.corrupt-*[0-9]"))
     except PermissionError:
-        return [note("missions", f"{path} is closed to you", "ask again with sudo")]
+        return [note("missions", f"{path} is not readable for you", "run doctor with sudo")]
     if not exists:
         found.append(ok("missions", f"none stored yet in {state_dir}"))
     else:
         found.append(_look_into(path))
     if aside:
-        remedy = f"what can be saved of it: sqlite3 {aside[-1]} .recover; then move it away"
+        remedy = f"to save its readable part: sqlite3 {aside[-1]} .recover; then move it away"
         found.append(note("missions", f"a damaged store was kept as {aside[-1]}", remedy))
     return found
 
 
 def _look_into(path: Path) -> Checked:
     try:
-        # Read-only: a daemon may be at work on it.
+        # Read-only: a daemon may be using it.
         with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=2)) as database:
             (finding,) = database.execute("PRAGMA quick_check(1)").fetchone()
             (count,) = database.execute("SELECT count(*) FROM missions").fetchone()
@@ -103,7 +107,7 @@ def _look_into(path: Path) -> Checked:
         finding = str(error)
     if finding == "ok":
         return ok("missions", f"{count} stored in {path}, whole")
-    remedy = "restart the bridge: it keeps the file aside and begins a new one (sudo systemctl restart naze-bridge)"
+    remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"
     return problem("missions", f"{path} is damaged: {finding}", remedy)
 
 

@@ -9,7 +9,7 @@ from service.machine.documentation import page
 from service.machine.host import Host
 from service.settings.addresses import GcsAddress
 
-#: In /proc/net/tcp, where only a listening socket has a port to itself.
+#: The state of listening sockets in /proc/net/tcp.
 _LISTENS = "0A"
 
 
@@ -59,7 +59,7 @@ def _check_port(host: Host, link: GcsAddress) -> Checked:
     if holder is not None and holder.is_naze_bridge:
         return ok("port for ground stations", f"{what} is the running daemon's")
     who = "another program (see: sudo naze-bridge doctor)" if holder is None else f"{holder.name} (pid {holder.pid})"
-    return problem("port for ground stations", f"{what} is taken by {who}", "stop that, or give gcs another port")
+    return problem("port for ground stations", f"{what} is used by {who}", "stop it, or give gcs another port")
 
 
 def _inode(host: Host, transport: str, port: int) -> str | None:

@@ -34,7 +34,7 @@ def check_port(host: Host, fc: FcAddress) -> Checked:
         return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
     there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
     if fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
-        remedy = "switch the UART on the header on: sudo naze-bridge setup"
+        remedy = "enable the UART on the header: sudo naze-bridge setup"
     else:
         remedy = "plug the flight controller in"
     if there:
@@ -52,7 +52,7 @@ def check_candidates(host: Host) -> list[SerialFc]:
 def check_no_port(host: Host) -> Checked:
     """The problem that there is no port at all."""
     remedy = "plug the flight controller into USB, or name its port: fc in the settings"
-    return problem("port", "there is no serial port on which a flight controller may be", remedy)
+    return problem("port", "there is no serial port for a flight controller", remedy)
 
 
 def check_permission(host: Host, fc: FcAddress) -> Checked | None:
@@ -68,7 +68,7 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
     if found.st_mode & stat.S_IRGRP and found.st_mode & stat.S_IWGRP and group == _GROUP:
         return ok("permission", f"{device} is open to the group {_GROUP}")
     mode = stat.filemode(found.st_mode)
-    lasting = f"a rule of udev that lasts: {page('docs/install.md')}"
+    lasting = f"permanently, with a udev rule: {page('docs/install.md')}"
     remedy = f"sudo chgrp {_GROUP} {device} && sudo chmod g+rw {device}; {lasting}"
     return problem("permission", f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}", remedy)
 
@@ -79,7 +79,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     if device is None:
         return None
     names = {device.name, Path(fc.path).name if isinstance(fc, SerialFc) else device.name}
-    # The firmware's name for the UART on the header.
+    # The firmware's name for the header's UART.
     names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
     found, remedies = [], []
     if _getty(host, device.name):
@@ -99,7 +99,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
         booted = words.search(host.read("/proc/cmdline"))
         if booted:
             found.append(f"the kernel was started with {booted[0]}")
-            remedies.append("take that word out of the boot loader's command line, and reboot")
+            remedies.append("remove that word from the boot loader's command line, and reboot")
     if not found:
         return ok("console", f"no login console on {device}")
     return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies))
@@ -133,9 +133,9 @@ def check_modem_manager(host: Host, fc: FcAddress) -> Checked:
         return ok("ModemManager", "does not run")
     device = _device(host, fc)
     if device is None or not device.name.startswith(("ttyUSB", "ttyACM")):
-        return ok("ModemManager", "runs, and looks at USB only")
+        return ok("ModemManager", "runs, but probes USB only")
     if any(host.path(f"{folder}/{_RULE}").exists() for folder in _RULES):
-        return ok("ModemManager", f"runs, and is kept off by {_RULE}")
+        return ok("ModemManager", f"runs, but ignores it because of {_RULE}")
     remedy = (
         f"install the package's udev rule ({page('docs/install.md')}), or: sudo systemctl disable --now ModemManager"
     )

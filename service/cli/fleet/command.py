@@ -50,7 +50,7 @@ for _command in (push_mission, verify_mission, enroll):
 def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition], **where: Any) -> None:
     """Show which vehicles are alive, and their state.
 
-    Exit code 0, also if none is; 1: the fleet cannot be reached, or the router does not answer.
+    Exit code 0, even if there are none; 1: the fleet cannot be reached, or the router does not answer.
     """
     with fleet_session(where) as (session, prefix):
         found = matching(everyone := roll_call(session, prefix), conditions)
@@ -62,7 +62,7 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
         if len(shown) < len(found):
             click.echo(f"{len(found) - len(shown)} more vehicles")
     elif everyone:
-        click.echo(f"None of {len(everyone)} vehicles is like this.")
+        click.echo(f"None of {len(everyone)} vehicles matches.")
     else:
         click.echo(f"No vehicle is alive under {prefix!r}.")
 
@@ -167,7 +167,7 @@ def _save(held: Held, path: Path, *, is_file: bool) -> None:
     except MissionFileError as error:
         fail(str(error))
     except OSError as error:
-        fail(f"{click.format_filename(path)} is no folder that can be written: {(error.strerror or '').lower()}")
+        fail(f"{click.format_filename(path)} is not a writable folder:  {(error.strerror or '').lower()}")
 
 
 def _show(held: Held, *, with_items: bool, to_error: bool) -> None:

@@ -33,7 +33,7 @@ _TRUTH = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def parse_condition(text: str) -> Condition:
-    """Read one condition; ValueError explains what is wrong. An unknown value fulfils none but !=."""
+    """Read one condition; ValueError explains what is wrong. An unknown value satisfies only !=."""
     match = _FORM.fullmatch(text)
     if match is None:
         raise ValueError(f"{text!r} is not a condition: write one like armed=true or battery_v<10.5")
@@ -67,4 +67,4 @@ def _wanted(name: str, kind: type, sign: str, value: str) -> tuple[Any, Callable
     try:
         return float(value), _SIGNS[sign]
     except ValueError:
-        raise ValueError(f"{name} is a number, which {value!r} is not") from None
+        raise ValueError(f"{name} is a number, but {value!r} is not") from None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fleet enroll`: a new member's login, and the router's configuration that lets it in."""
+"""`fleet enroll`: creates a new member's login and updates the router's configuration."""
 
 from pathlib import Path
 

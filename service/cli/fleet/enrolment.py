@@ -28,7 +28,7 @@ _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 
 
 class Role(Enum):
-    """What a member may do: be one vehicle, anything, or only watch."""
+    """A member's rights: to be one vehicle, to do everything, or only to watch."""
 
     VEHICLE = "vehicle"
     PILOT = "pilot"

@@ -45,7 +45,7 @@ def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: C
     for name in names:
         if used[name] > 1:
             held[name] = Held(name, error="several bridges use this name: give each its own (zenoh.vehicle)")
-    silent = "it does not tell: its bridge hangs, or the router's access control denies the question"
+    silent = "no reply: its bridge hangs, or the router's access control denies the query"
     return [held.get(name) or Held(name, error=silent) for name in names]
 
 
@@ -55,7 +55,7 @@ def _held(name: str, sample: zenoh.Sample) -> Held:
         return Held(name, error="this version does not understand its reply")
     count, checksum, items = whole(data, "count"), text(data, "checksum"), part(data, "items")
     if count is None or checksum is None:
-        return Held(name, error="what its flight controller holds is not known")
+        return Held(name, error="its flight controller's mission is not known")
     try:
         return Held(name, tuple(mission_items(items)), count, checksum)
     except ValueError as error:

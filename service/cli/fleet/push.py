@@ -29,7 +29,7 @@ _TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
 @dataclass(slots=True)
 class PushState:
-    """The progress of one vehicle. `records` of `total` are written; `error` is the reason of a failure."""
+    """The progress of one vehicle. `records` of `total` are written; `error` is the reason for a failure."""
 
     vehicle: str
     records: int = 0
@@ -80,7 +80,7 @@ class FleetPush:
         """Skip the vehicles that were not started."""
         for progress in self.vehicles.values():
             if not progress.is_done and not progress.is_begun:
-                progress.error = f"not begun: {why}"
+                progress.error = f"not started: {why}"
 
     def replied(self, vehicle: str, reply: Json | None) -> None:
         """Take a reply: progress, or the result of an accepted mission."""
@@ -147,7 +147,7 @@ def push(
         if not fleet.vehicles[name].is_done:
             # The token proves nothing: a vehicle that has just died may still have one.
             state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_TIMEOUT_S)
-            # Nor does a reply from a storage, which goes on answering for a dead vehicle.
+            # Nor does a reply from a storage, which keeps answering for a dead vehicle.
             fleet.ended(name, is_alive=any(replier(reply) in bridges for reply in state))
 
     def start(name: str) -> None:

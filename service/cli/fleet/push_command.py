@@ -29,7 +29,7 @@ from service.cli.mission_source import mission_bytes
 from service.cli.printing import print_json, print_table
 
 _UNREADABLE = 2
-_GOES_ON = "stopped; transfers that are under way go on there: `naze-bridge fleet list` shows what each vehicle holds"
+_GOES_ON = "stopped; transfers in progress continue: `naze-bridge fleet list` shows what each vehicle holds"
 
 
 @click.command("push")
@@ -38,7 +38,7 @@ _GOES_ON = "stopped; transfers that are under way go on there: `naze-bridge flee
 @all_option
 @where_option
 @click.option("--staged", is_flag=True, help="A tenth of the vehicles first, then the rest; stop at the first failure.")
-@click.option("--dry-run", is_flag=True, help="Show what the mission would become on each vehicle; write nothing.")
+@click.option("--dry-run", is_flag=True, help="Show how each vehicle would store the mission; write nothing.")
 @address_options
 @json_option
 def push_mission(
@@ -90,7 +90,7 @@ def push_mission(
 def verify_mission(
     file: Path, names: tuple[str, ...], to_all: bool, conditions: list[Condition], as_json: bool, **where: Any
 ) -> None:
-    """Compare what vehicles hold with a mission file, by checksum, as each one's own rules would store it.
+    """Compare the missions on vehicles with a file, by checksum, as stored under each vehicle's rules.
 
     Exit code 0: all hold it, 1: one does not, 2: the file is unreadable.
     """
@@ -109,7 +109,7 @@ def verify_mission(
 
 def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]:
     if bool(names) == to_all:
-        raise click.UsageError("say for which vehicles the mission is: --vehicle NAME, or --all")
+        raise click.UsageError("specify the vehicles: --vehicle NAME, or --all")
     try:
         mission = mission_bytes(file)
         return mission, len(read_mission_file(mission, click.format_filename(file)))
@@ -124,7 +124,7 @@ def _meant(session: zenoh.Session, prefix: str, names: tuple[str, ...], conditio
         return found
     like = {vehicle.name for vehicle in matching(roll_call(session, prefix), conditions)}
     if not like & set(found):
-        raise FleetError(f"none of {len(found)} vehicles is like this")
+        raise FleetError(f"none of {len(found)} vehicles matches")
     return [name for name in found if name in like]
 
 
@@ -133,7 +133,7 @@ def _show_trials(trials: list[Trial], as_json: bool) -> None:
     if as_json:
         print_json({"vehicles": [asdict(each) for each in trials], "failed": failed})
     else:
-        print_table(trial_table(trials, "Takes it", lambda trial: trial.is_taken))
-        click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would take the mission; nothing was written")
+        print_table(trial_table(trials, "Accepts it", lambda trial: trial.is_taken))
+        click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would accept the mission; nothing was written")
     if failed:
         raise SystemExit(1)

@@ -55,7 +55,7 @@ def _result(progress: PushState) -> Text:
         return Text("failed", style="bold red")
     if progress.is_done:
         return Text("verified", style="green")
-    return Text("under way" if progress.is_begun else "not begun", style="yellow")
+    return Text("in progress" if progress.is_begun else "not started", style="yellow")
 
 
 def trial_table(trials: Sequence[Trial], question: str, answer: Callable[[Trial], bool | None]) -> Table:

@@ -13,9 +13,9 @@ _TRY = "import sys, zenoh; zenoh.init_log_from_env_or('error'); zenoh.open(zenoh
 _TIMEOUT_S = 6.0
 #: The log messages of zenoh 1.10 on either side of a rejected handshake.
 _REASONS = {
-    "reason INVALID": "the router takes no more sessions: raise transport/unicast/max_sessions in its configuration",
+    "reason INVALID": "the router accepts no more sessions: raise transport/unicast/max_sessions in its configuration",
     "reason GENERIC": "the router does not accept this user and password",
-    "in response to an InitSyn": "the router wants a user and a password: give them in --zenoh-config",
+    "in response to an InitSyn": "the router requires a user and a password: give them in --zenoh-config",
 }
 
 

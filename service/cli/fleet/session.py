@@ -52,7 +52,7 @@ def open_session(address: FleetAddress) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as error:
         trouble = refusal(config) or endpoint_trouble(endpoints, tls_files(config))
-        raise FleetError(f"no way into the fleet; {trouble}") from error
+        raise FleetError(f"cannot join the fleet:  {trouble}") from error
 
 
 def ask(
@@ -66,7 +66,7 @@ def ask(
 
 
 #: Why a vehicle that is alive does not reply to a command.
-NO_COMMANDS = "takes no commands: zenoh.commands is off there, or the router denies you"
+NO_COMMANDS = "accepts no commands: zenoh.commands is off there, or the router denies access"
 
 
 def ask_each(
@@ -150,7 +150,7 @@ def _config(address: FleetAddress) -> zenoh.Config:
         for key, value in settings.items():
             config.insert_json5(key, json.dumps(value))
     except zenoh.ZError as error:
-        raise FleetError(f"zenoh does not take --connect {' --connect '.join(endpoints)}: {in_short(error)}") from error
+        raise FleetError(f"zenoh rejects --connect {' --connect '.join(endpoints)}: {in_short(error)}") from error
     return config
 
 
@@ -161,4 +161,4 @@ def _from_file(path: Path) -> zenoh.Config:
     except OSError as error:
         raise FleetError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
     except zenoh.ZError as error:
-        raise FleetError(f"{path} is no zenoh configuration: {in_short(error)}") from error
+        raise FleetError(f"{path} is not a zenoh configuration: {in_short(error)}") from error

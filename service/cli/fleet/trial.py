@@ -35,7 +35,7 @@ class Trial:
 
     @property
     def is_taken(self) -> bool | None:
-        """True if the vehicle would take the mission; None if it gave no verdict."""
+        """True if the vehicle would accept the mission; None if it gave no verdict."""
         return None if self.checksum is None else self.error is None
 
 

@@ -24,7 +24,7 @@ class BridgeState:
 
 @dataclass(frozen=True, slots=True)
 class FleetVehicle:
-    """The known data of one vehicle; None: not known.
+    """The known data of one vehicle; None: unknown.
 
     `answers`: True if its bridge sent its state. `bridges`: how many use this name, normally 1.
     """

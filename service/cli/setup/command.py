@@ -21,7 +21,7 @@ _ADDRESS_OF_HOTSPOT = "10.42.0.1"
 
 @click.command()
 @click.option("--fc", default="auto", show_default=True, metavar="FC", help="The flight controller, as for `run`.")
-@click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name. Default: keep the present one.")
+@click.option("--hotspot", metavar="SSID", help="Open a Wi-Fi network of this name. Default: keep the current one.")
 @click.option("--password-file", type=click.Path(path_type=Path, exists=True), help="File with the hotspot's password.")
 @click.option("--country", metavar="CC", help="Wi-Fi country, such as DE: the radio stays off without one.")
 @click.option("--name", metavar="HOST", help="Name of this machine on the network: HOST.local.")
@@ -53,11 +53,11 @@ def setup(
         fc = str(parse_fc(fc))
     except AddressError as error:
         raise click.UsageError(str(error)) from error
-    click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is no Raspberry Pi that is known.")
+    click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is not a known Raspberry Pi model.")
     password = None if password_file is None else _line_of(password_file)
     page = not no_page
     if not yes and not dry_run:
-        if hotspot is None and click.confirm("Open a Wi-Fi hotspot, for the field? (no: keep the present network)"):
+        if hotspot is None and click.confirm("Open a Wi-Fi hotspot, for the field? (no: keep the current network)"):
             hotspot = click.prompt("Its name", default=socket.gethostname())
             country = country or click.prompt("Your country, two letters")
         page = page and click.confirm("Serve the status page to browsers on the network?", default=True)
@@ -110,7 +110,7 @@ def _carry_out(steps: list[Step], machine: Machine) -> None:
                 machine.carry_out(change)
         except SetupError as error:
             click.echo("failed")
-            fail(f"{error}; what was done before stays, and setup can be run again")
+            fail(f"{error}; earlier changes are kept, and setup can be run again")
         click.echo("done")
 
 
@@ -127,14 +127,14 @@ def _tell_where(host: Host, answers: SetupChoices) -> None:
     token = host.read(f"{STATE_FOLDER}/{DEFAULT_NAME}").strip()
     if token:
         click.echo(f"Its token, for changes: {token}")
-    import segno  # only here: no other command draws
+    import segno  # imported here: no other command needs it
 
     segno.make(url, error="l").terminal(compact=True)
 
 
 def _check_wifi(ssid: str | None, password: str | None) -> None:
     if ssid is not None and not (0 < len(ssid.encode()) <= _MOST_SSID and ssid.isprintable()):
-        raise click.UsageError(f"{ssid!r} can be no network's name: 1 to {_MOST_SSID} characters")
+        raise click.UsageError(f"{ssid!r} is not a network name: 1 to {_MOST_SSID} characters")
     if password is not None and not (_LEAST_PASSWORD <= len(password) <= _MOST_PASSWORD and password.isascii()):
         raise click.UsageError(f"a Wi-Fi password has {_LEAST_PASSWORD} to {_MOST_PASSWORD} plain characters")
 

@@ -35,7 +35,7 @@ class SetupChoices:
     """The pilot's choices.
 
     `hotspot`: its name and password; None keeps the network. `name`: the host name, for NAME.local.
-    `key`: the passphrase of MAVLink signing; None keeps the present key, or leaves writing open to the whole network.
+    `key`: the passphrase of MAVLink signing; None keeps the current key, or leaves writing open to the whole network.
     """
 
     fc: str = "auto"
@@ -83,7 +83,7 @@ def _uart(host: Host, answers: SetupChoices) -> Iterator[Step]:
     lines = [line for line in wanted if not _is_on(text, line)]
     if lines:
         added = "\n[all]\n# naze-bridge: the UART on GPIO 14 and 15\n" + "".join(f"{line}\n" for line in lines)
-        yield Step("switch the UART on the header on", [WriteFile(file, text.rstrip("\n") + "\n" + added)], True)
+        yield Step("enable the UART on the header", [WriteFile(file, text.rstrip("\n") + "\n" + added)], True)
 
 
 def _is_on(text: str, line: str) -> bool:
@@ -125,7 +125,7 @@ def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:
 
 def settings_text(host: Host, answers: SetupChoices) -> str:
     """The drop-in file with the choices."""
-    lines = ["# Written by `naze-bridge setup`, which may be run again.", f'fc = "{answers.fc}"']
+    lines = ["# Written by `naze-bridge setup`, which can be run again.", f'fc = "{answers.fc}"']
     if answers.key is not None or host.path(KEY_FILE).exists():
         lines.append(f'gcs = [{{address = "udpin:0.0.0.0:{GCS_PORT}", key_file = "{KEY_FILE}"}}]')
     if answers.page:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What to enter in a ground station, and the page's address for another phone.
+// The connection data for a ground station, and the page's address for another phone.
 import { ask } from "./daemon.js";
 import { byId, make } from "./dom.js";
 

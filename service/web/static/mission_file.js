@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A mission file that is dropped or chosen: checked by the Pi, drawn, its changes listed first, then written.
+// A dropped or chosen mission file: checked by the Pi, drawn, its changes listed first, then written.
 import { tell } from "./daemon.js";
 import { byId, make } from "./dom.js";
 import { MapView } from "./map_view.js";

@@ -8,7 +8,7 @@ import { writeForm } from "./write_form.js";
 
 const list = byId("missions");
 const body = make("tbody");
-const rows = new Map(); // by mission number; a row that is known stays, with all that is open or selected in it
+const rows = new Map(); // by mission number; existing rows stay, with their open details and selections
 
 export async function showMissions(newest) {
   const { missions } = await ask("/api/missions");

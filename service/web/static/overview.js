@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The present values of /api/state, as words.
+// The current values of /api/state, as words.
 import { byId, make, setClass, setList, setText } from "./dom.js";
 import { STALE_S, age } from "./state_bar.js";
 
 const known = (value, unit = "", digits = 0) => (value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit}`);
-let before = null; // the byte counts of the state before, and when it was asked for
+let before = null; // the byte counts of the previous state, and the time of its request
 
 export function showOverview(state) {
   setText(byId("version"), state.version);
@@ -49,7 +49,7 @@ function battery({ voltage_v: volts, current_a: amperes, drawn_mah: drawn, remai
   return [known(volts, " V", 1), ...more.filter(Boolean)].join(", ");
 }
 
-// Bytes a second in and out, by link, between the state before and this one.
+// Bytes per second in and out, by link, since the previous state.
 function ratesOf(traffic) {
   const last = before;
   before = { traffic, at: performance.now() };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bar that stays in sight: armed, lost, stale; the transfer under way; and, for screen readers, what has changed.
+// The bar that is always visible: armed, lost, stale; the running transfer; and changes, for screen readers.
 import { byId, make, setText } from "./dom.js";
 
 export const STALE_S = 3;

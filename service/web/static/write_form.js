@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The form that writes a mission: token, button, and beside it the result of this very press, never of another write.
+// The form that writes a mission: token, button, and next to it the result of this press, never of another write.
 import { make, setClass, setText } from "./dom.js";
 import { currentToken, tokenField } from "./token.js";
 
