@@ -231,9 +231,9 @@ def test_wifi(pi: FaultyMachine) -> None:
 
 def test_a_port_that_is_taken(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
-    assert_problem(check_ports(pi, GCS), "UDP port 14550 is taken by another program", "give gcs another port")
+    assert_problem(check_ports(pi, GCS), "UDP port 14550 is used by another program", "give gcs another port")
     pi.runs(55, "/usr/bin/python3", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
-    assert_problem(check_ports(pi, GCS), "python3 (pid 55)", "stop that")
+    assert_problem(check_ports(pi, GCS), "python3 (pid 55)", "stop it")
 
 
 def test_a_port_that_is_our_own(pi: FaultyMachine) -> None:
@@ -246,7 +246,7 @@ def test_a_connection_from_a_port_does_not_take_it(pi: FaultyMachine) -> None:
     pi.sockets(tcp=TCP_14550)
     assert_ok(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is free")
     pi.sockets(tcp=TCP_14550.replace(" 01 ", " 0A "))
-    assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is taken", "stop that")
+    assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is used", "stop it")
 
 
 def test_zenoh(tmp_path: Path) -> None:

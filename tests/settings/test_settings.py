@@ -117,7 +117,7 @@ def test_a_table_that_is_none(folder: Path) -> None:
         ('gcs = ["tcpin:[::]:5760", "tcpin:[::]:5760"]', "would both listen on TCP port 5760"),
         ('gcs = ["tcpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]', "zenoh.listen tcp/0.0.0.0:7447"),
         ('gcs = ["udpin:0.0.0.0:7447"]\n[zenoh]\nlisten = ["quic/0.0.0.0:7447"]', "UDP port 7447: change one"),
-        ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is named 2 times: remove the others"),
+        ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is listed 2 times: remove the others"),
     ],
 )
 def test_two_users_of_one_port(folder: Path, text: str, words: str) -> None:
