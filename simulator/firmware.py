@@ -257,7 +257,8 @@ class Firmware:
         if self._clock - self._frsky_time >= frsky.PERIOD_SECONDS - _EPSILON:
             self._frsky_time = self._clock
             self._frsky_number += 1
-            self._uart.write(frsky.frames(self._flight(), self._frsky_number), self._clock)
+            uptime = self._clock - self._booted_at
+            self._uart.write(frsky.frames(self._flight(), self._frsky_number, uptime), self._clock)
 
     def _completes_packet(self, byte: int) -> bool:
         """Pass a byte to the active receivers."""

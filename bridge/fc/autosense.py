@@ -17,7 +17,7 @@ from enum import Enum, auto
 
 from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE
 from bridge.line.pending_replies import PendingReplies
-from protocols.frsky import FRSKY_SPEED, FrskyWatch
+from protocols.frsky import FRSKY_SPEED, FrskyParser
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.heartbeat import is_plausible_heartbeat
 from protocols.msp.commands import Msp
@@ -94,7 +94,7 @@ class _Visit:
     answer: MspFrame | None = None
     heartbeat: MavlinkFrame | None = None
     last_mavlink: MavlinkFrame | None = None
-    frsky: FrskyWatch = field(default_factory=FrskyWatch)
+    frsky: FrskyParser = field(default_factory=FrskyParser)
     echo: EchoWatch = field(default_factory=EchoWatch)
 
 

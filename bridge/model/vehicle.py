@@ -52,11 +52,12 @@ class Reading:
 class Orientation(Reading):
     """Right wing down and nose up are positive; heading 0 up to 360. rates_deg_s: roll, pitch, yaw.
 
+    roll_deg, pitch_deg: None in FrSky telemetry, which has only the heading.
     is_north_known: False if the heading does not come from a compass (Harakiri then reports 0).
     """
 
-    roll_deg: float
-    pitch_deg: float
+    roll_deg: float | None
+    pitch_deg: float | None
     heading_deg: float
     is_north_known: bool = True
     rates_deg_s: tuple[float, float, float] | None = None
@@ -79,7 +80,7 @@ class GlobalPosition(Reading):
 
     lat_e7: int
     lon_e7: int
-    altitude_m: float
+    altitude_m: float | None
     north_m_s: float | None = None
     east_m_s: float | None = None
 
@@ -325,7 +326,7 @@ class Vehicle:
         elif self.home is not None and self.home.altitude_m is None:
             if self.armed is False:
                 self.home = replace(self.home, altitude_m=position.altitude_m)
-            elif self.armed and height is not None:
+            elif self.armed and height is not None and position.altitude_m is not None:
                 self.home = replace(self.home, altitude_m=position.altitude_m - height.height_m)
 
 

@@ -120,7 +120,7 @@ class Moment:
         """The latest reading of a kind, unless it is stale."""
         return self.vehicle.fresh(kind, self.now, self.stale_s.get(kind, STALE_S))
 
-    def altitude_m(self, position: GlobalPosition) -> float:
+    def altitude_m(self, position: GlobalPosition) -> float | None:
         """Above mean sea level: home's altitude plus the height above it, finer than the GPS's whole metres."""
         home, height = self.vehicle.home, self.fresh(Height)
         if home is None or home.altitude_m is None or height is None:
@@ -204,7 +204,7 @@ def mission_item_reached(seq: int) -> Message:
 def attitude(at: Moment) -> Message | None:
     """ATTITUDE: radians, radians a second."""
     now = at.fresh(Orientation)
-    if now is None:
+    if now is None or now.roll_deg is None or now.pitch_deg is None:
         return None
     roll_rate, pitch_rate, yaw_rate = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
     return messages.MAVLink_attitude_message(
@@ -224,12 +224,13 @@ def gps_raw_int(at: Moment) -> Message | None:
     if gps is None:
         return None
     position = at.fresh(GlobalPosition) if gps.fix is not Fix.NO_FIX else None
+    place = 0, 0, 0
+    if position is not None and position.altitude_m is not None:
+        place = position.lat_e7, position.lon_e7, _fit(round(position.altitude_m * 1000), 32)
     return messages.MAVLink_gps_raw_int_message(
         at.boot_ms * 1000,
         gps.fix,
-        0 if position is None else position.lat_e7,
-        0 if position is None else position.lon_e7,
-        0 if position is None else _fit(round(position.altitude_m * 1000), 32),
+        *place,
         _scaled_u16(gps.hdop, 100),
         _UNKNOWN_U16,
         _scaled_u16(gps.ground_speed_m_s, 100),
@@ -243,13 +244,15 @@ def global_position_int(at: Moment) -> Message | None:
     position, height = at.fresh(GlobalPosition), at.fresh(Height)
     if position is None or height is None or position.north_m_s is None or position.east_m_s is None:
         return None
-    orientation = at.fresh(Orientation)
+    altitude_m, orientation = at.altitude_m(position), at.fresh(Orientation)
+    if altitude_m is None:
+        return None
     is_north_known = orientation is not None and orientation.is_north_known
     return messages.MAVLink_global_position_int_message(
         at.boot_ms,
         position.lat_e7,
         position.lon_e7,
-        _fit(round(at.altitude_m(position) * 1000), 32),
+        _fit(round(altitude_m * 1000), 32),
         _fit(round(height.height_m * 1000), 32),
         _fit(round(position.north_m_s * 100), 16),
         _fit(round(position.east_m_s * 100), 16),
@@ -271,13 +274,14 @@ def vfr_hud(at: Moment) -> Message | None:
     speed = math.nan if gps is None or gps.ground_speed_m_s is None else gps.ground_speed_m_s
     air = at.fresh(Airspeed)
     airspeed = math.nan if at.vehicle.airframe is Airframe.FIXED_WING else speed
+    altitude_m = None if position is None else at.altitude_m(position)
     throttle = (sticks.channels_us[_THROTTLE] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
     return messages.MAVLink_vfr_hud_message(
         airspeed if air is None else air.airspeed_m_s,
         speed,
         round(orientation.heading_deg) % 360,
         min(max(throttle, 0), 100),
-        math.nan if position is None else at.altitude_m(position),
+        math.nan if altitude_m is None else altitude_m,
         math.nan if height is None else height.climb_m_s,
     )
 
@@ -380,7 +384,7 @@ def scaled_pressure(at: Moment) -> Message | None:
 def attitude_quaternion(at: Moment) -> Message | None:
     """ATTITUDE_QUATERNION: w, x, y, z."""
     now = at.fresh(Orientation)
-    if now is None:
+    if now is None or now.roll_deg is None or now.pitch_deg is None:
         return None
     halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
     (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
@@ -409,7 +413,7 @@ def local_position_ned(at: Moment) -> Message | None:
 def nav_controller_output(at: Moment, target: Place, height_m: float | None) -> Message | None:
     """NAV_CONTROLLER_OUTPUT: direction and distance to a place, degrees and metres. The set points are unknown."""
     position, now, height = at.fresh(GlobalPosition), at.fresh(Orientation), at.fresh(Height)
-    if position is None or now is None:
+    if position is None or now is None or now.roll_deg is None or now.pitch_deg is None:
         return None
     bearing = round((bearing_deg(position, target) + 180) % 360 - 180)
     distance = min(round(distance_m(position, target)), _UNKNOWN_U16)

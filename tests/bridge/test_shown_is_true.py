@@ -2,7 +2,7 @@
 """A whole flight in each protocol: every value on a ground station's screen is the craft's, and none is old."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import pytest
@@ -17,6 +17,7 @@ from simulator.inav_boxes import BOXES as INAV_BOXES
 from simulator.inav_boxes import NAV_POSHOLD, NAV_WP
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import Upload
+from tests.support.fake_controllers import DeafWhileArmed
 from tests.support.world import GroundStation, World
 
 STEP_S, STALE_S = 0.1, 1.5
@@ -43,6 +44,11 @@ def of_home(craft: Craft) -> float:
     north = (craft.flight.lat_e7 - FIELD[0]) * METRES_PER_UNIT
     east = (craft.flight.lon_e7 - FIELD[1]) * METRES_PER_UNIT * math.cos(math.radians(45.38))
     return math.hypot(north, east)
+
+
+def velocity_cm_s(craft: Craft, direction_deg: float) -> float:
+    """The part of its speed over ground in a direction."""
+    return craft.flight.speed_ms * 100 * math.cos(math.radians(craft.flight.course - direction_deg))
 
 
 def named(name: str) -> Callable[[Message], float | None]:
@@ -83,10 +89,17 @@ SCREEN = {
     "volts": Shown("BATTERY_STATUS", lambda msg: msg.voltages[0], lambda c: c.flight.volts * 1e3, 51),
     "volts too": Shown("SYS_STATUS", known_volts, lambda c: c.flight.volts * 1e3, 51),
     "home distance": Shown("NAMED_VALUE_FLOAT", named("home_m"), of_home, 0.2),
+    "speed north": Shown("GLOBAL_POSITION_INT", lambda msg: msg.vx, lambda c: velocity_cm_s(c, 0), 30),
+    "speed east": Shown("GLOBAL_POSITION_INT", lambda msg: msg.vy, lambda c: velocity_cm_s(c, 90), 30),
     "throttle": Shown("RC_CHANNELS", lambda msg: msg.chan3_raw, lambda c: 1450 if c.armed else 1000, 0),
     "arm switch": Shown("RC_CHANNELS", lambda msg: msg.chan5_raw, lambda c: 2000 if c.armed else 1000, 0),
 }
-
+#: An armed Harakiri that hears nothing and sends FrSky telemetry: all that it tells, where coarser with its resolution.
+FRSKY = "FrSky"
+FRSKY_RESOLUTION = {
+    "lat": 17, "lon": 17, "height": 11, "altitude": 11, "climb": 8, "speed north": 50, "speed east": 50,
+    "heading": 0.6, "volts": 160, "volts too": 160, "home distance": 0.4,
+}  # fmt: skip
 
 SCREEN_BY_KIND = {
     kind: [each for each in SCREEN.items() if each[1].kind == kind] for kind in {w.kind for w in SCREEN.values()}
@@ -99,6 +112,7 @@ class Screen:
 
     world: World
     station: GroundStation
+    resolution: Mapping[str, float]
     past: list[tuple[float, Craft]] = field(default_factory=list)
     shown: dict[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -113,9 +127,9 @@ class Screen:
             if value is None:
                 continue
             self.shown[name] = self.world.now, value
-            if not self.is_true(what, value):
+            if not self.is_true(name, value):
                 self.look()  # it may be news
-                assert self.is_true(what, value), (self.world.now, name, value, what.truth(self.past[-1][1]))
+                assert self.is_true(name, value), (self.world.now, name, value, what.truth(self.past[-1][1]))
 
     def look(self) -> None:
         """Note the truth of this moment."""
@@ -123,12 +137,13 @@ class Screen:
         if craft is not None:
             self.past.append((self.world.now, craft))
 
-    def is_true(self, what: Shown, value: float) -> bool:
+    def is_true(self, name: str, value: float) -> bool:
         """True if the craft had this value at some time within the last 1.5 s."""
+        what, resolution = SCREEN[name], self.resolution.get(name, SCREEN[name].resolution)
         truths = [what.truth(craft) for craft in self.recent()]
         if what.circle:
-            return min(abs((value - truth + 180) % 360 - 180) for truth in truths) <= what.resolution + 1
-        return min(truths) - what.resolution <= value <= max(truths) + what.resolution
+            return min(abs((value - truth + 180) % 360 - 180) for truth in truths) <= resolution + 1
+        return min(truths) - resolution <= value <= max(truths) + resolution
 
     def recent(self) -> Iterator[Craft]:
         for at, craft in reversed(self.past):
@@ -158,32 +173,46 @@ def on_the_ground(board: str | TelemetryProtocol) -> Screen:
     """A ground station that watches a craft, ready to arm."""
     if isinstance(board, TelemetryProtocol):
         world = World(SimOptions(tele_prot=board))
+    elif board == FRSKY:
+        deaf = DeafWhileArmed(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults := Faults())
+        world = World(peer=deaf, faults=faults)
     else:
         world = World(peer=make_board(board, faults=(faults := Faults(boxes=0))), faults=faults)
     world.wait_ready(30)
     station = GroundStation(world)
     beat(station)
     world.run(6)  # long enough for the switches' ranges to be read
-    if not isinstance(board, TelemetryProtocol):
+    if board in BOXES:
         assert Upload(station, MISSION).run() is MissionResult.ACCEPTED
-    return Screen(world, station)
+    return Screen(world, station, FRSKY_RESOLUTION if board == FRSKY else {})
+
+
+def is_found(world: World) -> bool:
+    return world.bridge.session.controller is not None
 
 
 def arm(screen: Screen) -> None:
     screen.world.faults.armed = True
-    while not (screen.world.bridge.session.vehicle.armed and screen.world.is_found):
+    while not (screen.world.bridge.session.vehicle.armed and is_found(screen.world)):
         screen.fly(STEP_S, linked=False)
 
 
-ALL = [*TelemetryProtocol, *BOXES]
+ALL = [*TelemetryProtocol, *BOXES, FRSKY]
 
 
 def modes_of(board: str | TelemetryProtocol) -> tuple[tuple[int, int], ...]:
     """The boxes of three parts of a flight, each with the mode that they make."""
     if isinstance(board, TelemetryProtocol):
         return (ANGLE, COPTER_STABILIZE), (ANGLE | BARO, COPTER_ALT_HOLD), (ANGLE | BARO | GPS_HOLD, COPTER_LOITER)
+    if board == FRSKY:  # which has no mode: the heartbeat keeps the last one
+        return ((ANGLE, COPTER_STABILIZE),) * 3
     level, mission, hold = BOXES[board]
     return (level, COPTER_STABILIZE), (mission, COPTER_AUTO), (hold, COPTER_LOITER)
+
+
+def shown_by(board: str | TelemetryProtocol) -> set[str]:
+    """What an armed board tells."""
+    return set(FRSKY_RESOLUTION if board == FRSKY else SCREEN)
 
 
 @pytest.mark.parametrize("board", ALL)
@@ -193,6 +222,7 @@ def test_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
     assert set(screen.shown) == set(SCREEN)
     arm(screen)
     screen.fly(2.5, linked=False)
+    screen.shown.clear()
     for boxes, mode in modes_of(board):
         screen.world.faults.boxes = boxes
         screen.fly(40)
@@ -202,6 +232,7 @@ def test_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
         assert (home.latitude, home.longitude) == FIELD
         assert screen.world.bridge.report.whole().position.home_lat_deg == home.latitude / 1e7
     assert max(of_home(craft) for _, craft in screen.past) > 20
+    assert set(screen.shown) == shown_by(board)
 
 
 @pytest.mark.parametrize("board", ALL)
@@ -224,10 +255,12 @@ def test_what_was_heard_before_the_link_was_lost_is_not_shown_as_new(board: str 
     lost = [text for text in screen.station.texts() if "lost" in text]
     assert lost == ["Flight controller lost: silent for 3 s", "Flight controller lost: silent for 13 s"]
     screen.world.faults.hang = False
-    screen.world.wait_until(lambda world: world.is_found, 8)
+    screen.world.wait_until(is_found, 8)
     screen.fly(3, linked=False)
     assert screen.heartbeat.system_status == m.MAV_STATE_ACTIVE
     assert any(text.startswith("Flight controller back after 2") for text in screen.station.texts())
+    screen.shown.clear()
     screen.fly(5)
+    assert set(screen.shown) == shown_by(board)
     home = screen.station.said("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == FIELD

@@ -7,6 +7,7 @@ import pytest
 
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.profile import Profile
+from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionResult
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions, TelemetryProtocol
@@ -82,7 +83,8 @@ def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> Non
         assert len(warnings) == (board is DeafWhileArmed)
         # Of what is no longer heard nothing stays on the screen as if it were new.
         status = station.said("SYS_STATUS")[-1]
-        assert (status.voltage_battery == 65535) == (board is DeafWhileArmed)
+        gps_health = status.onboard_control_sensors_health & messages.MAV_SYS_STATUS_SENSOR_GPS
+        assert (gps_health == 0) == (board is DeafWhileArmed)
         assert world.now - next(at for at, message in reversed(station.heard) if message is status) <= 1.1
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         faults.armed = False

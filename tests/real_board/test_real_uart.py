@@ -3,7 +3,7 @@
 
 import pytest
 
-from protocols.frsky import FrskyWatch
+from protocols.frsky import FrskyParser
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_record import identify
 from protocols.msp.mission import INFO_REQUEST, decode_info
@@ -15,7 +15,7 @@ from tests.support.real_bench import IDENT, Figure, RealBench
 
 def has_frsky(heard: bytes) -> bool:
     """True if values of the FrSky hub protocol follow each other."""
-    watch, longest = FrskyWatch(), 0
+    watch, longest = FrskyParser(), 0
     for byte in heard:
         watch.feed(bytes((byte,)))
         longest = max(longest, watch.values_in_a_row)

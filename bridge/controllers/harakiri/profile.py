@@ -95,6 +95,6 @@ FRSKY = Profile(
     _FAMILY,
     Spoken.FRSKY,
     no_missions=ARMED,
-    notice="Telemetry not readable while armed (FrSky)",
+    notice="FrSky while armed: no attitude, mode or RC",
 )
 PROFILES = (PATCHED, UNPATCHED, MAVLINK, FRSKY)

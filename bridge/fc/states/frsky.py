@@ -2,19 +2,24 @@
 """The flight controller sends FrSky telemetry."""
 
 from bridge.fc.autosense import Spoken
+from bridge.fc.frsky_telemetry import FrskyTelemetry
 from bridge.fc.profile import FlightController
 from bridge.fc.states.base import State
 from bridge.fc.states.events import Event, FrskyFound, Lost
 from bridge.fc.states.port import Port
+from bridge.line.msp_link import PROBE
 from bridge.model.vehicle import FlightState, Source
-from protocols.frsky import FrskyWatch
+from protocols.frsky import FRSKY_SPEED, FrskyParser
+from protocols.msp.frame import MspParser
 
 #: Harakiri sends eight times a second.
 _SILENCE_S = 1.0
+#: A Harakiri that hears us also answers MSP, which has more to say.
+_PROBE_INTERVAL_S = 5.0
 
 
 class Frsky(State):
-    """An armed Harakiri sends FrSky telemetry (tele_prot 1): nothing to read, so its end is waited for."""
+    """An armed Harakiri sends FrSky telemetry (tele_prot 1) and did not answer MSP."""
 
     name = "FrSky"
     controller: FlightController
@@ -23,16 +28,19 @@ class Frsky(State):
         super().__init__(port, event.found.speed)
         (profile,) = (profile for profile in port.profiles if profile.spoken is Spoken.FRSKY)
         self.controller = FlightController(profile, profile.name)
-        self._watch = FrskyWatch()
+        self._parser, self._msp = FrskyParser(), MspParser()
+        self._probe_due = now + _PROBE_INTERVAL_S
         port.meet(self.controller)
+        self._telemetry = FrskyTelemetry(port.vehicle)
         self._note_armed(now)
 
     def receive(self, data: bytes, now: float) -> Event | None:
-        """Watch the line."""
-        self._watch.feed(data)
-        if self._watch.values_in_a_row:
+        """Read the values."""
+        for report in self._parser.feed(data):
+            self._telemetry.take(report, now)
+        if self._parser.values_in_a_row:
             self._note_armed(now)
-        return None
+        return Lost("it answers MSP again", (FRSKY_SPEED,)) if self._msp.feed(data) else None
 
     def _note_armed(self, now: float) -> None:
         """Only an armed Harakiri sends FrSky telemetry."""
@@ -41,9 +49,12 @@ class Frsky(State):
         self.port.vehicle.hear(FlightState(now, Source.FRSKY, True, None if known is None else known.mode))
 
     def tick(self, now: float) -> Event | None:
-        """Notice silence."""
-        return Lost(f"no FrSky telemetry for {_SILENCE_S} s") if now >= self.deadline() else None
+        """Ask for MSP now and then; notice silence."""
+        if now >= self._probe_due:
+            self._probe_due = now + _PROBE_INTERVAL_S
+            self.port.output.append(PROBE)
+        return Lost(f"no FrSky telemetry for {_SILENCE_S} s") if now >= self._heard_at + _SILENCE_S else None
 
     def deadline(self) -> float:
-        """The end of the line's silence."""
-        return self._heard_at + _SILENCE_S
+        """The next probe, or the end of the line's silence."""
+        return min(self._probe_due, self._heard_at + _SILENCE_S)

@@ -8,6 +8,7 @@ from bridge.fc.profile import FlightController, Profile
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
+from bridge.model.ground_track import GroundTrack
 from bridge.model.vehicle import Vehicle
 from protocols.mavlink.frame import MavlinkFrame
 
@@ -36,5 +37,7 @@ class Port:
         if controller.profile.family != self.family:
             self.family = controller.profile.family
             self.vehicle.forget()
+        # The craft may have turned while it was not heard.
+        self.vehicle.track = GroundTrack()
         self.vehicle.airframe = controller.airframe or self.vehicle.airframe
         self.vehicle.version = controller.version or self.vehicle.version

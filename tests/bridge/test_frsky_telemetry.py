@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An armed Harakiri that sends FrSky telemetry and does not hear the bridge: only what is certain is shown."""
+
+import pytest
+
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.fc.frsky_telemetry import FrskyTelemetry
+from bridge.model.vehicle import GlobalPosition, Height, Vehicle
+from protocols.frsky import FrskyReport
+from simulator.naze import SimulatedNaze
+from simulator.options import Faults, SimOptions, TelemetryProtocol
+from tests.support.world import World
+
+HERE = 453838000, 84733000
+
+
+def hear(*reports: FrskyReport) -> Vehicle:
+    """Let them come once a second."""
+    vehicle = Vehicle()
+    telemetry = FrskyTelemetry(vehicle)
+    for second, report in enumerate(reports):
+        telemetry.take(report, float(second))
+    return vehicle
+
+
+def at(north_e7: int, height_m: float | None = None) -> FrskyReport:
+    return FrskyReport(height_m, None, None, (HERE[0] + north_e7, HERE[1]))
+
+
+def test_velocity_and_climb_follow_from_two_reports() -> None:
+    assert hear(at(0, 3.0)).last(GlobalPosition) is None
+    vehicle = hear(at(0, 3.0), at(500, 4.5))
+    position, height = vehicle.last(GlobalPosition), vehicle.last(Height)
+    assert position is not None
+    assert height is not None
+    assert (position.lat_e7, position.east_m_s) == (HERE[0] + 500, 0)
+    assert position.north_m_s == pytest.approx(5.57, abs=0.01)
+    assert (position.altitude_m, height.height_m, height.climb_m_s) == (None, 4.5, 1.5)
+
+
+def test_a_position_that_stands_still_may_be_one_without_a_fix() -> None:
+    position = hear(at(0), at(500), at(500), at(500)).last(GlobalPosition)
+    assert position is not None
+    assert position.heard_at == 1
+
+
+@pytest.mark.parametrize("damaged", [at(10_000_000, 8000.0), at(-600_000_000, 60.0)])
+def test_a_jump_is_not_believed(damaged: FrskyReport) -> None:
+    vehicle = hear(at(0, 2.0), at(300, 3.0), damaged, at(900, 5.0))
+    position, height = vehicle.last(GlobalPosition), vehicle.last(Height)
+    assert position is not None
+    assert height is not None
+    assert (position.heard_at, position.lat_e7) == (1, HERE[0] + 300)
+    assert (height.heard_at, height.height_m) == (1, 3.0)
+
+
+class SwitchedReceiver(SimulatedNaze):
+    """A wire to its receiver that can be cut."""
+
+    is_deaf = False
+
+    def receive(self, data: bytes, now: float) -> None:
+        if not self.is_deaf:
+            super().receive(data, now)
+
+
+def test_msp_is_used_again_as_soon_as_it_is_answered() -> None:
+    faults = Faults()
+    board = SwitchedReceiver(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults)
+    world = World(faults=faults, peer=board)
+    world.wait_ready()
+    board.is_deaf, faults.armed = True, True
+    world.wait_until(lambda w: w.kind is harakiri.FRSKY, 8)
+    board.is_deaf = False
+    world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.speed == 9600, 8)
+    world.assert_line_was_clean()
