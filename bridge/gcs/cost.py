@@ -20,6 +20,7 @@ class Cost(Enum):
     """The limited kinds of work.
 
     RECEIVED: a datagram or a read from a connection.
+    ARRIVAL: a new peer, which costs greetings and a log entry.
     ANSWER: a message sent on request. Mission Planner requests about twenty when it connects.
     TRANSFER: a message of a mission transfer; over a fast link there may be a thousand items a second.
     TEXT: a STATUSTEXT that a station causes; a mission of 146 items may need one for each.
@@ -31,6 +32,7 @@ class Cost(Enum):
     """
 
     RECEIVED = auto()
+    ARRIVAL = auto()
     ANSWER = auto()
     TRANSFER = auto()
     TEXT = auto()
@@ -43,7 +45,10 @@ class Cost(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A rate for each peer, and one for all peers without standing together (bridge.gcs.budget)."""
+    """`each`: for every peer with standing, and every host of the others. `total`: for all the others together.
+
+    bridge.gcs.budget describes standing.
+    """
 
     each: Rate
     total: Rate
@@ -51,6 +56,7 @@ class Limit:
 
 LIMITS = {
     Cost.RECEIVED: Limit(Rate(1500, 3000), Rate(15000, 15000)),
+    Cost.ARRIVAL: Limit(Rate(20, 40), Rate(200, 400)),
     Cost.ANSWER: Limit(Rate(50, 200), Rate(500, 1000)),
     Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 2000)),
     Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),

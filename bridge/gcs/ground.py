@@ -160,8 +160,10 @@ class Ground:
     def admits(self, peer: Peer, now: float) -> bool:
         """False if a frame is not to be noted, because it comes from one of too many new addresses."""
         standing = self._standing(peer)
-        is_listener = standing is Standing.LISTENER
-        return standing is Standing.PROVEN or self._stations.admits(peer, now, is_listener=is_listener)
+        if standing is Standing.PROVEN or not self._stations.is_unknown(peer):
+            return True
+        has_room = self._stations.has_room_for(peer, is_listener=standing is Standing.LISTENER)
+        return has_room and self.budgets.allows(Cost.ARRIVAL, peer, now)
 
     def heard(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
         """Note a frame from a peer, which counts as connected from now on."""
@@ -183,11 +185,11 @@ class Ground:
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
         """The connection of a full link to drop; one with standing only if there is no other."""
         others = {peer: at for peer, at in peers.items() if self._standing(peer) is not Standing.PROVEN}
-        return displaced(others or peers)
+        return displaced(others or peers, self._stations.steady)
 
     def _has_standing(self, peer: Peer) -> bool:
         standing = self._standing(peer)
-        return standing is Standing.PROVEN or (standing is Standing.OPEN and self._stations.is_senior(peer))
+        return standing is Standing.PROVEN or (standing is Standing.OPEN and self._stations.has_standing(peer))
 
     @property
     def is_recording(self) -> bool:

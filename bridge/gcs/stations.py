@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The connected ground stations, and the MAVLink version for each."""
 
-from collections import Counter
-from collections.abc import Mapping
+from array import array
+from collections import Counter, defaultdict
+from collections.abc import Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf
+from zlib import crc32
 
-from bridge.gcs.budget import TokenBucket
-from bridge.gcs.cost import Rate
 from bridge.gcs.station import Peer, Station
 
 #: A UDP peer that is silent for this long has left; a TCP peer leaves with its connection.
@@ -18,8 +18,11 @@ MOVED_S = 5.0
 MAX_PEERS = 32
 #: The same for peers that may only read, so that they take no slot from those with the key.
 MAX_LISTENERS = 8
-#: Newcomers to a full link: addresses may be made up by the thousand. A pilot who comes now must be among them.
-_NEWCOMERS = Rate(1000, 1000)
+#: A peer is steady once it has been heard this often, with pauses of at least `_BEAT_S`: as heartbeats at 1 Hz are.
+_STEADY_BEATS = 3
+_BEAT_S = 0.7
+#: Addresses remembered that came to a full link: at 20,000 a second, most of them for at least a second.
+_REMEMBERED = 1 << 16
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
 #: Ids behind one peer: a radio or a router may carry several.
@@ -32,20 +35,33 @@ class _Known:
     is_listener: bool
     came_at: float
     heard_at: float
+    beats: int = 0
+    beat_at: float = -inf
     #: When each (sysid, compid) was last heard from there.
     speakers: dict[tuple[int, int], float] = field(default_factory=dict)
 
 
-def displaced(peers: Mapping[Peer, float]) -> Peer:
+def displaced(peers: Mapping[Peer, float], steady: Collection[Peer] = ()) -> Peer:
     """The peer of a full link that makes room for another. `peers`: when each was last heard, in order of arrival.
 
-    The first half keeps its slots: a pilot is not displaced by a later crowd, not even after a radio fade. Of the
-    others, the longest-silent peer of the host with most peers goes: a crowd is often one host, which changes its
-    addresses faster than a pilot's ground station falls silent.
+    The first half by precedence keeps its slots: a pilot is not displaced by a later crowd, not even after a radio
+    fade. Of the others, the longest-silent peer of the host with most peers goes: a crowd is often one host, which
+    changes its addresses faster than a pilot's ground station falls silent.
     """
     hosts = Counter(peer.host for peer in peers)
-    later = list(peers)[len(peers) // 2 :]
+    later = _by_precedence(peers, steady)[len(peers) // 2 :]
     return min(later, key=lambda peer: (-hosts[peer.host], peers[peer]))
+
+
+def _by_precedence(peers: Iterable[Peer], steady: Collection[Peer]) -> list[Peer]:
+    """Steady peers first; of them, as of the others, one of each host, then the second of each; then by arrival."""
+    rounds: Counter[tuple[bool, Hashable]] = Counter()
+    order: list[tuple[bool, int, Peer]] = []
+    for peer in peers:
+        group = peer not in steady, peer.host
+        rounds[group] += 1
+        order.append((group[0], rounds[group], peer))
+    return [peer for _, _, peer in sorted(order, key=lambda entry: entry[:2])]
 
 
 def _slots(*, is_listener: bool) -> int:
@@ -55,26 +71,25 @@ def _slots(*, is_listener: bool) -> int:
 class Stations:
     """The peers that were heard. Each is answered in its own version: MAVLink 2 once it has sent that.
 
-    A newcomer is always accepted; on a full link it replaces another peer.
+    On a full link a newcomer replaces another peer when it is heard for the second time: made-up addresses are used
+    once.
     """
 
     def __init__(self) -> None:
         self._known: dict[Peer, _Known] = {}  # in order of arrival
-        self._newcomers = TokenBucket(_NEWCOMERS)
-        self._seniors: set[Peer] | None = None  # counted again after each change
+        self._orders: dict[tuple[str, bool], list[Peer]] | None = None  # made again after each change
+        self._turned_away = array("I", [0]) * _REMEMBERED
         self._displaced: list[Peer] = []
         self._expiry_due = inf
 
-    def admits(self, peer: Peer, now: float, *, is_listener: bool) -> bool:
-        """Count a frame of an unproven peer; False if it is a newcomer to a full link and there are too many."""
-        if peer in self._known:
+    def has_room_for(self, peer: Peer, *, is_listener: bool) -> bool:
+        """False if a newcomer's link is full, and it is heard for the first time."""
+        if len(self._order(peer.link, is_listener=is_listener)) < _slots(is_listener=is_listener):
             return True
-        if len(self._alongside(peer.link, is_listener=is_listener)) < _slots(is_listener=is_listener):
-            return True
-        if not self._newcomers.has(now):
-            return False
-        self._newcomers.spend()
-        return True
+        mark = crc32(repr(peer).encode())
+        has_come_before = self._turned_away[mark % _REMEMBERED] == mark
+        self._turned_away[mark % _REMEMBERED] = mark
+        return has_come_before
 
     def heard(self, station: Station, version: int, now: float, *, is_listener: bool = False) -> bool:
         """Note a frame from a station; True if its peer is new."""
@@ -84,36 +99,45 @@ class Stations:
             known = self._add(station.peer, version, is_listener, now)
         known.heard_at = now
         known.version = max(known.version, version)
+        if known.beats < _STEADY_BEATS and now >= known.beat_at + _BEAT_S:
+            known.beats, known.beat_at = known.beats + 1, now
+            self._orders = None
         self._note_speaker(station, known, now)
         return is_new
 
     def _add(self, peer: Peer, version: int, is_listener: bool, now: float) -> _Known:
         self._known.pop(peer, None)
-        self._seniors = None
-        rivals = self._alongside(peer.link, is_listener=is_listener)
+        self._orders = None
+        rivals = {
+            other: known.heard_at
+            for other, known in self._known.items()
+            if other.link == peer.link and known.is_listener == is_listener
+        }
         if len(rivals) >= _slots(is_listener=is_listener):
-            other = displaced(rivals)
+            other = displaced(rivals, self.steady)
             del self._known[other]
             self._displaced.append(other)
         added = self._known[peer] = _Known(version, is_listener, now, now)
         return added
 
-    def _alongside(self, link: str, *, is_listener: bool) -> dict[Peer, float]:
-        """When each peer of this kind on a link was last heard."""
-        return {
-            other: known.heard_at
-            for other, known in self._known.items()
-            if other.link == link and known.is_listener == is_listener
-        }
+    @property
+    def steady(self) -> set[Peer]:
+        """The peers that have been heard for a while."""
+        return {peer for peer, known in self._known.items() if known.beats >= _STEADY_BEATS}
 
-    def is_senior(self, peer: Peer) -> bool:
-        """True if a peer belongs to the half of its full link that arrived first."""
-        if self._seniors is None:
-            self._seniors = set()
-            for link in {other.link for other in self._known}:
-                same = [other for other, its in self._known.items() if other.link == link and not its.is_listener]
-                self._seniors.update(same[: MAX_PEERS // 2])
-        return peer in self._seniors
+    def has_standing(self, peer: Peer) -> bool:
+        """True for the half of a link's places that keeps its slots."""
+        return peer in self._order(peer.link, is_listener=False)[: MAX_PEERS // 2]
+
+    def _order(self, link: str, *, is_listener: bool) -> list[Peer]:
+        """A link's peers by precedence."""
+        if self._orders is None:
+            kinds = defaultdict(list)
+            for peer, known in self._known.items():
+                kinds[peer.link, known.is_listener].append(peer)
+            steady = self.steady
+            self._orders = {kind: _by_precedence(peers, steady) for kind, peers in kinds.items()}
+        return self._orders.get((link, is_listener), [])
 
     def is_unknown(self, peer: Peer) -> bool:
         """True if nothing was heard from `peer`."""
@@ -127,7 +151,7 @@ class Stations:
     def gone(self, peer: Peer) -> None:
         """The peer's connection is closed."""
         self._known.pop(peer, None)
-        self._seniors = None
+        self._orders = None
 
     def expire(self, now: float) -> list[Peer]:
         """Forget silent peers; returns them and those displaced by others."""
@@ -137,7 +161,7 @@ class Stations:
             silent += [peer for peer, known in self._known.items() if now >= self._expires_at(peer, known)]
             for peer in silent:
                 self._known.pop(peer, None)
-            self._seniors = None
+            self._orders = None
             self._expiry_due = min((self._expires_at(peer, known) for peer, known in self._known.items()), default=inf)
         return silent
 
