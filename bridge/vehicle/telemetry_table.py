@@ -59,6 +59,6 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, Motors, 0.5, RC_CHANNELS, (make.servo_output_raw,)),
     Row(m.MAVLINK_MSG_ID_SCALED_PRESSURE, Pressure, 0.5, RAW_SENSORS, (make.scaled_pressure,)),
     Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, Orientation, inf, NO_STREAM, (make.attitude_quaternion,)),
-    Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, GlobalPosition, inf, NO_STREAM, (make.local_position_ned,)),
+    Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, GlobalPosition, inf, POSITION, (make.local_position_ned,)),
     Row(m.MAVLINK_MSG_ID_RAW_IMU, ImuSample, inf, RAW_SENSORS, (make.raw_imu,)),
 )

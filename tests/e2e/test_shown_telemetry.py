@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the real MAVSDK and the real MAVProxy show of a flown circle, beside what the simulated craft really did.
+"""What the real MAVSDK, MAVProxy and DroneKit show of a flown circle, beside what the simulated craft really did.
 
 Between a moment on board and the truth that is asked for lie the poll, the ground station's own rate and this process:
 half a second at the most. The craft flies at 2.5 m/s on a circle of 25 m (6 degrees a second), and climbs at 2.5 m/s
@@ -12,6 +12,7 @@ import math
 import re
 import time
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,9 @@ import pytest
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
 from bridge.model.battery import remaining_percent
+from simulator.flight import FIELD_LAT_E7, METRES_PER_DEGREE
 from tests.e2e.test_mavsdk import vehicle_at
+from tests.support import dronekit
 from tests.support.benches import Bench
 from tests.support.mavproxy import MavProxy
 from tests.support.programs import PATIENCE, comes
@@ -42,7 +45,6 @@ MAVSDK_MODES = {
     1 << 8: "MISSION",
     0: "ACRO",
 }
-_METRES_PER_DEGREE = 111_320.0
 
 
 def truth(bench: Bench) -> dict[str, Any]:
@@ -53,8 +55,8 @@ def truth(bench: Bench) -> dict[str, Any]:
 
 
 def metres_from(flight: dict[str, Any], lat_deg: float, lon_deg: float) -> float:
-    north = (lat_deg - flight["lat_e7"] / 1e7) * _METRES_PER_DEGREE
-    east = (lon_deg - flight["lon_e7"] / 1e7) * _METRES_PER_DEGREE * math.cos(math.radians(lat_deg))
+    north = (lat_deg - flight["lat_e7"] / 1e7) * METRES_PER_DEGREE
+    east = (lon_deg - flight["lon_e7"] / 1e7) * METRES_PER_DEGREE * math.cos(math.radians(lat_deg))
     return math.hypot(north, east)
 
 
@@ -178,3 +180,37 @@ def check_position(bench: Bench, mavproxy: MavProxy) -> None:
         return near and high and degrees_between(position["hdg"] / 100, now["heading"]) <= DIRECTION_DEG
 
     assert comes(agrees_now, seconds=3.0)
+
+
+def shows_mode(vehicle: Any, name: str) -> bool:
+    shown: str = vehicle.mode.name
+    return shown == name
+
+
+def test_dronekit_shows_the_flight_as_it_is(bench: Bench) -> None:
+    bench.board.set("armed 1")
+    with dronekit.vehicle_at(bench.daemon.port) as vehicle:
+        assert dict(vehicle.parameters) == {"SYSID_THISMAV": 1, "WPNAV_RADIUS": 200}
+        assert (vehicle.gps_0.fix_type, vehicle.gps_0.satellites_visible) == (3, 9)
+        for boxes, mode in ((1 << 7, "LOITER"), (1 << 6, "RTL"), (0, "ACRO")):
+            bench.board.set(f"boxes {boxes}")
+            assert comes(partial(shows_mode, vehicle, mode))
+        assert (vehicle.armed, vehicle.system_status.state) == (True, "ACTIVE")
+
+        def agrees_now() -> bool:
+            place, local, now = vehicle.location.global_relative_frame, vehicle.location.local_frame, truth(bench)
+            north_m = (now["lat_e7"] - FIELD_LAT_E7) / 1e7 * METRES_PER_DEGREE
+            return (
+                metres_from(now, place.lat, place.lon) <= POSITION_M
+                and abs(place.alt - now["height_m"]) <= HEIGHT_M
+                and local.north is not None
+                and abs(local.north - north_m) <= POSITION_M
+                and abs(math.degrees(vehicle.attitude.roll) - now["roll"]) <= TILT_DEG
+                and abs(math.degrees(vehicle.attitude.pitch) + now["pitch"]) <= TILT_DEG
+                and degrees_between(vehicle.heading, now["heading"]) <= DIRECTION_DEG
+                and abs(math.hypot(*vehicle.velocity[:2]) - now["speed_ms"]) <= SPEED_MS
+                and abs(vehicle.battery.voltage - now["volts"]) <= VOLTAGE_V
+            )
+
+        for _ in range(5):
+            assert comes(agrees_now)
