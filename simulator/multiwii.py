@@ -9,7 +9,7 @@ from simulator.msp_firmware import Boot, PortHabits, error, reply
 from simulator.msp_sensors import MspCommand, SensorReplies
 from simulator.multiwii_mission import MultiWiiMission
 from simulator.multiwii_navigation import MultiWiiNavigation
-from simulator.nav_status import State
+from simulator.nav_status import Mode, State
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import WaypointCraft
 
@@ -22,7 +22,7 @@ _BOX_NAMES = {
     11: "GPS HOLD", 13: "BEEPER", 20: "MISSION", 21: "LAND",
 }  # fmt: skip
 _BOXES = tuple(_BOX_NAMES)
-_ARM, _MISSION = _BOXES.index(0), _BOXES.index(20)
+_ARM, _RETURN, _MISSION = _BOXES.index(0), _BOXES.index(10), _BOXES.index(20)
 _FLAG_CRC_ERROR, _FLAG_HOME, _FLAG_HOLD, _FLAG_IN_PROGRESS = 0xFE, 0x01, 0x02, 0xFF
 _HOME, _HOLD = 0, 255
 
@@ -78,11 +78,13 @@ class MultiWiiFirmware:
             self._clock = now
         while self._clock + _STEP_S <= now:
             self._clock += _STEP_S
-            self._navigation.fly(_STEP_S, bool(self._faults.boxes >> _MISSION & 1))
+            returns, in_mission = (self._faults.boxes >> box & 1 for box in (_RETURN, _MISSION))
+            self._navigation.fly(_STEP_S, Mode.RTH if returns else Mode.NAV if in_mission else Mode.NONE)
 
     def _flags(self) -> int:
-        kept = self._faults.boxes & ~(1 << _ARM | 1 << _MISSION)
-        return kept | self.armed << _ARM | (self._navigation.state is not State.NONE) << _MISSION
+        kept = self._faults.boxes & ~(1 << _ARM | 1 << _RETURN | 1 << _MISSION)
+        mode = self._navigation.mode
+        return kept | self.armed << _ARM | (mode is Mode.RTH) << _RETURN | (mode is Mode.NAV) << _MISSION
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """The reply frame; none for a waypoint while a mission is flown."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii 2.4's mission mode (GPS.cpp): it fetches one step after the other from the EEPROM.
+"""MultiWii 2.4's return home, and its mission mode (GPS.cpp): it fetches one step after the other from the EEPROM.
 
 Not simulated: safe distances, the settling before a landing, and resuming an interrupted mission.
 """
@@ -17,7 +17,7 @@ _NO_JUMP = -10
 
 
 class MultiWiiNavigation:
-    """Flies `craft`. `step` is the last used waypoint, by the mission or by MSP."""
+    """Flies `craft`. `step` is the last used waypoint, by the mission or by MSP: its p1 decides if any RTH lands."""
 
     def __init__(self, mission: MultiWiiMission, craft: WaypointCraft) -> None:
         self._mission = mission
@@ -27,27 +27,30 @@ class MultiWiiNavigation:
         self._jumps = _NO_JUMP
         self._held_s = self._rth_height_m = 0.0
         self.home = craft.position
+        self.mode = Mode.NONE
         self.state = State.NONE
         self.step = NavWaypoint(action=0, flag=0)
         self.number = 0
 
     def end(self) -> None:
         """Stop: disarmed, or the switch is off."""
-        self.state = State.NONE
+        self.mode, self.state = Mode.NONE, State.NONE
         self._error = Error.NONE
 
     def status(self) -> NavStatus:
         """The content of MSP_NAV_STATUS."""
-        mode = Mode.NONE if self.state is State.NONE else Mode.NAV
-        return NavStatus(mode, self.state, self.step.action, self.number, self._error, round(self._craft.heading))
+        return NavStatus(self.mode, self.state, self.step.action, self.number, self._error, round(self._craft.heading))
 
-    def fly(self, seconds: float, is_requested: bool) -> None:
-        """Advance the flight; `is_requested`: the pilot's switch MISSION is on."""
-        if not is_requested:
+    def fly(self, seconds: float, mode: Mode) -> None:
+        """Advance the flight; `mode`: the one that the pilot's switches select."""
+        if mode is not self.mode:
             self.end()
-        elif self.state is State.NONE:
-            self._next_step, self._jumps = 1, _NO_JUMP
-            self.state = State.PROCESS_NEXT
+            self.mode = mode
+            if mode is Mode.RTH:
+                self._rth_height_m, self.state = max(self._craft.height_m, _RTH_HEIGHT_M), State.RTH_START
+            elif mode is Mode.NAV:
+                self._next_step, self._jumps = 1, _NO_JUMP
+                self.state = State.PROCESS_NEXT
         match self.state:
             case State.NONE:
                 self._craft.hover(_HOVER_HEIGHT_M, seconds)

@@ -322,6 +322,25 @@ def test_a_multiwii_is_not_read_in_flight() -> None:
     assert not [text for text in station.texts() if "changed" in text]
 
 
+@pytest.mark.parametrize("is_blank", [False, True])
+def test_a_multiwii_that_was_read_still_hovers_after_a_return_home_by_the_switch(is_blank: bool) -> None:
+    """It would land if the record that it read last had a p1: a hold, or an erased record."""
+    board, world, station = board_with("multiwii")
+    if not is_blank:
+        items = [replace(item, p1=7.0) for item in plan(9)]
+        assert Upload(station, items, tries=60).run(60) is ACCEPTED
+        world.run(3)
+        assert Download(station).run() is not None
+    written = board.counters.flash_writes
+    world.run(3)
+    board.faults.armed, board.faults.boxes = True, 1 << 7
+    world.run(60)
+    craft = board.truth(world.now)
+    assert craft is not None
+    assert craft.flight.height_m > 5
+    assert board.counters.flash_writes == written
+
+
 def test_a_multiwii_that_holds_nothing_is_watched_without_news() -> None:
     _, world, station = board_with("multiwii")
     before = len(world.written)

@@ -25,7 +25,7 @@ LENGTHS = {
     121: 7,
     122: 22,
 }
-MISSION = 1 << 10
+MISSION, RETURN = 1 << 10, 1 << 7
 CRC_ERROR, IN_PROGRESS = 0xFE, 0xFF
 
 
@@ -107,6 +107,16 @@ def test_a_mission_is_flown_home_and_landed() -> None:
         assert bench.now < 300
     assert sorted(set(numbers)) == [1, 2, 3, 4]
     assert numbers == sorted(numbers)
+
+
+@pytest.mark.parametrize(("p1", "state"), [(0, 3), (7, 10)])
+def test_a_return_home_by_the_switch_lands_if_the_waypoint_last_read_has_p1(p1: int, state: int) -> None:
+    bench = MspBench("multiwii", faults=Faults(boxes=0))
+    bench.upload([waypoint(1, Action.POSHOLD_TIME, p1=p1), waypoint(2)])
+    assert bench.read(1).p1 == p1
+    bench.faults.armed, bench.faults.boxes = True, RETURN
+    bench.run(60)
+    assert status(bench)[:2] == (2, state)
 
 
 def test_while_a_mission_is_flown_a_waypoint_gets_no_answer_and_none_is_told() -> None:

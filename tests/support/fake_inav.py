@@ -58,7 +58,7 @@ class FakeInav(MspFake):
             case Nav.GETINFO:
                 return bytes((0, self.capacity, self.is_valid, len(self.records)))
             case Nav.SET_WP:
-                self.writes += 1
+                self.writes += frame.payload[0] <= self.capacity
                 self.store(frame.payload[0], frame.payload[1:])
                 return b""
             case Nav.WP:

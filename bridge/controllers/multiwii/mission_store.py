@@ -1,14 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii 2.4 NAV: each record goes to EEPROM at once; the flag LAST ends the list (docs/inav.md)."""
+"""MultiWii 2.4 NAV: each record goes to EEPROM at once; the flag LAST ends the list (docs/inav.md).
+
+The record last read or written stays in RAM, and its p1 decides if a return home by the pilot's switch or by failsafe
+lands there: after each conversation it is cleared, as after power-on.
+"""
+
+from contextlib import suppress
 
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
-from bridge.line.conversation import Conversation
-from protocols.msp.nav import LAST, NavRecord
+from bridge.line.conversation import Conversation, LinkLost, ask
+from bridge.missions.fc_mission_store import PushProgress, PushResult
+from protocols.msp.nav import LAST, Nav, NavRecord, encode_set_wp
 
 #: Flags of invalid records: a wrong checksum in EEPROM, and erased EEPROM.
 _NO_RECORD = (0xFE, 0xFF)
 #: Action and flag of every reply while it flies a mission.
 _NAVIGATING = (0, 0xFF)
+#: Numbers above its capacity are not stored: SET_WP changes only the record in RAM. (255 would move a position hold.)
+_NOT_STORED = 254
+_CLEARED = NavRecord(0)
 
 
 class MultiwiiMissions(NavMissions):
@@ -18,8 +28,19 @@ class MultiwiiMissions(NavMissions):
     #: The records of a list that reads as empty.
     _empty: tuple[NavRecord, ...] = NOTHING
 
+    def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
+        """Write the list and verify it."""
+        result = yield from super().push(records, progress)
+        yield from self._clear_step()
+        return result
+
     def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
         """Read up to the last record. A list without one reads as empty, as does the single RTH of a cleared one."""
+        known = yield from self._read_list()
+        yield from self._clear_step()
+        return known
+
+    def _read_list(self) -> Conversation[tuple[NavRecord, ...] | None]:
         records: list[NavRecord] = []
         known: tuple[NavRecord, ...] = ()
         for number in range(1, self._profile.capacity + 1):
@@ -38,10 +59,20 @@ class MultiwiiMissions(NavMissions):
         return known
 
     def is_current(self) -> Conversation[bool]:
-        """Read some records, while disarmed: nothing else shows that another client has changed the list."""
+        """Read some records, while disarmed: nothing else shows that another client has changed the list.
+
+        In flight, a return home may begin between two requests.
+        """
         if self._known is None or self._vehicle.armed is not False:
             return True
-        return (yield from self._has_same_records(self._known or self._empty))
+        is_same = yield from self._has_same_records(self._known or self._empty)
+        yield from self._clear_step()
+        return is_same
+
+    def _clear_step(self) -> Conversation[None]:
+        if self._profile.capacity < _NOT_STORED and not self._vehicle.armed:
+            with suppress(LinkLost):
+                yield from ask(encode_set_wp(_NOT_STORED, _CLEARED), Nav.SET_WP, 0)
 
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
         """Write a single RTH first and the real record 1 last: a list interrupted in between only flies home."""
