@@ -52,7 +52,7 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
     except ValueError:
         lat = lon = None
     if lat is None or lon is None or abs(lat) > MAX_LAT_E7 or abs(lon) > MAX_LON_E7:
-        raise click.BadParameter(f"{text!r} is not a position: write it like  45.3838,8.4733")
+        raise click.BadParameter(f"{text!r} is not a position: write it like 45.3838,8.4733")
     return lat, lon
 
 

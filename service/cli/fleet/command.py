@@ -167,7 +167,7 @@ def _save(held: Held, path: Path, *, is_file: bool) -> None:
     except MissionFileError as error:
         fail(str(error))
     except OSError as error:
-        fail(f"{click.format_filename(path)} is not a writable folder:  {(error.strerror or '').lower()}")
+        fail(f"{click.format_filename(path)} is not a writable folder: {(error.strerror or '').lower()}")
 
 
 def _show(held: Held, *, with_items: bool, to_error: bool) -> None:

@@ -52,7 +52,7 @@ def open_session(address: FleetAddress) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as error:
         trouble = refusal(config) or endpoint_trouble(endpoints, tls_files(config))
-        raise FleetError(f"cannot join the fleet:  {trouble}") from error
+        raise FleetError(f"cannot join the fleet: {trouble}") from error
 
 
 def ask(
