@@ -325,13 +325,13 @@ class Ground:
 
 
 def split_text(text: str) -> list[str]:
-    """Split at spaces into pieces of 50 characters, padded with spaces; the last one is shorter.
+    """Split at spaces into pieces of 50 characters, padded with at least one space; the last one is shorter.
 
-    A piece shorter than 50 ends the text for those who join them (MAVLink: STATUSTEXT.chunk_seq).
+    A piece shorter than 50 ends the text for clients that join them with nothing in between (STATUSTEXT.chunk_seq).
     """
     pieces: list[str] = []
     while len(text) > _TEXT_SIZE - bool(pieces):
-        cut = text.rfind(" ", 1, _TEXT_SIZE + 1)
+        cut = text.rfind(" ", 1, _TEXT_SIZE)
         cut = cut if cut > 0 else _TEXT_SIZE
         pieces.append(text[:cut].ljust(_TEXT_SIZE))
         text = text[cut:].lstrip()

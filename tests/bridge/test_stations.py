@@ -5,6 +5,8 @@ import random
 
 import pytest
 from fastcrc.crc16 import mcrf4xx
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bridge.gcs.ground import split_text
 from bridge.gcs.station import Peer, Severity
@@ -267,6 +269,13 @@ def test_texts_fit_their_message_and_lose_nothing() -> None:
         assert len(pieces[-1]) <= (50 if len(pieces) == 1 else 49)
         assert "".join("".join(pieces).split()) == "".join(text.split())
         assert all(pieces[:-1])
+
+
+@given(st.lists(st.integers(1, 49), min_size=1, max_size=20))
+def test_joined_pieces_have_the_same_words(sizes: list[int]) -> None:
+    """MAVSDK and QGroundControl put nothing between the pieces."""
+    words = [chr(ord("a") + number % 26) * size for number, size in enumerate(sizes)]
+    assert "".join(split_text(" ".join(words))).split() == words
 
 
 def test_a_long_text_can_be_joined_and_its_pieces_can_be_read_alone() -> None:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The real MAVSDK as a ground station (what QGroundControl does, as far as missions go)."""
 
+import asyncio
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
@@ -163,6 +164,25 @@ async def test_clearing(shared: Bench) -> None:
         until(lambda: shared.board.records() == [], "an empty board")
         # Home is left.
         assert len(await missions.download_mission()) == 1
+
+
+async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
+    """MAVSDK joins the pieces of a STATUSTEXT, as QGroundControl does."""
+    texts: list[str] = []
+    async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(_PATIENCE_S):
+        upload = asyncio.ensure_future(MissionRawAsync(vehicle).upload_mission(raw_items(mixed_plan(20))))
+        async for text in TelemetryAsync(vehicle).subscribe_status_text():
+            texts.append(" ".join(text.text.split()))
+            if texts[-1].startswith("WP 8: Yaw"):
+                break
+        await upload
+    changes = [text for text in texts if text.startswith(("WP 6", "WP 7"))]
+    assert changes == [
+        "WP 6: Time s changed from 700 to 255 (seconds 1..255)",
+        "WP 6: Hit Rad changed from 1 to 2 m (2..255)",
+        "WP 6: Alt changed from 19.5 to 19 m (whole numbers only)",
+        "WP 7: DO_SET_ROI_NONE dropped, no ROI is known from here on",
+    ]
 
 
 async def test_cancelling_keeps_the_list_that_was_there(shared: Bench, kept: list[str]) -> None:
