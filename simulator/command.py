@@ -9,9 +9,9 @@ import click
 from click.core import ParameterSource
 
 from simulator.compiled_core import CORE_CAPACITY, load_core
-from simulator.emulated_naze.command import run_image
 from simulator.fc_kinds import KINDS
 from simulator.flash import ERASED
+from simulator.image_command import run_image
 from simulator.inav_boxes import BOXES
 from simulator.memory_file import open_memory
 from simulator.mission_commands import MissionCommands

@@ -14,55 +14,11 @@ The answer is `ok`, the JSON, or `error: ...`.
 import asyncio
 import json
 from dataclasses import asdict
-from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
-from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
-from simulator.far_end import FarEnd
-from simulator.flight import Craft
-from simulator.options import Counters, Faults
 from simulator.pty_link import PlugError
-
-
-class ControlledBoard(FarEnd, Protocol):
-    """A simulated board with switches and counters."""
-
-    @property
-    def faults(self) -> Faults | EmulatedFaults:
-        """The switches."""
-
-    @property
-    def counters(self) -> Counters | EmulatedCounters:
-        """The event counts so far."""
-
-    @property
-    def armed(self) -> bool:
-        """True if the craft is armed."""
-
-    @property
-    def power(self) -> Enum:
-        """The state of the CPU."""
-
-    @property
-    def protocol(self) -> Enum | None:
-        """The firmware's present protocol; None if it has only one, or does not run."""
-
-    @property
-    def stored_records(self) -> list[bytes]:
-        """The records that survive a power cut."""
-
-    def truth(self, now: float) -> Craft | None:
-        """The craft's true state; None while no firmware runs, and for a board without a simulated flight."""
-
-    def power_on(self, now: float) -> None:
-        """Supply it."""
-
-    def power_off(self, now: float) -> None:
-        """Cut the supply."""
-
-    def reset(self, now: float) -> None:
-        """Pull the CPU's reset line."""
+from simulator.simulated_board import SimulatedBoard
 
 
 class Plug(Protocol):
@@ -81,7 +37,7 @@ class Plug(Protocol):
 class Control:
     """Executes control lines."""
 
-    def __init__(self, board: ControlledBoard, link: Plug, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, board: SimulatedBoard, link: Plug, loop: asyncio.AbstractEventLoop) -> None:
         self._board = board
         self._link = link
         self._loop = loop

@@ -4,18 +4,17 @@
 Simpler than SimulatedNaze: these boards speak only MSP, at one speed.
 """
 
-import random
-from enum import Enum, auto
 from math import ceil, inf
 
 from simulator.flight import Craft
-from simulator.line import disturb
 from simulator.msp_firmware import Boot, BootFirmware, CrashError, MspFirmware
 from simulator.msp_options import MspOptions
 from simulator.msp_port import MspReceiver
 from simulator.msp_v2 import MspReceiverV2
 from simulator.options import Counters, Faults
+from simulator.receive_ring import GATHER_SECONDS
 from simulator.serial_ring import SerialRing
+from simulator.simulated_board import Power, SimulatedBoard
 from simulator.typed_line import TypedLine
 
 _CLI_PROMPT = b"\r\n# "
@@ -28,33 +27,21 @@ _NO_SPEED = 115200
 _ARM_RETRY_S = 0.1
 
 
-class MspPower(Enum):
-    """The state of the CPU. CRASHED and BOOTLOADER end only by a power cycle."""
+class MspBoard(SimulatedBoard):
+    """`eeprom` outlives resets and power cuts."""
 
-    OFF = auto()
-    BOOTING = auto()
-    RUNNING = auto()
-    CLI = auto()
-    CRASHED = auto()
-    BOOTLOADER = auto()
-
-
-class MspBoard:
-    """A board, created without power: see `power_on`. `faults` may be changed and `counters` read at any time.
-
-    `eeprom` outlives resets and power cuts.
-    """
+    faults: Faults
+    counters: Counters
 
     def __init__(
         self, boot: BootFirmware, eeprom: memoryview, options: MspOptions | None = None, faults: Faults | None = None
     ) -> None:
         self.options = options or MspOptions()
+        super().__init__(self.options.boot_ms / 1000, self.options.seed)
         self.faults = faults or Faults()
         self.counters = Counters()
-        self.power = MspPower.OFF
         self._boot_firmware = boot
         self._eeprom = eeprom
-        self._random = random.Random(self.options.seed)
         self._ring = SerialRing(self.options.baud, self.options.ring_size, self.counters)
         self._firmware: MspFirmware | None = None
         self._receiver = MspReceiver()
@@ -73,18 +60,13 @@ class MspBoard:
 
     @property
     def armed(self) -> bool:
-        """True if the craft is armed; `faults.armed` is only the pilot's request."""
+        """True if the craft is armed."""
         return self._firmware is not None and self._firmware.armed
-
-    @property
-    def protocol(self) -> None:
-        """It speaks only MSP."""
-        return None
 
     @property
     def is_alive(self) -> bool:
         """True if its port would exist if the board were a program."""
-        return self.power not in (MspPower.OFF, MspPower.CRASHED, MspPower.BOOTLOADER)
+        return self.power not in (Power.OFF, Power.CRASHED, Power.BOOTLOADER)
 
     @property
     def stored_records(self) -> list[bytes]:
@@ -92,7 +74,7 @@ class MspBoard:
         return self._boot_firmware(self._boot_at(self._next_task)).stored
 
     def truth(self, now: float) -> Craft | None:
-        """The craft's true state; None while no firmware runs."""
+        """The craft's true state."""
         self._run_until(now)
         try:
             return self._firmware.craft_at(now) if self._firmware else None
@@ -100,50 +82,18 @@ class MspBoard:
             self._crash()
             return None
 
-    def power_on(self, now: float) -> None:
-        """Switch the power on; the board boots."""
-        if self.power is MspPower.OFF:
-            self._boot(now)
-
-    def power_on_booted(self, now: float) -> None:
-        """Switch the power on early enough that the board has booted by `now`."""
-        self.power_on(now - self.options.boot_ms / 1000)
-
-    def power_off(self, now: float) -> None:
-        """Cut the power: RAM and bytes in transit are lost."""
-        self._run_until(now)
-        self._ring.clear()
-        self._stop(MspPower.OFF)
-
-    def reset(self, now: float) -> None:
-        """Pull the CPU's reset line: it boots again."""
-        self._run_until(now)
-        if self.power is not MspPower.OFF:
-            self._reset(now)
-
-    def receive(self, data: bytes, now: float) -> None:
-        """Put bytes on the wire to the board."""
-        self._run_until(now)
-        if self.power not in (MspPower.OFF, MspPower.CRASHED):
-            self._ring.receive(self._disturb(data), now)
-
-    def advance(self, now: float) -> bytes:
-        """The frames sent until `now` since the last call."""
-        self._run_until(now)
-        return self._disturb(self._ring.sent(now))
-
     def next_wakeup(self, now: float) -> float:
         """The time for the next call of `advance`; infinity if nothing will happen by itself."""
         due = self._next_event()
         departure = self._ring.next_departure()
         if due is not None and self._firmware:
-            due = max(due, min(self._ring.last_arrival(), due + 0.004))
+            due = max(due, min(self._ring.last_arrival(), due + GATHER_SECONDS))
         return max(now, min(inf if due is None else due, inf if departure is None else departure))
 
     # -- time ------------------------------------------------------------------------------------------------
 
     def _next_event(self) -> float | None:
-        if self.power is MspPower.BOOTING:
+        if self.power is Power.BOOTING:
             return self._boots_at
         firmware = self._firmware
         if firmware is None or self.faults.hang:
@@ -151,7 +101,7 @@ class MspBoard:
         wanted = [self._ring.next_arrival()]
         if self.faults.armed != firmware.armed:
             wanted.append(self._next_look)
-        if self._pending and self.power is MspPower.RUNNING:
+        if self._pending and self.power is Power.RUNNING:
             wanted.append(self._last_byte + (firmware.habits.cli_guard_s or 0.0))
         earliest = min((at for at in wanted if at is not None), default=None)
         return None if earliest is None else self._task_at(earliest)
@@ -162,7 +112,7 @@ class MspBoard:
 
     def _run_until(self, now: float) -> None:
         while (at := self._next_event()) is not None and at <= now:
-            if self.power is MspPower.BOOTING:
+            if self.power is Power.BOOTING:
                 self._start(at)
             else:
                 self._run_task(at)
@@ -171,34 +121,38 @@ class MspBoard:
             self._next_task = self._task_at(now) + self.options.serial_task_ms / 1000
 
     def _start(self, at: float) -> None:
-        self._ring.arrive(at)
-        while self._ring.read() is not None:
-            """Data received during the boot is lost."""
-        self.power = MspPower.RUNNING
+        self._ring.discard_arrived(at)
+        self.power = Power.RUNNING
         self._firmware = self._boot_firmware(self._boot_at(at))
         habits = self._firmware.habits
         self._receiver = (MspReceiverV2 if habits.speaks_v2 else MspReceiver)(habits.buffer_size)
         self._pending = None
         self._next_task = self._next_look = self._last_byte = at
 
-    def _reset(self, now: float) -> None:
-        self.counters.resets += 1
-        self._boot(now)
-
     def _boot(self, now: float) -> None:
-        self._stop(MspPower.BOOTING)
-        self._boots_at = now + self.options.boot_ms / 1000
+        self._stop(Power.BOOTING)
+        self._boots_at = now + self._boot_s
 
     def _boot_at(self, at: float) -> Boot:
         return Boot(self.options, self.faults, self.counters, self._eeprom, at)
 
     def _crash(self) -> None:
         self.counters.crashes += 1
-        self._stop(MspPower.CRASHED)
+        self._stop(Power.CRASHED)
 
-    def _stop(self, power: MspPower) -> None:
+    def _cut_power(self) -> None:
+        self._ring.power_off()
+        self._stop(Power.OFF)
+
+    def _stop(self, power: Power) -> None:
         self._firmware = None
         self.power = power
+
+    def _hear(self, data: bytes, now: float) -> None:
+        self._ring.receive(data, now)
+
+    def _take_sent(self, now: float) -> bytes:
+        return self._ring.sent(now)
 
     # -- one run of the serial task --------------------------------------------------------------------------
 
@@ -208,7 +162,7 @@ class MspBoard:
         self._busy = 0.0
         try:
             firmware.follow_pilot(at)
-            if self.power is MspPower.CLI:
+            if self.power is Power.CLI:
                 self._serve_cli(at)
             elif self._ring.arrive(at):
                 self._last_byte = at
@@ -224,7 +178,7 @@ class MspBoard:
 
     def _serve_msp(self, firmware: MspFirmware, at: float) -> None:
         """Read until a request is complete: one each time."""
-        while (byte := self._ring.read()) is not None:
+        while (byte := self._ring.read(at)) is not None:
             is_frames = self._receiver.in_frame or byte == ord("$")
             request = self._receiver.push(byte)
             if request:
@@ -243,17 +197,16 @@ class MspBoard:
 
     def _serve_letter(self, at: float) -> None:
         if self._pending == "#":
-            self.power = MspPower.CLI
+            self.power = Power.CLI
             self._typed = TypedLine(_CLI_LINE_SIZE)
             self.counters.cli_entered = True
             self._ring.write(_CLI_BANNER, at)
         else:
             self.counters.bootloader_entered = True
-            self._stop(MspPower.BOOTLOADER)
+            self._stop(Power.BOOTLOADER)
 
     def _serve_cli(self, at: float) -> None:
-        self._ring.arrive(at)
-        while (byte := self._ring.read()) is not None:
+        while (byte := self._ring.read(at)) is not None:
             echo, line = self._typed.type(byte)
             self._ring.write(echo, at)
             if line == "exit":
@@ -262,6 +215,3 @@ class MspBoard:
                 return
             if line is not None:
                 self._ring.write(_UNKNOWN_COMMAND + _CLI_PROMPT, at)
-
-    def _disturb(self, data: bytes) -> bytes:
-        return disturb(data, self.faults.lost_byte_rate, self.faults.bit_error_rate, self._random)

@@ -5,38 +5,30 @@ Time is passed in (seconds of any monotonic clock). Events between two calls are
 late call changes only the time at which bytes are collected.
 """
 
-import random
-from enum import Enum, auto
 from math import inf
 
 from protocols.wp_record import RECORD_SIZE
 from simulator.firmware import Firmware, Protocol, ResetError
 from simulator.flash import ERASED, NorFlash, PowerCutError
 from simulator.flight import Craft
-from simulator.line import disturb
 from simulator.mission_commands import MissionCommands
 from simulator.mission_slots import flash_size
 from simulator.missions import Board, BootMissions
 from simulator.options import Counters, Faults, SimOptions
-from simulator.traps import HazardWatch
-from simulator.uart import GATHER_SECONDS, Uart
+from simulator.receive_ring import GATHER_SECONDS
+from simulator.simulated_board import Power, SimulatedBoard
+from simulator.uart import Uart
 
 
-class Power(Enum):
-    """The state of the CPU."""
+class SimulatedNaze(SimulatedBoard):
+    """A Naze32 with Harakiri.
 
-    OFF = auto()
-    BOOTING = auto()
-    RUNNING = auto()
-    CLI = auto()
-
-
-class SimulatedNaze:
-    """A Naze32 with Harakiri, created without power: see `power_on`.
-
-    `faults` may be changed and `counters` read at any time. `memory` is the flash chip, of `flash_size(options)` bytes;
-    without it the board has a blank one of its own. `boot_missions` makes the mission extension, at every boot.
+    `memory` is the flash chip, of `flash_size(options)` bytes; without it the board has a blank one of its own.
+    `boot_missions` makes the mission extension, at every boot.
     """
+
+    faults: Faults
+    counters: Counters
 
     def __init__(
         self,
@@ -46,6 +38,7 @@ class SimulatedNaze:
         boot_missions: BootMissions = MissionCommands,
     ) -> None:
         self.options = options or SimOptions()
+        super().__init__(self.options.boot_ms / 1000, self.options.seed)
         self.faults = faults or Faults()
         self.counters = Counters()
         if memory is None:
@@ -53,10 +46,8 @@ class SimulatedNaze:
         self._flash = NorFlash(memory, self.faults)
         self._boot_missions = boot_missions
         self._uart = Uart(self.options.baud, self.counters, self.options.tree.value)
-        self._random = random.Random(self.options.seed)
-        self._hazards = HazardWatch()
-        # No firmware while the board boots, and no boot time while it has no power.
-        self._boots_at: float | None = None
+        self._boots_at = 0.0
+        # None while the board boots or has no power.
         self._firmware: Firmware | None = None
 
     @property
@@ -65,24 +56,17 @@ class SimulatedNaze:
         return self._uart.baud
 
     @property
-    def power(self) -> Power:
-        """The state of the CPU."""
-        if self._firmware:
-            return Power.CLI if self._firmware.in_cli else Power.RUNNING
-        return Power.OFF if self._boots_at is None else Power.BOOTING
-
-    @property
     def protocol(self) -> Protocol | None:
-        """The firmware's present protocol; None while no firmware runs."""
+        """The firmware's present protocol."""
         return self._firmware.protocol if self._firmware else None
 
     @property
     def armed(self) -> bool:
-        """True if the craft is armed; `faults.armed` is only the pilot's request."""
+        """True if the craft is armed."""
         return self._firmware is not None and self._firmware.armed
 
     def truth(self, now: float) -> Craft | None:
-        """The craft's true state, which only the simulation knows; None while no firmware runs."""
+        """The craft's true state, which only the simulation knows."""
         self._run_until(now)
         return self._firmware.craft_at(now) if self._firmware else None
 
@@ -102,39 +86,6 @@ class SimulatedNaze:
         """The number of erases and programs so far."""
         return self._flash.operations
 
-    def power_on(self, now: float) -> None:
-        """Switch the power on; the board boots."""
-        if self.power is Power.OFF:
-            self._boot(now)
-
-    def power_on_booted(self, now: float) -> None:
-        """Switch the power on early enough that the board has booted by `now`."""
-        self.power_on(now - self.options.boot_ms / 1000)
-
-    def power_off(self, now: float) -> None:
-        """Cut the power: RAM and bytes in transit are lost, flash is kept."""
-        self._run_until(now)
-        self._cut_power()
-
-    def reset(self, now: float) -> None:
-        """Pull the CPU's reset line: it boots again."""
-        self._run_until(now)
-        if self.power is not Power.OFF:
-            self._reset(now)
-
-    def receive(self, data: bytes, now: float) -> None:
-        """Put bytes on the wire to the RX pin; they arrive at line rate."""
-        self._run_until(now)
-        data = self._disturb(data)
-        self.counters.hazard_runs += self._hazards.runs_in(data)
-        if self.power is not Power.OFF:
-            self._uart.receive(data, now)
-
-    def advance(self, now: float) -> bytes:
-        """The bytes sent from the TX pin until `now` since the last call."""
-        self._run_until(now)
-        return self._disturb(self._uart.transmitted(now))
-
     def next_wakeup(self, now: float) -> float:
         """The time for the next call of `advance`; infinity if nothing will happen by itself.
 
@@ -149,7 +100,7 @@ class SimulatedNaze:
 
     def _next_event(self) -> float | None:
         """The next time that the CPU has work to do."""
-        if self.faults.hang:
+        if self.faults.hang or self.power is Power.OFF:
             return None
         return self._firmware.next_loop() if self._firmware else self._boots_at
 
@@ -164,30 +115,34 @@ class SimulatedNaze:
                 self._firmware = Firmware(
                     self.options, self.faults, self.counters, self._uart, self._flash, self._boot_missions, at
                 )
+                self.power = Power.RUNNING
         if self._firmware and self.faults.hang:
             self._firmware.hold(now)
 
     def _run_loop(self, firmware: Firmware, at: float) -> None:
         try:
             firmware.run_loop(at)
+            if firmware.in_cli:
+                self.power = Power.CLI
         except PowerCutError:
             self._cut_power()
         except ResetError:
             self._reset(at)
 
-    def _reset(self, now: float) -> None:
-        self.counters.resets += 1
-        self._boot(now)
-
     def _boot(self, now: float) -> None:
+        self.power = Power.BOOTING
         self._firmware = None
-        self._boots_at = now + self.options.boot_ms / 1000
+        self._boots_at = now + self._boot_s
         self._uart.set_baud(self.options.baud, now)
 
     def _cut_power(self) -> None:
-        self._firmware = self._boots_at = None
+        self.power = Power.OFF
+        self._firmware = None
         self._flash.take_busy_seconds()
         self._uart.power_off()
 
-    def _disturb(self, data: bytes) -> bytes:
-        return disturb(data, self.faults.lost_byte_rate, self.faults.bit_error_rate, self._random)
+    def _hear(self, data: bytes, now: float) -> None:
+        self._uart.receive(data, now)
+
+    def _take_sent(self, now: float) -> bytes:
+        return self._uart.transmitted(now)

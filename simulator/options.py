@@ -55,49 +55,67 @@ class SimOptions:
 
 
 @dataclass(slots=True, kw_only=True)
-class Faults:
-    """Switches that may be changed at any time.
+class BoardFaults:
+    """Switches of any board that may be changed at any time.
 
-    The rates are probabilities per bit and per byte, in both directions. `armed` is the pilot's request: the firmware
-    refuses it while a configuration write is scheduled. `boxes`: the other switches, one bit for each of BOXNAMES.
-    `extension` takes effect at the next boot. Without `msp` only MAVLink is answered. The power fails during the
-    given flash operation from now on (page erases and 16-byte programs, from 1; 0: never), or so many of them fail.
-    `arming_blockers`: INAV's arming flags (runtime_config.h). `stick_loads`: the number of times the pilot has loaded
-    the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none.
+    The rates are probabilities per bit and per byte, in both directions. `hang`: the CPU stops. `armed` is the
+    pilot's request, which the firmware may refuse. The power fails during the given flash operation from now on (page
+    erases and 16-byte programs, or half-words on the emulated Naze, from 1; 0: never), or so many of them fail.
     """
 
     bit_error_rate: float = 0.0
     lost_byte_rate: float = 0.0
     hang: bool = False
     armed: bool = False
+    power_cut_at_flash_operation: int = 0
+    flash_failures: int = 0
+
+
+@dataclass(slots=True, kw_only=True)
+class Faults(BoardFaults):
+    """Switches of a simulated firmware.
+
+    `boxes`: the pilot's switches except ARM, one bit for each of BOXNAMES. `busy`: a configuration write is scheduled.
+    `extension` takes effect at the next boot. Without `msp` only MAVLink is answered.
+    `arming_blockers`: INAV's arming flags (runtime_config.h). `stick_loads`: the number of times the pilot has loaded
+    the saved missions with the sticks. `selected_mission`: the pilot's selection; 0: none.
+    """
+
     boxes: int = 1
     busy: bool = False
     extension: bool = True
     msp: bool = True
-    power_cut_at_flash_operation: int = 0
-    flash_failures: int = 0
     arming_blockers: int = 0
     stick_loads: int = 0
     selected_mission: int = 0
 
 
-@dataclass(slots=True)
-class Counters:
-    """Event counts since the board was created.
+@dataclass(slots=True, kw_only=True)
+class BoardCounters:
+    """Event counts of any board since it was created.
 
     hazard_runs: three equal hazard bytes in a row on the RX pin, acted on or not.
-    rx_overflows, tx_overflows: rings overrun while the firmware ran.
-    max_outstanding_reply_bytes: of the 255 that the TX ring holds.
-    cli_entered, bootloader_entered, crashes: entries into states that only a reset ends.
-    flash_writes: mission lists ever made valid in this flash, as of the last mission command.
+    bootloader_entered, crashes: entries into states that only the reset line or a power cycle ends.
     """
 
     hazard_runs: int = 0
+    resets: int = 0
+    bootloader_entered: bool = False
+    crashes: int = 0
+
+
+@dataclass(slots=True, kw_only=True)
+class Counters(BoardCounters):
+    """Event counts of a simulated firmware.
+
+    rx_overflows, tx_overflows: rings overrun while the firmware ran.
+    max_outstanding_reply_bytes: of the 255 that the TX ring holds.
+    cli_entered: into a state that only a reset ends.
+    flash_writes: mission lists ever made valid in this flash, as of the last mission command.
+    """
+
     rx_overflows: int = 0
     tx_overflows: int = 0
     max_outstanding_reply_bytes: int = 0
     cli_entered: bool = False
-    bootloader_entered: bool = False
-    crashes: int = 0
-    resets: int = 0
     flash_writes: int = 0

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import click
 
-from simulator.control import Control, ControlledBoard, Plug
+from simulator.control import Control, Plug
 from simulator.pty_link import PlugError, PtyLink
+from simulator.simulated_board import SimulatedBoard
 from simulator.tcp_link import SimTcpLink
 
 
@@ -28,7 +29,7 @@ class Running:
     power_cut_after: float | None = None
 
 
-async def run_board(board: ControlledBoard, name: str, running: Running, is_alive: Callable[[], bool]) -> None:
+async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive: Callable[[], bool]) -> None:
     """Run it. click.ClickException if its link or address is not available."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()

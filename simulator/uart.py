@@ -4,27 +4,16 @@
 from collections import deque
 
 from simulator.options import Counters
-
-_BITS_PER_BYTE = 10
-# Times are floats in seconds: with this tolerance a byte that ends exactly now has ended.
-_EPSILON_BYTES = 1e-3
-#: The time that a finished frame may wait for the next one, to save wake-ups at both ends.
-GATHER_SECONDS = 0.004
+from simulator.receive_ring import EPSILON_BYTES, GATHER_SECONDS, ReceiveRing
 
 
-class Uart:
+class Uart(ReceiveRing):
     """Bytes on their way in (`receive` to `read`) and out (`write` to `transmitted`)."""
 
     def __init__(self, baud: int, counters: Counters, ring_size: int = 256) -> None:
+        super().__init__(baud, ring_size, counters)
         self.baud = baud
-        self._counters = counters
-        self._size = ring_size
-        self._byte_time = _BITS_PER_BYTE / baud
-        # Incoming: bytes on the wire, as (time of the first start bit, bytes).
-        self._wire: deque[tuple[float, bytes]] = deque()
-        self._wire_free_at = 0.0
-        self._unread = bytearray()
-        # Outgoing: the ring, the running DMA transfer, and the end of each written burst.
+        # The ring, the running DMA transfer, and the end of each written burst.
         self._ring = bytearray(ring_size)
         self._head = 0
         self._tail = 0
@@ -38,81 +27,20 @@ class Uart:
         """Reinitialise the UART, as the firmware does on arming: the rings are cleared."""
         self._transmit(now)
         self.baud = baud
-        self._byte_time = _BITS_PER_BYTE / baud
+        self._set_speed(baud)
         self._unread.clear()
-        self._dma_left = 0
-        self._head = self._tail
-        self._burst_ends.clear()
+        self._drop_unsent()
 
     def power_off(self) -> None:
         """Drop all bytes in transit."""
-        self._wire.clear()
-        self._wire_free_at = 0.0
-        self._unread.clear()
+        super().power_off()
+        self._drop_unsent()
+        self._sent.clear()
+
+    def _drop_unsent(self) -> None:
         self._dma_left = 0
         self._head = self._tail
         self._burst_ends.clear()
-        self._sent.clear()
-
-    # -- incoming --------------------------------------------------------------------------------------------
-
-    def receive(self, data: bytes, now: float) -> None:
-        """Put bytes on the RX wire, behind those already there."""
-        if not data:
-            return
-        start = max(now, self._wire_free_at)
-        self._wire.append((start, data))
-        self._wire_free_at = start + len(data) * self._byte_time
-
-    def next_arrival(self) -> float | None:
-        """The arrival time of the next unread byte; in the past if it is in the ring."""
-        if self._unread:
-            return 0.0
-        return self._wire[0][0] + self._byte_time if self._wire else None
-
-    def last_arrival(self) -> float:
-        """The arrival time of the last byte on the wire."""
-        return self._wire_free_at
-
-    def discard_arrived(self, now: float) -> None:
-        """Drop bytes that arrived until `now`, while no receiver was running."""
-        self._leave_wire(now)
-        self._unread.clear()
-
-    def keep_arrived(self, now: float) -> None:
-        """Keep bytes that arrived unread until `now`; an overrun is then not counted against the client."""
-        self._leave_wire(now)
-        self._drop_lapped()
-
-    def read(self, now: float) -> int | None:
-        """The next unread byte; None if there is none."""
-        self._arrive(now)
-        return self._unread.pop(0) if self._unread else None
-
-    def _arrive(self, now: float) -> None:
-        self._leave_wire(now)
-        if len(self._unread) >= self._size:
-            # The DMA has overrun the reader, which sees only the distance between the two positions.
-            self._counters.rx_overflows += 1
-            self._drop_lapped()
-
-    def _drop_lapped(self) -> None:
-        if len(self._unread) >= self._size:
-            del self._unread[: len(self._unread) - len(self._unread) % self._size]
-
-    def _leave_wire(self, now: float) -> None:
-        while self._wire:
-            start, data = self._wire[0]
-            count = min(int((now - start) / self._byte_time + _EPSILON_BYTES), len(data))
-            if count <= 0:
-                break
-            self._unread += data[:count]
-            if count == len(data):
-                self._wire.popleft()
-            else:
-                self._wire[0] = (start + count * self._byte_time, data[count:])
-
-    # -- outgoing --------------------------------------------------------------------------------------------
 
     def write(self, data: bytes, now: float) -> None:
         """Put bytes into the TX ring, which overwrites unsent bytes without a check."""
@@ -161,7 +89,7 @@ class Uart:
 
     def _transmit(self, now: float) -> None:
         while self._dma_left:
-            count = min(int((now - self._dma_time) / self._byte_time + _EPSILON_BYTES), self._dma_left)
+            count = min(int((now - self._dma_time) / self._byte_time + EPSILON_BYTES), self._dma_left)
             if count <= 0:
                 return
             self._sent += self._ring[self._dma_at : self._dma_at + count]

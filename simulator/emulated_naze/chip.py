@@ -18,6 +18,7 @@ from simulator.emulated_naze.nvic import Irq, Nvic
 from simulator.emulated_naze.pace import Pace
 from simulator.emulated_naze.ppm import PpmReceiver
 from simulator.emulated_naze.rcc import Rcc
+from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 from simulator.emulated_naze.system_control import SystemControl
 from simulator.emulated_naze.systick import SysTick
 from simulator.emulated_naze.timer import Timer
@@ -51,7 +52,9 @@ class Chip:
     What the firmware writes to must begin in a page (of `_MAP_PAGE`) of its own: the program's pages are read only.
     """
 
-    def __init__(self, flash: memoryview, program_size: int, seed: int) -> None:
+    def __init__(
+        self, flash: memoryview, program_size: int, faults: EmulatedFaults, counters: EmulatedCounters, seed: int
+    ) -> None:
         self.flash = flash
         self._random = random.Random(seed)
         self.clock = Clock()
@@ -63,7 +66,7 @@ class Chip:
         self.cpu = Cpu(self.clock, nvic, lambda: rcc.core_hz, self._vectors)
         self._bus = Bus(self._pace)
         self.dma = Dma(self.cpu, nvic)
-        self.flash_controller = FlashController(flash, self._stall, self._random)
+        self.flash_controller = FlashController(flash, self._stall, self._random, faults, counters)
         self.usart1 = Usart(self.clock, nvic, Irq.USART1, lambda: rcc.apb2_hz, self.dma.channel(5), self.dma.channel(4))
         self.usart2 = Usart(self.clock, nvic, Irq.USART2, lambda: rcc.apb1_hz)
         self.i2c2 = I2c(

@@ -5,6 +5,7 @@ import random
 from collections.abc import Callable
 
 from simulator.emulated_naze.image import FLASH_BASE, FLASH_SIZE
+from simulator.emulated_naze.switches import EmulatedCounters, EmulatedFaults
 
 PAGE_SIZE = 1024
 _KEYR, _SR, _CR, _AR, _OBR, _WRPR = 0x04, 0x0C, 0x10, 0x14, 0x1C, 0x20
@@ -23,28 +24,27 @@ class FlashController:
     An operation is a page erased or a half-word programmed. `tear` decides what a power cut leaves behind of one.
     """
 
-    def __init__(self, memory: memoryview, stall: Callable[[int], None], tear: random.Random) -> None:
+    def __init__(
+        self,
+        memory: memoryview,
+        stall: Callable[[int], None],
+        tear: random.Random,
+        faults: EmulatedFaults,
+        counters: EmulatedCounters,
+    ) -> None:
         self._memory = memory
         self._stall = stall
         self._tear = tear
-        #: Operations until the power goes, counting the one in which it does; 0: never.
-        self.cut_after = 0
-        #: So many operations from now fail.
-        self.failures = 0
+        self._faults = faults
+        self._counters = counters
         #: Called in the middle of the operation in which the power goes.
         self.on_power_cut: Callable[[], None] = lambda: None
-        self.erases = self.programs = 0
         self.reset()
 
     def reset(self) -> None:
         """Locked."""
         self._control = _LOCK
         self._status = self._address = self._keys = 0
-
-    @property
-    def operations(self) -> int:
-        """Pages erased and half-words programmed so far."""
-        return self.erases + self.programs
 
     def read(self, offset: int) -> int:
         """A word."""
@@ -94,7 +94,7 @@ class FlashController:
         if not 0 <= at < FLASH_SIZE:
             self._status |= _PROTECTION_ERROR
             return
-        self.erases += 1
+        self._counters.flash_erases += 1
         if self._loses_power():
             self._tear_page(at)
             self.on_power_cut()
@@ -108,7 +108,7 @@ class FlashController:
         if not self._control & _PG or size != 2 or at % 2:
             self._status |= _PROGRAM_ERROR
             return
-        self.programs += 1
+        self._counters.flash_programs += 1
         present = int.from_bytes(self._memory[at : at + 2], "little")
         if self._loses_power():
             kept = self._tear.getrandbits(16)
@@ -122,10 +122,10 @@ class FlashController:
             self._stall(_PROGRAM_NS)
 
     def _loses_power(self) -> bool:
-        if not self.cut_after:
+        if not self._faults.power_cut_at_flash_operation:
             return False
-        self.cut_after -= 1
-        return not self.cut_after
+        self._faults.power_cut_at_flash_operation -= 1
+        return not self._faults.power_cut_at_flash_operation
 
     def _tear_page(self, at: int) -> None:
         """Leave what an erase that is cut short may leave: the old page, a blank one, or any mixture."""
@@ -139,8 +139,8 @@ class FlashController:
                 page[:] = bytes(0xFF if self._tear.getrandbits(1) else byte for byte in page)
 
     def _fails(self) -> bool:
-        if not self.failures:
+        if not self._faults.flash_failures:
             return False
-        self.failures -= 1
+        self._faults.flash_failures -= 1
         self._status |= _PROGRAM_ERROR
         return True

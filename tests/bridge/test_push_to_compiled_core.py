@@ -14,8 +14,9 @@ from protocols.mission_item import MissionItem, MissionResult
 from simulator.compiled_core import load_core
 from simulator.flash import ERASED
 from simulator.mission_slots import flash_size
-from simulator.naze import Power, SimulatedNaze
+from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions
+from simulator.simulated_board import Power
 from tests.support.c_core import library
 from tests.support.conversations import records_of, waypoints
 from tests.support.world import World

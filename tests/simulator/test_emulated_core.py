@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from simulator.emulated_naze.board import EmulatedPower
+from simulator.simulated_board import Power
 from tests.support.table_program import RAM, Rig, Steps
 
 RCC_CR, RCC_CFGR, RCC_CSR = 0x4002_1000, 0x4002_1004, 0x4002_1024
@@ -83,7 +83,7 @@ def test_only_with_its_key_is_a_reset_granted() -> None:
 
 def test_code_that_goes_astray_stops_the_board(caplog: pytest.LogCaptureFixture) -> None:
     rig = Rig(Steps().load(0x6000_0000)).run(0.001)
-    assert rig.board.power is EmulatedPower.CRASHED
+    assert rig.board.power is Power.CRASHED
     assert rig.board.counters.crashes == 1
     assert "the core has crashed" in caplog.text
     rig.board.power_off(rig.now)

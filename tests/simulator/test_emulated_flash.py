@@ -3,7 +3,7 @@
 
 import pytest
 
-from simulator.emulated_naze.board import EmulatedPower
+from simulator.simulated_board import Power
 from tests.support.table_program import FLASH, RAM, Rig, Steps
 
 KEYR, SR, CR, AR = 0x4002_2004, 0x4002_200C, 0x4002_2010, 0x4002_2014
@@ -63,7 +63,7 @@ def test_power_goes_in_the_middle_of_an_operation(operation: int) -> None:
     rig = Rig(steps, flash=flash)
     rig.board.faults.power_cut_at_flash_operation = operation
     rig.run(0.1)
-    assert rig.board.power is EmulatedPower.OFF
+    assert rig.board.power is Power.OFF
     assert rig.board.flash_operations == operation
     # The half-words programmed before are whole, those after were not started.
     done = 2 * max(operation - 2, 0)

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.msp.frame import request
-from simulator.msp_board import MspPower
 from simulator.msp_options import MspOptions
 from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
 from simulator.options import Faults
+from simulator.simulated_board import Power
 from tests.support.msp_bench import GETINFO, LOAD, SAVE, SET_WP, WP, MspBench, waypoint
 
 VERSIONS = ("6.1.1", "7.1.2", "8.0.1", "9.0.1", "9.1.0")
@@ -192,7 +192,7 @@ def test_a_jump_to_nowhere_is_acknowledged_and_kills_the_board(version: str, p1:
     bench.upload(THREE)
     bench.write(1, waypoint(0))
     bench.write(2, waypoint(action=Action.JUMP, p1=p1))
-    assert bench.board.power is MspPower.CRASHED
+    assert bench.board.power is Power.CRASHED
     assert not bench.board.is_alive
     assert bench.ask(GETINFO, timeout=5.0) is None
     bench.restart()

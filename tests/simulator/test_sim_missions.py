@@ -30,8 +30,8 @@ from protocols.msp.mission import (
     encode_read,
 )
 from protocols.wp_record import WpRecord
-from simulator.naze import Power
 from simulator.options import Faults, SimOptions
+from simulator.simulated_board import Power
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 NOTHING = ListIdentity(0, 0)

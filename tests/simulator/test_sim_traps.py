@@ -7,8 +7,8 @@ from protocols.mission_record import identify
 from protocols.msp.frame import request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk
 from simulator.firmware import Protocol
-from simulator.naze import Power
 from simulator.options import Faults, SimOptions, TelemetryProtocol
+from simulator.simulated_board import Power
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 IDENT = request(100)

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A client at the UART of an emulated board with a real image, and a clock that only the test moves."""
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Sequence
 
+from protocols.mission_record import ListIdentity, identify, pack_records
 from protocols.msp.frame import request
-from simulator.emulated_naze.board import EmulatedNaze, EmulatedPower
+from protocols.wp_record import WpRecord
+from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image
 from simulator.msp_port import HarakiriCommand
+from simulator.simulated_board import Power
 from tests.support.naze_bench import WireBench
 
 #: Puts a name and a value into the table at the end.
@@ -16,6 +20,9 @@ IDENT = request(HarakiriCommand.IDENT)
 _DEAF_S = 0.6
 _LONGEST_BOOT_S = 12.0
 _CALIBRATION_S = 15.0
+#: harakiri_mission.c's nm_t (a link-time optimizer appends to the name), and where it has the stored list's identity.
+_CORE, _STORED_AT = "mission", 8
+_CFG_SIZE = 3 * 1024
 _WRITE_PENDING = "ScheduleEEPROMwriteMS"
 
 
@@ -45,7 +52,14 @@ class RealBench(WireBench):
 
     @property
     def is_off(self) -> bool:
-        return self.naze.power is EmulatedPower.OFF
+        return self.naze.power is Power.OFF
+
+    def has_loaded(self, records: Sequence[WpRecord]) -> bool:
+        """True if this is the list in the firmware's RAM: in its configuration, and in the core's nm_t.stored."""
+        address = next(at for name, at in self.image.symbols.items() if name.split(".")[0] == _CORE)
+        checksum, count = struct.unpack("<IH", self.naze.peek(address + _STORED_AT, 6))
+        in_configuration = pack_records(records) in self.naze.peek(self.image.symbols["cfg"], _CFG_SIZE)
+        return in_configuration and ListIdentity(count, checksum) == identify(records)
 
     def arm(self, armed: bool = True) -> None:
         """Let the pilot do it, with the sticks."""
