@@ -54,11 +54,11 @@ test: $(VENV)/.test-ready
 	@$(BROWSER) || { $(call INSTALL,$(BROWSER_PACKAGES)); } || true
 	@$(BROWSER) || echo 'The status page: NOT TESTED in a browser: none here (apt-get install $(BROWSER_PACKAGES))'
 	@command -v systemd-analyze >/dev/null || { $(call INSTALL,systemd); } || true
+	@$(MAKE) -s -C firmware tools
 	@$(BARE_ROOT) || echo 'The Debian package: NOT INSTALLED anywhere: no namespaces can be made here'
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder \
 	    $$($(BROWSER) || echo --ignore=tests/web/test_web_page.py) \
 	    $$($(BARE_ROOT) || echo --deselect=$(IN_BARE_ROOT)) $(ARGS)
-	$(if $(ARGS),,$(MAKE) -C firmware test)
 
 lint: $(VENV)/.test-ready
 	$(BIN)/ruff check

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mission core's own tests, built and run as `make -C firmware test` does, and a short run of its fuzzer."""
+"""Everything that `make -C firmware test` builds and runs, and a short run of the core's fuzzer."""
 
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,24 +10,25 @@ import pytest
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 
+# A busy machine takes its time for 220,000 power cuts under sanitizers.
+pytestmark = pytest.mark.timeout(600)
+
+
 def make(*arguments: str) -> str:
-    """Run make in firmware/ and return what it printed; empty if the tools for it are not on this machine."""
+    """Run make in firmware/ and return what it printed; skip the test if the tools for it are not on this machine."""
     run = subprocess.run(["make", "-s", "-C", FIRMWARE, "APT=no", *arguments], capture_output=True, text=True)
     printed = run.stdout + run.stderr
     assert run.returncode == 0, printed
     if "NOT RUN" in printed:
-        sys.stderr.write(printed)
-        assert "apt-get install" in printed
-        return ""
+        pytest.skip(printed.strip())
     return printed
 
 
-# Two of the eight variants that `make -C firmware test` runs hold every compiler, standard and word size.
-@pytest.mark.parametrize("variant", ["gcc-c99-32", "clang-c11-64"])
-def test_core_survives_every_power_cut_under_sanitizers(variant: str) -> None:
-    printed = make(variant)
-    if not printed:
-        return
+@pytest.mark.parametrize("bits", [64, 32])
+@pytest.mark.parametrize("standard", ["c99", "c11"])
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_core_survives_every_power_cut_under_sanitizers(compiler: str, standard: str, bits: int) -> None:
+    printed = make(f"{compiler}-{standard}-{bits}")
     cuts = re.findall(r"(\d+) of (\d+)", printed)
     assert len(cuts) == 2
     assert all(whole == all_ for whole, all_ in cuts)
@@ -38,8 +38,6 @@ def test_core_survives_every_power_cut_under_sanitizers(variant: str) -> None:
 
 def test_core_on_an_emulated_cortex_m3() -> None:
     printed = make("test-arm")
-    if not printed:
-        return
     stack = re.search(r"(\d+) bytes at most", printed)
     assert stack is not None
     assert int(stack[1]) <= 256
@@ -49,8 +47,6 @@ def test_core_on_an_emulated_cortex_m3() -> None:
 def test_core_stays_small() -> None:
     """The budget is for the whole patch, 4 KB of flash; the core must leave room for Harakiri's side of it."""
     printed = make("size")
-    if not printed:
-        return
     sizes = re.search(r"^\s*(\d+)\s+(\d+)\s+(\d+)\s", printed, re.MULTILINE)
     assert sizes is not None
     text, data, bss = map(int, sizes.groups())
@@ -59,8 +55,7 @@ def test_core_stays_small() -> None:
 
 
 def test_fuzzer_finds_nothing_in_a_few_seconds() -> None:
-    printed = make("fuzz", "FUZZ_SECONDS=5")
-    assert not printed or "stat::number_of_executed_units" in printed
+    assert "stat::number_of_executed_units" in make("fuzz", "FUZZ_SECONDS=5")
 
 
 @pytest.mark.parametrize(("pages", "compiles"), [(128, True), (64, False)])
