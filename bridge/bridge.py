@@ -187,9 +187,9 @@ class Bridge:
             self.runner.next_deadline(),
             self._uploads.next_deadline(),
             self.ground.next_deadline(),
-            self._announcer.next_deadline(),
-            self._watch.next_deadline(),
-            self._vehicle.next_deadline() if self._is_represented else inf,
+            self._announcer.due,
+            self._watch.due,
+            self._vehicle.due if self._is_represented else inf,
         )
 
     # Between the parts.
@@ -226,12 +226,13 @@ class Bridge:
 
     def _pass_on_news(self, now: float) -> None:
         self.report.now = now
-        if self.report.is_watched:
+        if self.report.watched:
             self.session.settle_telemetry()
         news = self.session.vehicle.take_news()
         if not news:
             return
-        self.report.heard(news)
+        if self.report.watched:
+            self.report.heard(news)
         if self._is_represented:
             self._vehicle.heard(news, now)
         if FlightState in news:

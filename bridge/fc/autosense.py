@@ -61,12 +61,16 @@ class Spoken(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The result, and the evidence in words. `speed` in baud, None if the line has none; `heard`: a MAVLink frame."""
+    """The result, and the evidence in words. `speed` in baud, None if the line has none; `heard`: a MAVLink frame.
+
+    `pending`: replies that the board may still owe to the search.
+    """
 
     spoken: Spoken
     speed: int | None
     why: str
     heard: MavlinkFrame | None = None
+    pending: PendingReplies = field(default_factory=PendingReplies)
 
 
 def visit_order(
@@ -228,4 +232,4 @@ class Autosense:
 
     def _conclude(self, spoken: Spoken, why: str) -> None:
         self.phase = Phase.FOUND
-        self.found = Found(spoken, self.speed, why, self._visit.heartbeat)
+        self.found = Found(spoken, self.speed, why, self._visit.heartbeat, self.pending)

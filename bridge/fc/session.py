@@ -6,46 +6,35 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
+from bridge.fc.autosense import Found, Spoken
 from bridge.fc.profile import FlightController, Profile
-from bridge.fc.states.base import Closed, State
+from bridge.fc.states.base import Closed, Event, Identified, Lost, Port, PortClosed, PortOpened, State
 from bridge.fc.states.cli import Cli
-from bridge.fc.states.events import (
-    CliFound,
-    Event,
-    FrskyFound,
-    Identified,
-    Lost,
-    MavlinkFound,
-    MspFound,
-    PortClosed,
-    PortOpened,
-)
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.msp import Identifying, MspLine, Polling
-from bridge.fc.states.port import Port
 from bridge.fc.states.searching import Searching
 from bridge.line.msp_link import MspLink
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
-from bridge.model.events import EventLog, Incidents
+from bridge.model.events import EventLog, Incidents, Level
 from bridge.model.vehicle import Vehicle
 from protocols.mavlink.frame import MavlinkFrame
 
-#: State -> event -> next state. Any other event in a state is a bug.
-TRANSITIONS: Mapping[type[State], Mapping[type[Event], type[State]]] = {
+#: State -> event, or what was found -> next state. Any other event in a state is a bug.
+TRANSITIONS: Mapping[type[State], Mapping[type[Event] | Spoken, type[State]]] = {
     Closed: {PortOpened: Searching},
     Searching: {
-        MspFound: Identifying,
-        MavlinkFound: Mavlink,
-        FrskyFound: Frsky,
-        CliFound: Cli,
+        Spoken.MSP: Identifying,
+        Spoken.MAVLINK: Mavlink,
+        Spoken.FRSKY: Frsky,
+        Spoken.CLI: Cli,
         Lost: Searching,
         PortClosed: Closed,
     },
-    Identifying: {Identified: Polling, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
-    Polling: {Identified: Polling, MavlinkFound: Mavlink, CliFound: Cli, Lost: Searching, PortClosed: Closed},
+    Identifying: {Identified: Polling, Spoken.MAVLINK: Mavlink, Spoken.CLI: Cli, Lost: Searching, PortClosed: Closed},
+    Polling: {Identified: Polling, Spoken.MAVLINK: Mavlink, Spoken.CLI: Cli, Lost: Searching, PortClosed: Closed},
     Mavlink: {Lost: Searching, PortClosed: Closed},
     Frsky: {Lost: Searching, PortClosed: Closed},
     Cli: {Lost: Searching, PortClosed: Closed},
@@ -76,7 +65,7 @@ class FcSession:
         #: From the port's opening or a loss until a flight controller is found.
         self._incident = ""
         self._on_change = on_change
-        self.state: State = Closed(self._port, speeds[0])
+        self.state: State = Closed(self._port, PortClosed(None), 0.0)
 
     @property
     def controller(self) -> FlightController | None:
@@ -153,7 +142,8 @@ class FcSession:
 
     def take_output(self) -> list[bytes]:
         """The bytes to be written to the port at the present `speed`."""
-        return self.state.take_output()
+        output, self._port.output = self._port.output, []
+        return output + self.state.take_output()
 
     def settle_telemetry(self) -> None:
         """Read what a passed-through autopilot has sent into the vehicle."""
@@ -168,21 +158,16 @@ class FcSession:
     def _handle(self, event: Event, now: float) -> None:
         """Go where the table says."""
         before = self.state
-        after = TRANSITIONS[type(before)][type(event)]
+        after = TRANSITIONS[type(before)][event.spoken if isinstance(event, Found) else type(event)]
         if not isinstance(event, Identified):
             self._leave(before, event, now)
-        self.state = self._enter(after, event, now)
-        if isinstance(event, MspFound | MavlinkFound | FrskyFound | CliFound):
-            self._log_event(
-                "debug",
-                "fc.sensed",
-                protocol=event.found.spoken.value,
-                speed_baud=event.found.speed,
-                why=event.found.why,
-                incident=self._follow_incident(),
-            )
-        if self.state.controller is not None:
-            self._welcome(self.state.controller, event, now)
+        self.state = after(self._port, event, now)
+        match event:
+            case Found():
+                self._note("debug", "fc.sensed", event)
+                self._welcome(event, now)
+            case Identified(found=found):
+                self._welcome(found, now)
         if self.state.trouble:
             self._on_change(None, now)
             self._log_event(
@@ -191,7 +176,7 @@ class FcSession:
 
     def _leave(self, state: State, event: Event, now: float) -> None:
         """Forget the flight controller and end its conversations."""
-        self.state = Closed(self._port, state.speed)
+        self.state = Closed(self._port, event, now)
         if state.trouble:
             self._on_change(None, now)
         if not isinstance(state, MspLine) and state.controller is None:
@@ -205,39 +190,16 @@ class FcSession:
                 "warning", "fc.lost", why=event.why, speed_baud=state.speed, incident=self._follow_incident()
             )
 
-    def _enter(self, after: type[State], event: Event, now: float) -> State:
-        match event:
-            case PortOpened():
-                return Searching(self._port, now)
-            case PortClosed():
-                return Closed(self._port, self.state.speed)
-            case Lost():
-                return Searching(self._port, now, event)
-            case MspFound():
-                return Identifying(self._port, event, now)
-            case Identified():
-                return Polling(self._port, event, now)
-            case MavlinkFound():
-                return Mavlink(self._port, event, now)
-            case FrskyFound():
-                return Frsky(self._port, event, now)
-            case CliFound():
-                return Cli(self._port, event, now)
+    def _welcome(self, found: Found, now: float) -> None:
+        controller = self.state.controller
+        if controller is not None:
+            self._note("info", "fc.found", found, name=controller.name, kind=controller.profile.name)
+            self._incident = ""
+            self._on_change(controller, now)
 
-    def _welcome(self, controller: FlightController, event: Event, now: float) -> None:
-        assert isinstance(event, Identified | MavlinkFound | FrskyFound)
-        self._log_event(
-            "info",
-            "fc.found",
-            protocol=event.found.spoken.value,
-            speed_baud=event.found.speed,
-            name=controller.name,
-            kind=controller.profile.name,
-            why=event.found.why,
-            incident=self._follow_incident(),
-        )
-        self._incident = ""
-        self._on_change(controller, now)
+    def _note(self, level: Level, event: str, found: Found, **facts: str) -> None:
+        facts |= {"protocol": found.spoken.value, "why": found.why, "incident": self._follow_incident()}
+        self._log_event(level, event, speed_baud=found.speed, **facts)
 
     def _follow_incident(self) -> str:
         self._incident = self._incident or self._incidents.begin("link")

@@ -25,7 +25,7 @@ FrameListener = Callable[[Sequence[bytes]], None]
 
 
 class Ground:
-    """All ground stations together. Implements `Post`. `on_newcomer` is called when a peer is heard for the first time.
+    """All ground stations together. `on_newcomer` is called when a peer is heard for the first time.
 
     `standing`: a peer's rights (bridge.gcs.guard). One that may only read gets telemetry and answers, but no texts
     for everyone, and is not recorded.

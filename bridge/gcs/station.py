@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground stations, and the interface for sending to them."""
+"""Ground stations and their addresses."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple, Protocol
-
-from bridge.gcs.cost import Cost
-from protocols.mavlink.dialect import Message
+from typing import NamedTuple
 
 
 class Peer(NamedTuple):  # hashed several times for each message: as a tuple, in C
@@ -50,19 +47,3 @@ class Severity(IntEnum):
     WARNING = 4
     NOTICE = 5
     INFO = 6
-
-
-class Post(Protocol):
-    """Sends messages to ground stations."""
-
-    def to(self, station: Station, message: Message) -> None:
-        """Send to one ground station."""
-
-    def allows(self, station: Station, cost: Cost) -> bool:
-        """Count work that a ground station causes; False if that exceeds its limit."""
-
-    def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
-        """Show a text (STATUSTEXT) on one ground station, or on every one."""
-
-    def say_to_others(self, severity: Severity, text: str, station: Station) -> None:
-        """Show a text on every ground station but this one."""

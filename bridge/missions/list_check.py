@@ -7,10 +7,9 @@ One controller's rules are a `MissionRules` and its `ListCheck`; `bridge.control
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from bridge.missions.value_range import UNUSED, Range
 from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from bridge.model.verdict import CLEARED_LIST, Verdict, rejected
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
@@ -20,6 +19,34 @@ MAX_LON_E7 = 180 * 10**7
 RELATIVE_FRAMES = (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT)
 SEA_LEVEL_FRAMES = (Frame.GLOBAL, Frame.GLOBAL_INT)
 TERRAIN_FRAMES = (Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT)
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """The whole numbers from `low` to `high`; `instead_of_zero` is stored where 0 has no meaning."""
+
+    low: int
+    high: int
+    why: str
+    instead_of_zero: int = 0
+
+    def fit(self, value: float) -> int:
+        """Truncate toward zero, then clamp; NaN and infinities count as 0."""
+        return min(max(_whole(value), self.low), self.high) or self.instead_of_zero
+
+    def reason(self, value: float) -> str:
+        """The reason that `value` is not stored unchanged."""
+        whole = _whole(value)
+        if whole == 0 and self.instead_of_zero:
+            return "0 not allowed"
+        return "whole numbers only" if self.low != self.high and self.fit(value) == whole else self.why
+
+
+def _whole(value: float) -> int:
+    return math.trunc(value) if math.isfinite(value) else 0
+
+
+UNUSED = Range(0, 0, "not used")
 
 
 class ListCheck(ABC):

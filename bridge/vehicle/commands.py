@@ -16,7 +16,8 @@ from bridge.fc.actions import (
     FcActions,
 )
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
-from bridge.gcs.station import Post, Severity, Station
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity, Station
 from bridge.vehicle.own_vehicle import OwnVehicle
 from protocols.mavlink.command_result import CommandResult
 from protocols.mavlink.dialect import messages
@@ -74,8 +75,8 @@ _OUTCOMES = {
 class CommandService:
     """Executes commands and acknowledges them."""
 
-    def __init__(self, post: Post, vehicle: OwnVehicle, actions: FcActions, banner: Callable[[], str]) -> None:
-        self._post = post
+    def __init__(self, ground: Ground, vehicle: OwnVehicle, actions: FcActions, banner: Callable[[], str]) -> None:
+        self._ground = ground
         self._vehicle = vehicle
         self._actions = actions
         self._banner = banner
@@ -88,25 +89,27 @@ class CommandService:
         elif self._actions.present == action:
             # Repeated by the user or duplicated by the network.
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
-        elif not self._post.allows(station, Cost.FLASH):
-            self._post.say(Severity.ERROR, TOO_MANY_WRITES, station)
+        elif not self._ground.allows(station, Cost.FLASH):
+            self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:
             self._actions.start(action, lambda outcome: self._acted(station, command, outcome), now)
 
     def refuse_mode(self, station: Station) -> None:
         """SET_MODE has no acknowledgement, so only a text is sent."""
-        self._post.say(Severity.ERROR, _REFUSED[messages.MAV_CMD_DO_SET_MODE], station)
+        self._ground.say(Severity.ERROR, _REFUSED[messages.MAV_CMD_DO_SET_MODE], station)
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
-        self._post.to(
+        self._ground.to(
             station,
             messages.MAVLink_command_ack_message(command, result, 0, 0, station.sysid, station.compid),
         )
 
     def _acted(self, station: Station, command: int, outcome: ActionResult) -> None:
         result = _OUTCOMES[outcome]
-        self._post.say(Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR, outcome.value, station)
+        self._ground.say(
+            Severity.NOTICE if result is CommandResult.ACCEPTED else Severity.ERROR, outcome.value, station
+        )
         self._acknowledge(station, command, result)
 
     def _do(self, station: Station, command: int, params: Sequence[float]) -> CommandResult:
@@ -118,12 +121,12 @@ class CommandService:
             case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
                 return self._tell_interval(station, _msgid(params[0]))
             case messages.MAV_CMD_DO_SEND_BANNER:
-                self._post.say(Severity.INFO, self._banner(), station)
+                self._ground.say(Severity.INFO, self._banner(), station)
                 return CommandResult.ACCEPTED
         if command in _ASKS_FOR:
             return self._send_once(station, _ASKS_FOR[command])
         if command in _REFUSED:
-            self._post.say(Severity.ERROR, _REFUSED[command], station)
+            self._ground.say(Severity.ERROR, _REFUSED[command], station)
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
 
@@ -156,7 +159,7 @@ class CommandService:
         if interval_s is not None:
             interval_us = -1 if interval_s == math.inf else min(round(interval_s * 1e6), _MAX_I32)
         if 0 <= msgid <= _MAX_U16:
-            self._post.to(station, messages.MAVLink_message_interval_message(msgid, interval_us))
+            self._ground.to(station, messages.MAVLink_message_interval_message(msgid, interval_us))
         return CommandResult.UNSUPPORTED if interval_s is None else CommandResult.ACCEPTED
 
 

@@ -22,7 +22,8 @@ class LinkAnnouncer:
     def __init__(self) -> None:
         self._known: str | None = None
         self._silent_since: float | None = None
-        self._say_at = 0.0
+        #: The time of the next `tick`.
+        self.due = inf
         #: True from the first text about a loss until the flight controller is back.
         self.is_lost = False
 
@@ -30,11 +31,11 @@ class LinkAnnouncer:
         """The flight controller is no longer on the line."""
         if self._silent_since is None:
             self._silent_since = silent_since
-            self._say_at = silent_since + _LOST_S
+            self.due = silent_since + _LOST_S
 
     def found(self, controller: FlightController, now: float) -> tuple[Severity, str] | None:
         """A flight controller is on the line."""
-        silent_since, self._silent_since = self._silent_since, None
+        silent_since, self._silent_since, self.due = self._silent_since, None, inf
         was_lost, self.is_lost = self.is_lost, False
         profile, before = controller.profile, self._known
         is_switch = profile.spoken is Spoken.MAVLINK and not profile.is_passed_through and before is not None
@@ -50,12 +51,8 @@ class LinkAnnouncer:
 
     def tick(self, now: float, trouble: str) -> tuple[Severity, str] | None:
         """Report a loss, and again every 10 s; `trouble`: its cause, if known, and what the pilot must do."""
-        if self._silent_since is None or now < self._say_at:
+        if self._silent_since is None or now < self.due:
             return None
         self.is_lost = True
-        self._say_at = now + _REPEAT_S
+        self.due = now + _REPEAT_S
         return Severity.WARNING, trouble or f"Flight controller lost: silent for {now - self._silent_since:.0f} s"
-
-    def next_deadline(self) -> float:
-        """The time of the next `tick`."""
-        return inf if self._silent_since is None else self._say_at

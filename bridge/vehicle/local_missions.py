@@ -57,7 +57,7 @@ class LocalMissions:
             self._missions.release(owner)
             if arrived and isinstance(result, DeliveryResult):
                 severity = Severity.WARNING if result.is_lossy else Severity.NOTICE
-                self._context.post.say(severity, f"{source}: {result.text}")
+                self._context.ground.say(severity, f"{source}: {result.text}")
             self._context.log_event(
                 "info" if result.ack is MissionResult.ACCEPTED else "warning",
                 "mission.push_ended",

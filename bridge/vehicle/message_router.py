@@ -5,7 +5,8 @@ from collections.abc import Callable
 from math import inf
 
 from bridge.gcs.cost import Cost
-from bridge.gcs.station import Post, Severity, Station
+from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity, Station
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.mission_download import MissionDownloads
 from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION, MissionUploads
@@ -40,14 +41,14 @@ class MessageRouter:
 
     def __init__(
         self,
-        post: Post,
+        ground: Ground,
         uploads: MissionUploads,
         downloads: MissionDownloads,
         parameters: Parameters,
         commands: CommandService,
         vehicle: OwnVehicle,
     ) -> None:
-        self._post = post
+        self._ground = ground
         self._vehicle = vehicle
         self._uploads = uploads
         self._downloads = downloads
@@ -95,13 +96,13 @@ class MessageRouter:
     def take(self, station: Station, message: Message, now: float) -> None:
         """Handle a message for which `understands` is True, unless its sender exceeds its limit."""
         msgid = message.get_msgId()
-        if self._post.allows(station, Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
+        if self._ground.allows(station, Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
             self._handlers[msgid](station, message, now)
 
     def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):
-            self._post.say(Severity.ERROR, "It is flown with the transmitter", station)
-            self._post.to(
+            self._ground.say(Severity.ERROR, "It is flown with the transmitter", station)
+            self._ground.to(
                 station, m.MAVLink_mission_ack_message(station.sysid, station.compid, MissionResult.DENIED, 0)
             )
             return
@@ -121,7 +122,7 @@ class MessageRouter:
             self._uploads.ack(station, message.type, now)
 
     def _set_current(self, station: Station, _message: Message, _now: float) -> None:
-        self._post.say(Severity.ERROR, "The current waypoint cannot be set", station)
+        self._ground.say(Severity.ERROR, "The current waypoint cannot be set", station)
 
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
@@ -133,15 +134,15 @@ class MessageRouter:
     def _ftp(self, station: Station, message: Message, _now: float) -> None:
         answer = refuse(message.payload)
         if answer is not None:
-            self._post.to(station, m.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer))
+            self._ground.to(station, m.MAVLink_file_transfer_protocol_message(0, station.sysid, station.compid, answer))
 
     def _ping(self, station: Station, message: Message, _now: float) -> None:
         # A PING with targets is itself an answer.
         if message.target_system == 0:
-            self._post.to(
+            self._ground.to(
                 station, m.MAVLink_ping_message(message.time_usec, message.seq, station.sysid, station.compid)
             )
 
     def _timesync(self, station: Station, message: Message, now: float) -> None:
         if message.tc1 == 0:
-            self._post.to(station, m.MAVLink_timesync_message(int(now * 1e9), message.ts1))
+            self._ground.to(station, m.MAVLink_timesync_message(int(now * 1e9), message.ts1))

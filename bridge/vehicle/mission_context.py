@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from bridge.gcs.station import Post
+from bridge.gcs.ground import Ground
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, MissionService
@@ -18,11 +18,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class MissionContext:
-    """`post`: sends messages to ground stations."""
+    """`ground`: sends messages to ground stations."""
 
     missions: MissionService
     runner: Runner
-    post: Post
+    ground: Ground
     vehicle: Vehicle
     log_event: EventLog
     incidents: Incidents

@@ -47,7 +47,7 @@ class MissionDownloads:
     def __init__(self, context: MissionContext) -> None:
         self._missions = context.missions
         self._context = context
-        self._post = context.post
+        self._ground = context.ground
         self._vehicle = context.vehicle
         self._snapshots: dict[Station, _Snapshot] = {}
         self._questions: dict[_Question, None] = {}
@@ -95,7 +95,7 @@ class MissionDownloads:
         if self._is_reading:
             return
         held = self._missions.held
-        if held is not None and (self._vehicle.armed or not self._post.allows(question.station, Cost.BOARD)):
+        if held is not None and (self._vehicle.armed or not self._ground.allows(question.station, Cost.BOARD)):
             # While armed the list cannot change; a station that asks too often gets the copy, too.
             self._read(held, now)
         else:
@@ -131,12 +131,12 @@ class MissionDownloads:
             self._ack(question.station, MissionResult.INVALID_SEQUENCE)
 
     def _send_count(self, station: Station, count: int) -> None:
-        self._post.to(
+        self._ground.to(
             station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count, MISSION_TYPE_MISSION)
         )
 
     def _send_item(self, station: Station, item: MissionItem, *, as_int: bool) -> None:
-        self._post.to(station, item_message(item, station.sysid, station.compid, as_int=as_int))
+        self._ground.to(station, item_message(item, station.sysid, station.compid, as_int=as_int))
 
     def _present_home(self) -> MissionItem:
         """Item 0 as last read, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
@@ -154,11 +154,11 @@ class MissionDownloads:
         )
 
     def _refuse(self, station: Station, refusal: Refusal) -> None:
-        self._post.say(Severity.ERROR, refusal.text, station)
+        self._ground.say(Severity.ERROR, refusal.text, station)
         self._ack(station, refusal.ack)
 
     def _ack(self, station: Station, result: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
-        self._post.to(
+        self._ground.to(
             station,
             messages.MAVLink_mission_ack_message(station.sysid, station.compid, result, mission_type),
         )

@@ -80,7 +80,7 @@ class MissionUploads:
         self._context = context
         self._missions = context.missions
         self._runner = context.runner
-        self._post = context.post
+        self._ground = context.ground
         self._moved_to = moved_to
         self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
         self._answers = RecentAnswers(moved_to)
@@ -149,7 +149,7 @@ class MissionUploads:
             return
         if item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
-            self._post.say(Severity.ERROR, text, station)
+            self._ground.say(Severity.ERROR, text, station)
             self._ack(station, MissionResult.INVALID_SEQUENCE)
             return
         if state.announced_again:
@@ -171,7 +171,7 @@ class MissionUploads:
         if answer is not None and answer.is_refusal:
             self._ack(station, answer.ack)
             return
-        self._post.say(Severity.ERROR, "A mission can only be written as a whole", station)
+        self._ground.say(Severity.ERROR, "A mission can only be written as a whole", station)
         self._ack(station, MissionResult.UNSUPPORTED)
 
     def ack(self, station: Station, result: int, now: float) -> None:
@@ -217,7 +217,7 @@ class MissionUploads:
         for reminder in [reminder for reminder in self._reminders if now >= reminder[0]]:
             self._reminders.remove(reminder)
             _, station, text = reminder
-            self._post.say(Severity.ERROR, text, station)
+            self._ground.say(Severity.ERROR, text, station)
         self._begin_next(now)
         self._ask(now)
 
@@ -244,7 +244,7 @@ class MissionUploads:
         upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(now))
         self._uploads.append(upload)
         refusal = self._missions.armed_refusal()
-        if refusal is None and not self._post.allows(station, Cost.BOARD):
+        if refusal is None and not self._ground.allows(station, Cost.BOARD):
             refusal = _TOO_MANY_UPLOADS
         if refusal is not None:
             self._handle(upload, Ended(refusal), now)
@@ -279,7 +279,7 @@ class MissionUploads:
             self._forget(upload, now)
         match event:
             case Turn() if isinstance(before, Complete):
-                if before.verdict.result is Result.REJECTED or self._post.allows(upload.station, Cost.FLASH):
+                if before.verdict.result is Result.REJECTED or self._ground.allows(upload.station, Cost.FLASH):
                     upload.state = Delivering(now)
                     self._deliver(upload, before.received, before.verdict, now)
                 else:
@@ -362,10 +362,10 @@ class MissionUploads:
         request = messages.MAVLink_mission_request_message(
             station.sysid, station.compid, state.wanted, MISSION_TYPE_MISSION
         )
-        self._post.to(station, request)
+        self._ground.to(station, request)
         if state.request.is_repeated:
             for elsewhere in self._elsewhere(upload, now):
-                self._post.to(elsewhere, request)
+                self._ground.to(elsewhere, request)
 
     def _deliver(self, upload: _Upload, items: tuple[MissionItem, ...], verdict: Verdict[Any], now: float) -> None:
         arrived = ArrivedMission(str(upload.station), items, verdict)
@@ -378,7 +378,7 @@ class MissionUploads:
 
     def _is_kept(self, upload: _Upload) -> bool:
         """False if a ground station sent too many lists that did not reach the flight controller."""
-        return self._post.allows(upload.station, Cost.STORED)
+        return self._ground.allows(upload.station, Cost.STORED)
 
     def _delivered(
         self, upload: _Upload, verdict: Verdict[Any], delivery: DeliveryResult | LinkLost, now: float
@@ -399,17 +399,17 @@ class MissionUploads:
     def _tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations."""
         if delivery.ack is not MissionResult.ACCEPTED:
-            self._post.say(Severity.ERROR, delivery.text, station)
+            self._ground.say(Severity.ERROR, delivery.text, station)
         else:
-            self._post.say(Severity.WARNING if delivery.is_lossy else Severity.INFO, delivery.text, station)
+            self._ground.say(Severity.WARNING if delivery.is_lossy else Severity.INFO, delivery.text, station)
             for news, line in finding_lines(verdict.findings):
                 if line != delivery.text:
-                    self._post.say(Severity.WARNING if news is News.WARNING else Severity.NOTICE, line, station)
+                    self._ground.say(Severity.WARNING if news is News.WARNING else Severity.NOTICE, line, station)
         if delivery.number is None:
-            self._post.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
+            self._ground.say(Severity.WARNING, "The mission could not be stored on the Pi", station)
         if delivery.change:
             severity = Severity.WARNING if verdict.result is Result.CLEARED else Severity.INFO
-            self._post.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
+            self._ground.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
 
     def _refuse(self, upload: _Upload, state: UploadState, refusal: Refusal, now: float) -> None:
         """Report the reason for the end of an upload; the received items are stored all the same."""
@@ -421,7 +421,7 @@ class MissionUploads:
             self._runner.start(delivery, lambda _delivery, _at: None, now)
             if state.is_closed:
                 self._reminders += [(now + later_s, upload.station, refusal.text) for later_s in _REMINDERS_S]
-        self._post.say(Severity.ERROR, refusal.text, upload.station)
+        self._ground.say(Severity.ERROR, refusal.text, upload.station)
         self._answer(upload, refusal.ack, now)
         self._note("mission.refused", upload, "warning", ack=refusal.ack.name, why=refusal.text)
         self._begin_next(now)
@@ -460,7 +460,7 @@ class MissionUploads:
             if answer.is_refusal or seq == answer.count - 1:
                 self._ack(station, answer.ack)
         elif not self._uploads and not self._answers.is_known(station, now):
-            self._post.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
+            self._ground.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
             self._answers.note(station, _UNKNOWN_UPLOAD.ack, 0, now)
             self._ack(station, _UNKNOWN_UPLOAD.ack)
 
@@ -479,7 +479,7 @@ class MissionUploads:
             self._ack(where, ack)
 
     def _ack(self, station: Station, ack: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
-        self._post.to(
+        self._ground.to(
             station,
             messages.MAVLink_mission_ack_message(station.sysid, station.compid, ack, mission_type),
         )

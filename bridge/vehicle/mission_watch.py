@@ -18,24 +18,25 @@ class MissionWatch:
     def __init__(self, context: MissionContext) -> None:
         self._context = context
         self._is_looking = False
-        self._due = inf
+        #: The time of the next `tick`.
+        self.due = inf
         self._began_at = 0.0
 
     def look(self, now: float) -> None:
         """Check now: a flight controller was found."""
-        self._due = now + self._interval_s
+        self.due = now + self._interval_s
         if not self._is_looking:
             self._is_looking, self._began_at = True, now
             self._context.runner.start(self._context.missions.is_outdated(), self._looked, now, in_background=True)
 
     def tick(self, now: float) -> None:
         """Check if it is time."""
-        if now < self._due:
+        if now < self.due:
             return
         if self._context.missions.dialect is None:
-            self._due = inf
+            self.due = inf
         elif self._context.runner.is_busy:
-            self._due = now + self._interval_s
+            self.due = now + self._interval_s
         else:
             self.look(now)
 
@@ -43,10 +44,6 @@ class MissionWatch:
     def _interval_s(self) -> float:
         dialect = self._context.missions.dialect
         return inf if dialect is None else dialect.watch_s
-
-    def next_deadline(self) -> float:
-        """The time of the next `tick`."""
-        return self._due
 
     def _looked(self, is_outdated: bool | LinkLost, now: float) -> None:
         if is_outdated is True:
@@ -59,8 +56,8 @@ class MissionWatch:
     def _caught_up(self, news: MissionChange | LinkLost | None, now: float) -> None:
         self._is_looking = False
         # On a slow line, some of the time is left to others.
-        self._due = max(self._due, now + (now - self._began_at) * _PAUSE)
+        self.due = max(self.due, now + (now - self._began_at) * _PAUSE)
         if not isinstance(news, MissionChange):
             return
-        self._context.post.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)
+        self._context.ground.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)
         self._context.log_event("warning" if news.is_warning else "info", "mission.changed_on_board", detail=news.text)

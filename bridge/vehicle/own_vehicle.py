@@ -70,7 +70,8 @@ class OwnVehicle:
         self._is_lost = is_lost
         self._unix_time_s = unix_time_s
         self._started_at = self._now = now
-        self._tick_due = now
+        #: The time of the next `tick`: the sooner of a second's end and of the next heartbeat for newcomers.
+        self.due = self._second_ends = now
         #: Messages that any ground station wants, by the reading that they follow.
         self._rows: dict[type[Reading], list[Row]] = {}
         self._rates = MessageRates(_DEFAULTS)
@@ -99,6 +100,7 @@ class OwnVehicle:
         self._is_news_wanted = True
         self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
+        self.due = min(self.due, self._newcomers_due)
         self._ground.greet(peer, self._make_heartbeat())
         everyone = self._ground.everyone()
         if len(everyone) == 1:
@@ -110,9 +112,12 @@ class OwnVehicle:
         self._now = now
         if now >= self._newcomers_due:
             self._greet(now)
-        if now < self._tick_due:
-            return
-        self._tick_due = max(self._tick_due + _TICK_S, now)
+        if now >= self._second_ends:
+            self._end_second(now)
+        self.due = min(self._second_ends, self._newcomers_due)
+
+    def _end_second(self, now: float) -> None:
+        self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
         self._rates.keep(everyone)
         self._set_polls(everyone)
@@ -129,10 +134,6 @@ class OwnVehicle:
             self._is_news_wanted, self._repeated_at = False, now
             self._announced_home, self._told_blockers = None, ()
         self._announce_home()
-
-    def next_deadline(self) -> float:
-        """The time of the next `tick`."""
-        return min(self._tick_due, self._newcomers_due)
 
     def _greet(self, now: float) -> None:
         self._newcomers = {peer: until for peer, until in self._newcomers.items() if now < until}

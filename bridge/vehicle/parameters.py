@@ -23,7 +23,7 @@ class Parameters:
     def __init__(self, context: MissionContext, sysid: int) -> None:
         self._missions = context.missions
         self._runner = context.runner
-        self._post = context.post
+        self._ground = context.ground
         self._sysid = sysid
         self._is_setting = False
 
@@ -44,11 +44,11 @@ class Parameters:
         dialect = self._missions.dialect
         if name != WP_RADIUS or dialect is None or dialect.wp_radius_cm is None:
             if name == WP_RADIUS:
-                self._post.say(Severity.ERROR, f"{WP_RADIUS} cannot be set on this flight controller now", station)
+                self._ground.say(Severity.ERROR, f"{WP_RADIUS} cannot be set on this flight controller now", station)
             self._send(station, name)
             return
         if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
-            self._post.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm", station)
+            self._ground.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm", station)
             self._send(station, name)
             return
         # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
@@ -61,20 +61,20 @@ class Parameters:
             # A change is pending; a station that requested another value repeats its request.
             return
         if self._missions.armed_refusal() is not None:
-            self._post.say(Severity.ERROR, _stays(dialect.wp_radius_cm, PushFailure.ARMED), station)
+            self._ground.say(Severity.ERROR, _stays(dialect.wp_radius_cm, PushFailure.ARMED), station)
             self._send(station, name)
             return
-        if not self._post.allows(station, Cost.FLASH):
-            self._post.say(Severity.ERROR, TOO_MANY_WRITES, station)
+        if not self._ground.allows(station, Cost.FLASH):
+            self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._send(station, name)
             return
 
         def done(failure: PushFailure | LinkLost | None, _at: float) -> None:
             self._is_setting = False
             if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
-                self._post.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer", station)
+                self._ground.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer", station)
             elif failure is not None:
-                self._post.say(Severity.ERROR, _stays(dialect.wp_radius_cm, failure), station)
+                self._ground.say(Severity.ERROR, _stays(dialect.wp_radius_cm, failure), station)
             self._send(station, name)
 
         self._is_setting = True
@@ -90,7 +90,7 @@ class Parameters:
     def _send(self, station: Station, name: str) -> None:
         values = self._values()
         if name in values:
-            self._post.to(station, self._message(values, name))
+            self._ground.to(station, self._message(values, name))
 
     @staticmethod
     def _message(values: dict[str, float], name: str) -> Message:

@@ -71,32 +71,27 @@ class VehicleReporter:
         #: The time to which ages refer, monotonic s.
         self.now = 0.0
         self._fresh: set[Group] = set()
-        self._watched: frozenset[Group] = frozenset()
+        #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
+        self.watched: frozenset[Group] = frozenset()
         self._makers: Mapping[Group, Callable[[], Any]] = {group: getattr(self, f"_{group.value}") for group in Group}
 
     def heard(self, news: Collection[type[Reading]]) -> None:
-        """The vehicle has new readings."""
-        if self._watched:
-            self._fresh.update(group for reading, group in _NEWS_OF.items() if reading in news)
+        """The vehicle has new readings. To be called while groups are watched."""
+        self._fresh.update(group for reading, group in _NEWS_OF.items() if reading in news)
 
     def watch(self, groups: Iterable[Group]) -> None:
         """Poll for these groups from now on; `take_fresh` returns the updated ones."""
-        self._watched = frozenset(groups)
+        self.watched = frozenset(groups)
         wanted: dict[type[Reading], float] = {}
-        for group in self._watched:
+        for group in self.watched:
             wanted |= _SHOWS[group]
         self._want(wanted)
-
-    @property
-    def is_watched(self) -> bool:
-        """True while any group is watched."""
-        return bool(self._watched)
 
     def take_fresh(self) -> frozenset[Group]:
         """The watched groups updated since the last call."""
         if not self._fresh:
             return _NOTHING
-        fresh = self._watched & self._fresh
+        fresh = self.watched & self._fresh
         self._fresh.clear()
         return fresh
 

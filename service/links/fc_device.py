@@ -2,7 +2,6 @@
 """Opens the connection to a flight controller: a serial port, a TCP connection, or the simulated Naze."""
 
 import asyncio
-import contextlib
 import os
 import socket
 import termios
@@ -49,16 +48,6 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
 
     # One board for all openings: its mission survives a lost port, as a real board's does.
     return SimLink(SimulatedNaze(), asyncio.get_running_loop()).start
-
-
-def acknowledge(device: Device) -> None:
-    """Let a TCP connection acknowledge received bytes at once, not 40 ms later.
-
-    INAV 6.1's simulator and cheap serial adapters send replies byte by byte, and wait for this after the first one.
-    """
-    if isinstance(device, socket.socket) and device.family != socket.AF_UNIX:
-        with contextlib.suppress(OSError):
-            device.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
 
 
 def open_serial(path: str) -> serial.Serial:

@@ -20,13 +20,13 @@ from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
+    UNUSED,
     ListCheck,
     given,
     missing_coordinate,
     refuse_frame,
     refuse_position,
 )
-from bridge.missions.value_range import UNUSED
 from bridge.model.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_item import Command, MissionItem, MissionResult

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from bridge.missions.value_range import UNUSED, Range
+from bridge.missions.list_check import UNUSED, Range
 from protocols.mission_item import Command
 from protocols.wp_record import WpCommand
 

@@ -11,7 +11,7 @@ from bridge.controllers.harakiri.rules import (
     InList,
     command_rules,
 )
-from bridge.missions.value_range import UNUSED, Range
+from bridge.missions.list_check import UNUSED, Range
 from protocols.mavlink.command_name import command_name
 from protocols.mission_item import Command
 

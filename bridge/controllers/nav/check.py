@@ -26,13 +26,13 @@ from bridge.controllers.nav.unshown import flies_home, keep_unshown
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
+    UNUSED,
     ListCheck,
     given,
     missing_coordinate,
     refuse_frame,
     refuse_position,
 )
-from bridge.missions.value_range import UNUSED
 from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single

@@ -1,19 +1,90 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of the line to a flight controller, one class each. Sans-IO.
+"""The states of the line to a flight controller, their events, and what outlives them. Sans-IO.
 
 Every state takes bytes and time, reports an event when it ends, and has a deadline: no state can wait for ever.
 `bridge.fc.session` has the table of which event leads where.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar
 
-from bridge.fc.profile import FlightController
-from bridge.fc.states.events import Event
-from bridge.fc.states.port import Port
+from bridge.fc.autosense import Found
+from bridge.fc.profile import FlightController, Profile
 from bridge.line.msp_link import MspLink
 from bridge.line.pending_replies import PendingReplies
+from bridge.line.poll_schedule import PollSchedule
+from bridge.line.runner import Runner
+from bridge.model.autopilot import Autopilot
+from bridge.model.ground_track import GroundTrack
+from bridge.model.vehicle import Vehicle
+from protocols.mavlink.frame import MavlinkFrame
+
+
+@dataclass(frozen=True, slots=True)
+class PortOpened:
+    """The port is open."""
+
+
+@dataclass(frozen=True, slots=True)
+class PortClosed:
+    """The port is gone. `why` is None if the bridge closed it itself."""
+
+    why: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """The board on an MSP link is known."""
+
+    controller: FlightController
+    found: Found
+    link: MspLink
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The line fell silent, or carries something else. `first`: speeds to try before all others."""
+
+    why: str
+    first: Sequence[int] = ()
+    pending: PendingReplies = field(default_factory=PendingReplies)
+
+
+#: Found: a protocol was heard on the line.
+Event = PortOpened | PortClosed | Found | Identified | Lost
+
+
+@dataclass(slots=True)
+class Port:
+    """Everything that outlives a state: settings, knowledge about the port, and shared parts of the bridge."""
+
+    speeds: Sequence[int | None]
+    autopilot: Autopilot
+    profiles: Sequence[Profile]
+    runner: Runner
+    on_mavlink: Callable[[list[MavlinkFrame]], None]
+    polls: PollSchedule = field(default_factory=PollSchedule)
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    output: list[bytes] = field(default_factory=list)
+    #: A Harakiri that arms may change its speed; disarmed, it comes back to this one.
+    known_speed: int | None = None
+    #: The family of the board that was last identified over MSP on this port.
+    met_family: str | None = None
+    #: The family of the board that `vehicle` describes, which outlives a lost link and a change of protocol.
+    family: str | None = None
+
+    def meet(self, controller: FlightController) -> None:
+        """Begin a new vehicle if this is another board than before."""
+        if controller.profile.family != self.family:
+            self.family = controller.profile.family
+            self.vehicle.forget()
+        # The craft may have turned while it was not heard.
+        self.vehicle.track = GroundTrack()
+        self.vehicle.airframe = controller.airframe or self.vehicle.airframe
+        self.vehicle.version = controller.version or self.vehicle.version
 
 
 class State(ABC):
@@ -27,9 +98,10 @@ class State(ABC):
     controller: FlightController | None = None
     link: MspLink | None = None
 
-    def __init__(self, port: Port, speed: int | None) -> None:
+    def __init__(self, port: Port, event: Event, now: float) -> None:
         self.port = port
-        self.speed = speed
+        #: Of the port, baud.
+        self.speed = event.speed if isinstance(event, Found) else None
 
     @abstractmethod
     def receive(self, data: bytes, now: float) -> Event | None:
@@ -44,9 +116,8 @@ class State(ABC):
         """The time of the next `tick`; infinity only while the port is closed."""
 
     def take_output(self) -> list[bytes]:
-        """The bytes to be written, in order."""
-        output, self.port.output = self.port.output, []
-        return output
+        """The bytes to be written after `port.output`, in order."""
+        return []
 
     def unanswered(self) -> PendingReplies:
         """Replies that may still come: a board that stood still sends them all at once."""

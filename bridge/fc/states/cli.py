@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller is in its command line, which only a reset leaves."""
 
-from bridge.fc.states.base import State
-from bridge.fc.states.events import CliFound, Event, Lost
-from bridge.fc.states.port import Port
+from bridge.fc.autosense import Found
+from bridge.fc.states.base import Event, Lost, Port, State
 from bridge.line.msp_link import PROBE
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.echo import RUB_OUT_LINE, typed_and_rubbed_out
@@ -25,8 +24,8 @@ class Cli(State):
     name = "command line"
     trouble = "The flight controller is in its command line: type exit there, or unplug it"
 
-    def __init__(self, port: Port, event: CliFound, now: float) -> None:
-        super().__init__(port, event.found.speed)
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, now)
         self._heard_at = self._sent_at = now
         self._begin_listening()
         port.output.append(RUB_OUT_LINE)

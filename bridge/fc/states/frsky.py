@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller sends FrSky telemetry."""
 
-from bridge.fc.autosense import Spoken
+from bridge.fc.autosense import Found, Spoken
 from bridge.fc.frsky_telemetry import FrskyTelemetry
 from bridge.fc.profile import FlightController
-from bridge.fc.states.base import State
-from bridge.fc.states.events import Event, FrskyFound, Lost
-from bridge.fc.states.port import Port
+from bridge.fc.states.base import Event, Lost, Port, State
 from bridge.line.msp_link import PROBE
 from bridge.model.vehicle import FlightState, Source
 from protocols.frsky import FRSKY_SPEED, FrskyParser
@@ -24,8 +22,8 @@ class Frsky(State):
     name = "FrSky"
     controller: FlightController
 
-    def __init__(self, port: Port, event: FrskyFound, now: float) -> None:
-        super().__init__(port, event.found.speed)
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, now)
         (profile,) = (profile for profile in port.profiles if profile.spoken is Spoken.FRSKY)
         self.controller = FlightController(profile, profile.name)
         self._parser, self._msp = FrskyParser(), MspParser()

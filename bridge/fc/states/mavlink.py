@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller speaks MAVLink."""
 
-from bridge.fc.autosense import Spoken
+from bridge.fc.autosense import Found, Spoken
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController, Profile
-from bridge.fc.states.base import State
-from bridge.fc.states.events import Event, Lost, MavlinkFound
-from bridge.fc.states.port import Port
+from bridge.fc.states.base import Event, Lost, Port, State
 from bridge.line.mavlink_line import MavlinkLine
 from bridge.model.autopilot import Autopilot
 from protocols.mavlink.frame import MavlinkFrame
@@ -18,9 +16,9 @@ class Mavlink(State):
     name = "MAVLink"
     controller: FlightController
 
-    def __init__(self, port: Port, event: MavlinkFound, now: float) -> None:
-        super().__init__(port, event.found.speed)
-        profile = self._profile(event.found.heard)
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, now)
+        profile = self._profile(event.heard)
         self.controller = FlightController(profile, profile.name)
         port.meet(self.controller)
         self._line = MavlinkLine(is_harakiri=not profile.is_passed_through, now=now)
@@ -46,8 +44,8 @@ class Mavlink(State):
         return self._line.next_deadline()
 
     def take_output(self) -> list[bytes]:
-        """What the line sends, and what ground stations send through it."""
-        return super().take_output() + self._line.take_output()
+        """What the line itself sends."""
+        return self._line.take_output()
 
     def _take(self, frames: list[MavlinkFrame], now: float) -> Event | None:
         if frames:

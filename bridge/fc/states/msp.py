@@ -8,9 +8,7 @@ from bridge.fc.autosense import Found, Spoken
 from bridge.fc.interview import Interview, NoAnswer
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import FlightController, Profile
-from bridge.fc.states.base import State
-from bridge.fc.states.events import CliFound, Event, Identified, Lost, MavlinkFound, MspFound
-from bridge.fc.states.port import Port
+from bridge.fc.states.base import Event, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import MspLink
 from bridge.line.pending_replies import PendingReplies
@@ -40,8 +38,8 @@ class MspLine(State):
 
     link: MspLink
 
-    def __init__(self, port: Port, link: MspLink, found: Found) -> None:
-        super().__init__(port, found.speed)
+    def __init__(self, port: Port, found: Found, link: MspLink, now: float) -> None:
+        super().__init__(port, found, now)
         self.link = link
         self.found = found
         self._foreign = _ForeignBytes()
@@ -61,7 +59,7 @@ class MspLine(State):
         if not frames:
             self._echo.feed(data)
             if self._echo.is_echo():
-                return CliFound(Found(Spoken.CLI, self.speed, "it echoes where it answered before"))
+                return Found(Spoken.CLI, self.speed, "it echoes where it answered before")
         return self.finished()
 
     def tick(self, now: float) -> Event | None:
@@ -81,7 +79,7 @@ class MspLine(State):
         requests = self.link.take_output()
         for frame in requests:
             self._echo.sent(frame)
-        return super().take_output() + requests
+        return requests
 
     def unanswered(self) -> PendingReplies:
         """What the link still waits for."""
@@ -118,7 +116,7 @@ class MspLine(State):
             return None
         heard = self._foreign.mavlink
         if heard is not None:
-            return MavlinkFound(Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard))
+            return Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard)
         if self._is_foreign:
             first = [speed for speed in _ARMED_SPEEDS if speed in self.port.speeds and speed != self.speed]
             return Lost("the incoming data is no longer MSP", first, self.unanswered())
@@ -131,9 +129,8 @@ class Identifying(MspLine):
     name = "identifying"
     is_searching = True
 
-    def __init__(self, port: Port, event: MspFound, now: float) -> None:
-        found = event.found
-        super().__init__(port, MspLink(found.speed, now, event.pending.size(found.speed, now)), found)
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, MspLink(event.speed, now, event.pending.size(event.speed, now)), now)
         self._end: Event | None = None
         self._give_up_at = now + _IDENTIFY_TIMEOUT_S
         port.runner.link_up(self.link)
@@ -173,7 +170,7 @@ class Polling(MspLine):
     controller: FlightController
 
     def __init__(self, port: Port, event: Identified, now: float) -> None:
-        super().__init__(port, event.link, event.found)
+        super().__init__(port, event.found, event.link, now)
         self.controller = controller = event.controller
         port.met_family = controller.profile.family
         if controller.info is not None:

@@ -2,9 +2,7 @@
 """The protocol and speed of a port are looked for."""
 
 from bridge.fc.autosense import Autosense, Spoken
-from bridge.fc.states.base import State
-from bridge.fc.states.events import CliFound, Event, FrskyFound, Lost, MavlinkFound, MspFound
-from bridge.fc.states.port import Port
+from bridge.fc.states.base import Event, Lost, Port, PortOpened, State
 
 
 class Searching(State):
@@ -13,10 +11,11 @@ class Searching(State):
     name = "searching"
     is_searching = True
 
-    def __init__(self, port: Port, now: float, lost: Lost | None = None) -> None:
-        first, pending = ((), None) if lost is None else (lost.first, lost.pending)
+    def __init__(self, port: Port, event: PortOpened | Lost, now: float) -> None:
+        super().__init__(port, event, now)
+        first, pending = (event.first, event.pending) if isinstance(event, Lost) else ((), None)
         self._search = Autosense(port.speeds, port.known_speed, now, first, pending)
-        super().__init__(port, self._search.speed)
+        self.speed = self._search.speed
 
     def receive(self, data: bytes, now: float) -> Event | None:
         """Feed the search."""
@@ -35,7 +34,7 @@ class Searching(State):
 
     def take_output(self) -> list[bytes]:
         """The search's probes."""
-        return super().take_output() + self._search.take_output()
+        return self._search.take_output()
 
     def _event(self) -> Event | None:
         self.speed = self._search.speed
@@ -45,12 +44,4 @@ class Searching(State):
         self.port.output += self._search.take_output()
         if found.spoken is Spoken.MSP or (self.port.known_speed is None and found.spoken is Spoken.MAVLINK):
             self.port.known_speed = found.speed
-        match found.spoken:
-            case Spoken.MSP:
-                return MspFound(found, self._search.pending)
-            case Spoken.MAVLINK:
-                return MavlinkFound(found)
-            case Spoken.FRSKY:
-                return FrskyFound(found)
-            case Spoken.CLI:
-                return CliFound(found)
+        return found
