@@ -3,7 +3,7 @@
 
 import random
 
-from bridge.controllers.harakiri.records import items_from_records
+from bridge.controllers.harakiri.rules import items_from_records
 from protocols.mission_item import MissionItem
 from protocols.wp_record import WpCommand, WpRecord
 

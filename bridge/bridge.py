@@ -11,7 +11,6 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
     FcSession <-> PassThrough <-> Ground
 """
 
-from collections.abc import Sequence
 from math import inf
 
 from bridge.config import BridgeConfig
@@ -24,11 +23,9 @@ from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.guard import Guard
 from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity
-from bridge.line.conversation import StoreEffect
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, DeliveryResult, MissionService
+from bridge.missions.mission_service import NO_LINK, MissionService
 from bridge.model.events import EventLog, Incidents
-from bridge.model.mission_log import ArrivedMission
 from bridge.model.mission_transfer import MissionTransfer
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import FlightState
@@ -55,11 +52,8 @@ class Bridge:
     ) -> None:
         self._config = config
         self._log_event = log_event
-        self._store_effects: list[StoreEffect] = []
         self._was_armed = False
-        self._logs_flights = on_frames is not None
         self._announcer = LinkAnnouncer()
-        self._mission_endings: list[tuple[ArrivedMission, DeliveryResult]] = []
         incidents = Incidents()
 
         self.guard = Guard(config.links, log_event, passes_everything=config.passes_everything)
@@ -68,11 +62,11 @@ class Bridge:
             config.compid,
             log_event,
             self._newcomer,
-            on_frames or _drop,
+            on_frames,
             self.guard.standing,
             config.signers,
         )
-        self.runner = Runner(self._store_effects.append)
+        self.runner = Runner()
         self.session = FcSession(
             config.speeds,
             config.profiles,
@@ -84,20 +78,18 @@ class Bridge:
             config.autopilot,
         )
         vehicle = self.session.vehicle
-        self.missions = MissionService(lambda *ending: self._mission_endings.append(ending), vehicle)
+        self.missions = MissionService(vehicle)
         context = MissionContext(self.missions, self.runner, self.ground, vehicle, log_event, incidents)
         self.local = LocalMissions(context)
         self.sharing = MspSharing(self.session, self.runner)
-        self._vehicle = OwnVehicle(
-            self.session, self.missions, self.ground, lambda: self._announcer.is_lost, config.unix_time_s, now
-        )
+        self._vehicle = OwnVehicle(self.session, self.missions, self.ground, self._announcer, config.unix_time_s, now)
         self.report = VehicleReporter(self.session, self.missions, self.ground, self._vehicle.also_want)
-        self._uploads = MissionUploads(context, self.ground.moved_to)
+        self._uploads = MissionUploads(context)
         self._downloads = MissionDownloads(context)
         self._watch = MissionWatch(context)
         parameters = Parameters(context, config.sysid)
         actions = FcActions(self.session, self.missions, self.runner)
-        commands = CommandService(self.ground, self._vehicle, actions, self._banner)
+        commands = CommandService(self.ground, self._vehicle, actions, self.session, config.version)
         router = MessageRouter(self.ground, self._uploads, self._downloads, parameters, commands, self._vehicle)
         self._incoming = Incoming(
             self.guard, self.ground, router, parameters, self.session.send_mavlink, config.sysid, config.compid
@@ -127,28 +119,19 @@ class Bridge:
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""
-        self._uploads.peer_gone(peer, now)
+        self._forget(peer, now)
         self.ground.gone(peer)
-        self._incoming.forget(peer)
 
     def link_closed(self, name: str, now: float) -> None:
         """A link is closed, and all ground stations on it are gone."""
         for peer in self.ground.remove_link(name):
-            self._uploads.peer_gone(peer, now)
-            self._incoming.forget(peer)
+            self._forget(peer, now)
+
+    def _forget(self, peer: Peer, now: float) -> None:
+        self._uploads.peer_gone(peer, now)
+        self._incoming.forget(peer)
 
     # Missions.
-
-    def take_store_effects(self) -> list[StoreEffect]:
-        """The pending store operations; the service answers each with `runner.store_answered`."""
-        effects = self._store_effects[:]
-        self._store_effects.clear()
-        return effects
-
-    def take_mission_endings(self) -> list[tuple[ArrivedMission, DeliveryResult]]:
-        """The missions concluded since the last call, each with its result."""
-        endings, self._mission_endings = self._mission_endings, []
-        return endings
 
     @property
     def transfer(self) -> MissionTransfer | None:
@@ -173,10 +156,12 @@ class Bridge:
         self._pass_on_news(now)
         self.runner.tick(now)
         self._uploads.tick(now)
-        self._watch.tick(now)
+        if now >= self._watch.due:
+            self._watch.tick(now)
         for peer in self.ground.expire(now):
             self._incoming.forget(peer)
-        self._say(self._announcer.tick(now, self.session.trouble))
+        if now >= self._announcer.due:
+            self._say(self._announcer.tick(now, self.session.trouble))
         if self._is_represented:
             self._vehicle.tick(now)
 
@@ -246,14 +231,5 @@ class Bridge:
         self._was_armed = armed
         if armed:
             self._uploads.armed(now)
-        self.ground.record_flight(on=armed and self._logs_flights and self._is_represented)
+        self.ground.record_flight(on=armed and self._is_represented)
         self._log_event("info", "vehicle.armed" if armed else "vehicle.disarmed")
-
-    def _banner(self) -> str:
-        controller = self.session.controller
-        name = "no flight controller" if controller is None else controller.name
-        return f"naze-bridge {self._config.version}: {name}"
-
-
-def _drop(_frames: Sequence[bytes]) -> None:
-    """The frame listener of a bridge without a log."""

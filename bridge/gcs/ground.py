@@ -39,7 +39,7 @@ class Ground:
         compid: int,
         log_event: EventLog,
         on_newcomer: Callable[[Peer], None],
-        on_frames: FrameListener,
+        on_frames: FrameListener | None,
         standing: Callable[[Peer], Standing],
         signers: Mapping[str, Signer],
     ) -> None:
@@ -47,7 +47,8 @@ class Ground:
         self._compid = compid
         self._log_event = log_event
         self._on_newcomer = on_newcomer
-        self.on_frames = on_frames
+        self._logs_flights = on_frames is not None
+        self.on_frames = on_frames or _drop
         self._standing = standing
         self._signers = signers
         self._stations = Stations()
@@ -198,7 +199,7 @@ class Ground:
 
     def record_flight(self, *, on: bool) -> None:
         """Log everything that a connected ground station would get, even if there is none."""
-        if on:
+        if on and self._logs_flights:
             self.add_default_peer(RECORDER, until_answered=False)
         else:
             self.remove_default_peer(RECORDER)
@@ -336,3 +337,7 @@ def split_text(text: str) -> list[str]:
         pieces.append(text[:cut].ljust(_TEXT_SIZE))
         text = text[cut:].lstrip()
     return [*pieces, text]
+
+
+def _drop(_frames: Sequence[bytes]) -> None:
+    """The frame listener of a bridge without a log."""

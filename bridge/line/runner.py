@@ -47,11 +47,11 @@ class Task(Generic[T]):
 class Runner:
     """Runs conversations in the order in which they were started. Time is passed in.
 
-    `on_store` gets each effect for the store; the reply comes back through `store_answered`.
+    Effects for the store are kept for `take_store_effects`; the reply comes back through `store_answered`.
     """
 
-    def __init__(self, on_store: Callable[[StoreEffect], None]) -> None:
-        self._on_store = on_store
+    def __init__(self) -> None:
+        self._store_effects: list[StoreEffect] = []
         self._link: MspLink | None = None
         self._mavlink: MavlinkLine | None = None
         self._queue: deque[Task[Any]] = deque()
@@ -118,6 +118,11 @@ class Runner:
         """Pass on a MAVLink frame if the running conversation waits for it."""
         if isinstance(self._awaited, Await) and frame.msgid in self._awaited.msgids:
             self._advance(frame, now)
+
+    def take_store_effects(self) -> list[StoreEffect]:
+        """The pending store operations; the service answers each with `store_answered`."""
+        effects, self._store_effects = self._store_effects, []
+        return effects
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
         """Pass on the store's reply to an effect; a reply after its timeout is ignored."""
@@ -203,7 +208,7 @@ class Runner:
                 else:
                     self._awaited = effect
                     self._deadline = now + _STORE_PATIENCE_S
-                    self._on_store(effect)
+                    self._store_effects.append(effect)
                     return
         except StopIteration as stop:
             result = stop.value

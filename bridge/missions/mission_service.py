@@ -75,13 +75,10 @@ OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
 class MissionService:
-    """Holds the transfer lock, the dialect of the current flight controller, and its list.
+    """Holds the transfer lock, the dialect of the current flight controller, and its list."""
 
-    `on_ending` is called with the result of each mission.
-    """
-
-    def __init__(self, on_ending: Callable[[ArrivedMission, DeliveryResult], None], vehicle: Vehicle) -> None:
-        self._on_ending = on_ending
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._endings: list[tuple[ArrivedMission, DeliveryResult]] = []
         self._vehicle = vehicle
         self._dialect: AnyFcMissionStore | None = None
         self._refusal = NO_LINK
@@ -143,6 +140,11 @@ class MissionService:
             self._owner = owner
         return refusal
 
+    def take_endings(self) -> list[tuple[ArrivedMission, DeliveryResult]]:
+        """The missions concluded since the last call, each with its result."""
+        endings, self._endings = self._endings, []
+        return endings
+
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed; saves a request to a busy board."""
         return ARMED if self._dialect is not None and self._vehicle.armed else None
@@ -200,7 +202,7 @@ class MissionService:
         `is_kept` False: do not store it, because too many lists arrived.
         """
         delivery = yield from self._deliver(arrived, progress, is_kept=is_kept)
-        self._on_ending(arrived, delivery)
+        self._endings.append((arrived, delivery))
         return delivery
 
     def _deliver(

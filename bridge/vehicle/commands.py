@@ -5,7 +5,7 @@ No command may arm, steer or restart an aircraft; those that would are refused w
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from bridge.fc.actions import (
     CALIBRATE_ACCELEROMETER,
@@ -15,6 +15,7 @@ from bridge.fc.actions import (
     FcAction,
     FcActions,
 )
+from bridge.fc.session import FcSession
 from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
@@ -73,13 +74,16 @@ _OUTCOMES = {
 
 
 class CommandService:
-    """Executes commands and acknowledges them."""
+    """Executes commands and acknowledges them. `version`: of the bridge."""
 
-    def __init__(self, ground: Ground, vehicle: OwnVehicle, actions: FcActions, banner: Callable[[], str]) -> None:
+    def __init__(
+        self, ground: Ground, vehicle: OwnVehicle, actions: FcActions, session: FcSession, version: str
+    ) -> None:
         self._ground = ground
         self._vehicle = vehicle
         self._actions = actions
-        self._banner = banner
+        self._session = session
+        self._version = version
 
     def take(self, station: Station, command: int, params: Sequence[float], now: float) -> None:
         """Execute a command and acknowledge it. `params`: param1..param7."""
@@ -121,7 +125,9 @@ class CommandService:
             case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
                 return self._tell_interval(station, _msgid(params[0]))
             case messages.MAV_CMD_DO_SEND_BANNER:
-                self._ground.say(Severity.INFO, self._banner(), station)
+                controller = self._session.controller
+                name = "no flight controller" if controller is None else controller.name
+                self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
                 return CommandResult.ACCEPTED
         if command in _ASKS_FOR:
             return self._send_once(station, _ASKS_FOR[command])

@@ -51,7 +51,7 @@ class LinkAnnouncer:
 
     def tick(self, now: float, trouble: str) -> tuple[Severity, str] | None:
         """Report a loss, and again every 10 s; `trouble`: its cause, if known, and what the pilot must do."""
-        if self._silent_since is None or now < self.due:
+        if self._silent_since is None:
             return None
         self.is_lost = True
         self.due = now + _REPEAT_S

@@ -7,7 +7,6 @@ packets of its own and takes any ack to MISSION_COUNT as "continue"; most specia
 in docs/ground-stations.md.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -76,14 +75,14 @@ class _Upload:
 class MissionUploads:
     """All ground stations' uploads and clears."""
 
-    def __init__(self, context: MissionContext, moved_to: Callable[[Station, float], list[Station]]) -> None:
+    def __init__(self, context: MissionContext) -> None:
         self._context = context
         self._missions = context.missions
         self._runner = context.runner
         self._ground = context.ground
-        self._moved_to = moved_to
+        self._moved_to = context.ground.moved_to
         self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
-        self._answers = RecentAnswers(moved_to)
+        self._answers = RecentAnswers(self._moved_to)
         self._reminders: list[tuple[float, Station, str]] = []
         self._is_asking = False
         self._may_ask_at = 0.0

@@ -30,9 +30,7 @@ class MissionWatch:
             self._context.runner.start(self._context.missions.is_outdated(), self._looked, now, in_background=True)
 
     def tick(self, now: float) -> None:
-        """Check if it is time."""
-        if now < self.due:
-            return
+        """Check, if no transfer runs."""
         if self._context.missions.dialect is None:
             self.due = inf
         elif self._context.runner.is_busy:

@@ -19,6 +19,7 @@ from bridge.model.flight_mode import FlightMode
 from bridge.model.mission_progress import MissionProgress
 from bridge.model.vehicle import STALE_S, FlightState, Health, Home, MissionLeg, Readiness, Reading
 from bridge.vehicle import vehicle_messages
+from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.telemetry_table import EXTENDED_STATUS, EXTRA3, NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
@@ -60,14 +61,14 @@ class OwnVehicle:
         session: FcSession,
         missions: MissionService,
         ground: Ground,
-        is_lost: Callable[[], bool],
+        announcer: LinkAnnouncer,
         unix_time_s: Callable[[float], float | None],
         now: float,
     ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
-        self._is_lost = is_lost
+        self._announcer = announcer
         self._unix_time_s = unix_time_s
         self._started_at = self._now = now
         #: The time of the next `tick`: the sooner of a second's end and of the next heartbeat for newcomers.
@@ -263,7 +264,7 @@ class OwnVehicle:
         return heartbeat
 
     def _make_heartbeat(self) -> Message:
-        return vehicle_messages.heartbeat(self._session.vehicle, is_lost=self._is_lost())
+        return vehicle_messages.heartbeat(self._session.vehicle, is_lost=self._announcer.is_lost)
 
     def _mission_current(self) -> Message:
         held = self._missions.held

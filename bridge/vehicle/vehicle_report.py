@@ -51,7 +51,6 @@ _SHOWS: Mapping[Group, Mapping[type[Reading], float]] = {
 }
 _NEWS_OF = {next(iter(readings)): group for group, readings in _SHOWS.items() if readings}
 _FIXES = {Fix.NO_FIX: "none", Fix.TWO_D: "2D", Fix.THREE_D: "3D"}
-_NOTHING: frozenset[Group] = frozenset()
 
 
 class VehicleReporter:
@@ -70,14 +69,15 @@ class VehicleReporter:
         self._want = want
         #: The time to which ages refer, monotonic s.
         self.now = 0.0
-        self._fresh: set[Group] = set()
+        #: Groups updated since the last `take_fresh`, some of which may no longer be watched.
+        self.fresh: set[Group] = set()
         #: The groups in use: they are polled, and `take_fresh` returns the updated ones.
         self.watched: frozenset[Group] = frozenset()
         self._makers: Mapping[Group, Callable[[], Any]] = {group: getattr(self, f"_{group.value}") for group in Group}
 
     def heard(self, news: Collection[type[Reading]]) -> None:
         """The vehicle has new readings. To be called while groups are watched."""
-        self._fresh.update(group for reading, group in _NEWS_OF.items() if reading in news)
+        self.fresh.update(group for reading, group in _NEWS_OF.items() if reading in news)
 
     def watch(self, groups: Iterable[Group]) -> None:
         """Poll for these groups from now on; `take_fresh` returns the updated ones."""
@@ -89,10 +89,8 @@ class VehicleReporter:
 
     def take_fresh(self) -> frozenset[Group]:
         """The watched groups updated since the last call."""
-        if not self._fresh:
-            return _NOTHING
-        fresh = self.watched & self._fresh
-        self._fresh.clear()
+        fresh = self.watched & self.fresh
+        self.fresh.clear()
         return fresh
 
     def group(self, group: Group) -> Any:

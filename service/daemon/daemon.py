@@ -230,7 +230,7 @@ class Daemon:
             self._fc_traffic.pieces_sent += 1
             self._fc_traffic.bytes_sent += len(data)
         self._send_datagrams()
-        for effect in bridge.take_store_effects():
+        for effect in bridge.runner.take_store_effects():
             self._carry_out(effect)
         self._tell_followers()
         deadline = bridge.next_deadline()
@@ -337,8 +337,9 @@ class Daemon:
         self.flush()
 
     def _tell_followers(self) -> None:
-        fresh = self.bridge.report.take_fresh()
-        endings = self.bridge.take_mission_endings()
+        report = self.bridge.report
+        fresh = report.take_fresh() if report.fresh else None
+        endings = self.bridge.missions.take_endings()
         for follower in self._followers:
             if fresh:
                 follower.telemetry(fresh)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from bridge.controllers.harakiri.mission_store import HarakiriMissions
-from bridge.line.conversation import Conversation, StoreEffect
+from bridge.line.conversation import Conversation
 from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import PushResult
@@ -76,7 +76,7 @@ class Line:
         self._disturb = disturb
         self._link = MspLink(_BAUD, self.now)
         self._link.receiver_timeout_s = info.inter_byte_timeout_ms / 1000
-        self._runner = Runner(self._no_store)
+        self._runner = Runner()
         self._runner.link_up(self._link)
         self._order = count()
         self._wire: list[tuple[float, int, Callable[[bytes], None], bytes]] = []
@@ -107,10 +107,8 @@ class Line:
     def wait_for_boot(self) -> None:
         self.now = max(self.now, self._up_at)
 
-    def _no_store(self, effect: StoreEffect) -> None:
-        raise AssertionError(effect)
-
     def _step(self) -> None:
+        assert not self._runner.take_store_effects()
         due = [self._link.next_deadline(), self._runner.next_deadline(), *(at for at, *_ in self._wire[:1])]
         self.now = max(self.now, min(due))
         self._tell_the_board_the_time()

@@ -8,7 +8,7 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
-from bridge.controllers.harakiri.records import items_from_records
+from bridge.controllers.harakiri.rules import items_from_records
 from bridge.missions.list_check import check_list
 from bridge.model.finding import DROPPED, REJECTED
 from bridge.model.verdict import Result

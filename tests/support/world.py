@@ -288,7 +288,7 @@ class World:
             station = self.stations.get(peer)
             if station is not None:
                 station.carry(frame)
-        for effect in self.bridge.take_store_effects():
+        for effect in self.bridge.runner.take_store_effects():
             self._carry_out(effect)
 
     def _write(self, data: bytes) -> None:

@@ -4,7 +4,6 @@
 import math
 from dataclasses import dataclass, replace
 
-from bridge.controllers.harakiri.records import items_from_records
 from bridge.controllers.harakiri.rules import (
     CRUISE,
     NO_ROI_KNOWN,
@@ -15,6 +14,7 @@ from bridge.controllers.harakiri.rules import (
     CommandRule,
     InList,
     command_rules,
+    items_from_records,
 )
 from bridge.controllers.harakiri.single_precision import readable_e7
 from bridge.missions.list_check import (

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.harakiri.records import HarakiriStore, items_from_records
-from bridge.controllers.harakiri.rules import MAV_COMMANDS
+from bridge.controllers.harakiri.mission_store import HarakiriStore
+from bridge.controllers.harakiri.rules import MAV_COMMANDS, items_from_records
 from bridge.controllers.harakiri.single_precision import degrees_read_e7, degrees_to_send
 from bridge.line.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
 from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult, StoreReport, StoreState

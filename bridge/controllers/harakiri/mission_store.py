@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The companion's side of Harakiri's mission extension (docs/msp-mission.md)."""
 
-from collections.abc import Callable, Sequence
+from abc import ABC
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TypeVar
 
 from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.harakiri.records import HarakiriStore
+from bridge.controllers.harakiri.rules import items_from_records
 from bridge.line.conversation import (
     Conversation,
     LinkLost,
@@ -19,7 +20,16 @@ from bridge.line.conversation import (
     receive,
     send,
 )
-from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult, StoreReport, StoreState
+from bridge.missions.fc_mission_store import (
+    FcMissionStore,
+    PushFailed,
+    PushFailure,
+    PushProgress,
+    PushResult,
+    StoreReport,
+    StoreState,
+)
+from protocols.mission_item import MissionItem
 from protocols.mission_record import ListIdentity, identify
 from protocols.msp import mission as ext
 from protocols.msp.frame import FRAME_OVERHEAD, MspFrame
@@ -55,6 +65,18 @@ _FAILURES = {
 }
 
 AnswerT = TypeVar("AnswerT", Staged, Radius)
+
+
+class HarakiriStore(FcMissionStore[WpRecord], ABC):
+    """The mission store of a Harakiri, over either protocol: each record is an item, home too."""
+
+    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """A list as a ground station reads it."""
+        return tuple(items_from_records(records, sent_as))
+
+    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
+        """The same number."""
+        return number if number < len(records) else 0
 
 
 class HarakiriMissions(HarakiriStore):

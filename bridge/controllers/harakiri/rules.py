@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's mission rules by command: the table of docs/mission-rules.md."""
+"""Harakiri's mission commands: the rules by command (the table of docs/mission-rules.md), and records as items."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
+from types import MappingProxyType
 
 from bridge.missions.list_check import UNUSED, Range
-from protocols.mission_item import Command
-from protocols.wp_record import WpCommand
+from protocols.mission_item import Command, Frame, MissionItem
+from protocols.wp_record import WpCommand, WpRecord
 
 MAV_COMMANDS: Mapping[int, Command] = {
     WpCommand.WAYPOINT: Command.NAV_WAYPOINT,
@@ -20,6 +21,8 @@ MAV_COMMANDS: Mapping[int, Command] = {
     WpCommand.TAKEOFF: Command.NAV_TAKEOFF,
     WpCommand.SETROI: Command.NAV_ROI,
 }
+_UNKNOWN_COMMAND = 0
+_NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
 ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI)
 
 #: The capacity with default settings; patched boards report theirs.
@@ -98,3 +101,37 @@ def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, Command
     # fmt: on
     rules: dict[int, CommandRule] = {MAV_COMMANDS[row.record]: row for row in rows}
     return rules | dict.fromkeys(ROI_COMMANDS, rules[Command.NAV_ROI])
+
+
+def items_from_records(records: Iterable[WpRecord], sent_as: Mapping[int, int] = _NONE_KNOWN) -> list[MissionItem]:
+    """The items of a stored list (docs/mission-rules.md, "Read-back").
+
+    Frame 3, home frame 0. A region of interest gets its command number from `sent_as` (stored seq to MAV_CMD), else
+    80. A record with an unknown WpCommand becomes MAV_CMD 0, with the raw number as its param1: no ground station
+    takes that for a flight command, and the rules would drop it (our own choice).
+    """
+    return [_item(seq, record, sent_as) for seq, record in enumerate(records)]
+
+
+def _item(seq: int, record: WpRecord, sent_as: Mapping[int, int]) -> MissionItem:
+    match MAV_COMMANDS.get(record.command):
+        case None:
+            command, p1 = _UNKNOWN_COMMAND, record.command
+        case Command.NAV_LOITER_TURNS:
+            command, p1 = int(Command.NAV_LOITER_TURNS), record.turns
+        case Command.NAV_ROI:
+            command, p1 = sent_as.get(seq, int(Command.NAV_ROI)), record.time
+        case known:
+            command, p1 = int(known), record.time
+    return MissionItem(
+        seq=seq,
+        command=command,
+        frame=int(Frame.GLOBAL_RELATIVE_ALT if seq else Frame.GLOBAL),
+        p1=float(p1),
+        p2=float(record.radius_m),
+        p3=0.0,
+        p4=float(record.roi_heading),
+        lat_e7=record.lat_e7,
+        lon_e7=record.lon_e7,
+        alt_m=float(record.height_m),
+    )
