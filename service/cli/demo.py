@@ -24,6 +24,7 @@ from service.cli.mission_table import mission_table
 from service.cli.printing import fail, print_table
 from service.control.client import ControlError, ask_daemon
 from service.control.mission_data import Json, mission_items
+from service.machine.host import Host
 
 #: A link to examples/ in the repository, a file in the installed package.
 _EXAMPLE = Path(__file__).parent / "naze-field.waypoints"
@@ -76,7 +77,7 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, cons
 
 
 def _stay(port: int, process: subprocess.Popen[bytes], state_dir: Path, console: Console) -> None:
-    addresses = ", ".join(_own_addresses()) or "this machine's address"
+    addresses = ", ".join(Host().ipv4_addresses()) or "this machine's address"
     console.print(
         f"\nThe bridge keeps running. In Mission Planner choose UDPCl, host {addresses}, port {port}, and press Connect"
         "\n(QGroundControl, MAVProxy and MAVSDK: udpout / udp client to the same address). Ctrl-C ends.\n"
@@ -117,13 +118,3 @@ def _free_port(wanted: int, console: Console) -> int:
             console.print(f"UDP port {wanted} is in use; using another one.")
         port: int = probe.getsockname()[1]
         return port
-
-
-def _own_addresses() -> list[str]:
-    """The machine's address on its network, found without sending anything."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))
-        except OSError:
-            return []
-        return [str(probe.getsockname()[0])]

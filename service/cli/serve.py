@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.printing import fail
-from service.control.client import ControlError
-from service.control.socket_path import socket_of_daemon
+from service.control.client import ControlError, socket_of_daemon
 from service.daemon.api import ControlServer
 from service.daemon.daemon import Daemon
 from service.daemon.lifecycle import run_until_signal

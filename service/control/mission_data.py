@@ -20,8 +20,19 @@ _NUMBERS = ("p1", "p2", "p3", "p4", "alt_m")
 
 
 def to_json(value: object) -> str:
-    """One line of strict JSON: NaN ("not given") becomes null, infinity a string."""
-    return json.dumps(_strict(value), allow_nan=False)
+    """One line of strict JSON."""
+    return json.dumps(strict(value), allow_nan=False)
+
+
+def strict(value: Any) -> Any:
+    """Replace numbers that JSON lacks: NaN ("not given") becomes null, infinity a text."""
+    if isinstance(value, dict):
+        return {key: strict(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value
 
 
 def mission_items(data: object) -> list[MissionItem]:
@@ -79,13 +90,3 @@ def _place(entry: Json, key: str) -> int | None:
 def _is_whole(value: object) -> TypeGuard[int]:
     """True for an int, so for a Command too, but not for a bool."""
     return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _strict(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _strict(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_strict(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    return value

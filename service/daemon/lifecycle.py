@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The life of a daemon from its start to a signal, reported to systemd."""
+"""The life of a daemon from its start to a signal, reported to systemd; SIGHUP reloads the settings."""
 
 import asyncio
 import signal
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import fields, replace
 
 import structlog
 
 from service.daemon.daemon import Daemon
-from service.daemon.reload import reload_when_told
+from service.machine.log_setup import set_log_level
 from service.machine.notify import Notifier
-from service.settings import Settings
+from service.settings import Settings, SettingsError
 
 #: The interval of status updates, and the minimum number of watchdog messages per watchdog timeout.
 _INTERVAL_S = 2.0
@@ -46,7 +47,7 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
         loop.add_signal_handler(number, signalled, number)
     told_to_reload = asyncio.Event()
     loop.add_signal_handler(signal.SIGHUP, told_to_reload.set)
-    reloading = loop.create_task(reload_when_told(told_to_reload, daemon, notifier, load))
+    reloading = loop.create_task(_reload_when_told(told_to_reload, daemon, notifier, load))
     reporting = _Reporting(daemon, notifier)
     ready = loop.create_task(_tell_ready(daemon, notifier))
     try:
@@ -101,3 +102,37 @@ def link_line(daemon: Daemon) -> str:
         where = f"{session.controller.name} ({session.state.name}{speed}{armed})"
     count = len(list(bridge.ground.peers()))
     return f"{where}; {count} ground station{'' if count == 1 else 's'}"
+
+
+async def _reload_when_told(
+    told: asyncio.Event, daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]
+) -> None:
+    """Apply the result of `load` each time `told` is set; invalid settings change nothing."""
+    while await told.wait():
+        told.clear()
+        notifier.reloading()
+        try:
+            # In a thread: a slow disk must not delay the links.
+            _take_over(daemon, await asyncio.to_thread(load))
+        except SettingsError as error:
+            _log.error("config.rejected", why=[str(problem) for problem in error.problems], what="nothing is changed")
+        notifier.ready()
+
+
+def _take_over(daemon: Daemon, new: Settings) -> None:
+    old = daemon.settings
+    changed = {field.name for field in fields(Settings) if getattr(old, field.name) != getattr(new, field.name)}
+    live: set[str] = set()
+    if "log_level" in changed:
+        set_log_level(new.log_level)
+        daemon.settings = replace(daemon.settings, log_level=new.log_level)
+        live.add("log_level")
+    if "access" in changed:
+        # Keys are held by the parts that guard and sign: write access is not changed during a transfer.
+        changed = changed - {"access"} | {"gcs"}
+    elif "gcs" in changed:
+        daemon.change_links(new.gcs)
+        live.add("gcs")
+    _log.info("config.reloaded", taken_over=sorted(live))
+    if needs_restart := sorted(changed - live):
+        _log.warning("config.needs_restart", settings=needs_restart)

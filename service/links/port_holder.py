@@ -9,8 +9,6 @@ from pathlib import Path
 
 from service.machine.host import Host
 
-_LOGIN_PROGRAMS = ("agetty", "getty", "login")
-
 
 def explain_port_error(path: str, error: OSError) -> str:
     """Turn an error from opening `path` into one sentence: what, where, what to do."""
@@ -32,23 +30,10 @@ def explain_port_error(path: str, error: OSError) -> str:
 
 
 def find_console(path: str) -> str | None:
-    """The name of the terminal if a login console runs on the port, else None.
-
-    A getty takes no lock: both could open the port, and each would lose half of the input.
-    """
-    if not Path(path).exists():
-        # Called four times a second: too often for a search through all processes.
-        return None
+    """The name of the terminal if a login console runs on the port, else None."""
+    # Called four times a second: too often for a search through all processes while there is no port.
     terminal = Path(path).resolve().name
-    for process in _processes():
-        try:
-            command = (process / "cmdline").read_bytes().split(b"\0")
-        except OSError:
-            continue
-        program = os.path.basename(command[0]).decode(errors="replace")
-        if program in _LOGIN_PROGRAMS and terminal.encode() in command[1:]:
-            return terminal
-    return None
+    return terminal if Path(path).exists() and Host().has_login(terminal) else None
 
 
 def find_holder(path: str) -> str | None:
@@ -57,14 +42,14 @@ def find_holder(path: str) -> str | None:
         target = os.stat(path)
     except OSError:
         return None
-    for process in _processes():
-        if process.name == str(os.getpid()):
+    for process in Host().processes():
+        if process.pid == os.getpid():
             continue
         try:
-            for descriptor in (process / "fd").iterdir():
+            for descriptor in Path(f"/proc/{process.pid}/fd").iterdir():
                 # By device number: in a container the device may have another name.
                 if os.path.samestat(descriptor.stat(), target):
-                    return f"{(process / 'comm').read_text().strip()} (pid {process.name})"
+                    return f"{process.name} (pid {process.pid})"
         except OSError:
             continue
     return None
@@ -84,7 +69,3 @@ def find_user(host: Host, path: str) -> str | None:
         if any(named.search(argument) for argument in process.arguments[1:]) or host.has_open(process, path):
             return f"{process.name} (pid {process.pid})"
     return None
-
-
-def _processes() -> list[Path]:
-    return [entry for entry in Path("/proc").iterdir() if entry.name.isdecimal()]

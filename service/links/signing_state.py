@@ -18,7 +18,7 @@ import structlog
 
 from bridge.gcs.guard import LinkAccess
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Signing, Timestamps
-from service.machine.disk_thread import DiskThread
+from service.machine.threads import DiskThread
 from service.settings import Settings
 from storage.atomic_file import replace_file
 

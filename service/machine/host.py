@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _SIOCGIFADDR = 0x8915
+#: The programs of a login console.
+LOGIN_PROGRAMS = ("agetty", "getty", "login")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +77,13 @@ class Host:
             return any(os.readlink(descriptor) == link for descriptor in open_files)
         except OSError:
             return False
+
+    def has_login(self, terminal: str) -> bool:
+        """True if a login console runs on a terminal, such as ttyS0.
+
+        It takes no lock: both programs could open the port, and each would lose half of the input.
+        """
+        return any(process.name in LOGIN_PROGRAMS and terminal in process.arguments[1:] for process in self.processes())
 
     def ipv4_addresses(self) -> list[str]:
         """The machine's IPv4 addresses except the loopback's, Wi-Fi first."""

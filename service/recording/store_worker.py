@@ -4,7 +4,6 @@
 import asyncio
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ import structlog
 from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreEffect
 from bridge.model.mission_log import ArrivedMission, PendingMission
 from protocols.mission_record import ListIdentity, identify, pack_records
-from service.machine.disk_thread import DiskThread
+from service.machine.threads import DiskThread, post
 from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store, store_in_memory
 
 DATABASE_NAME = "missions.db"
@@ -44,7 +43,7 @@ class StoreWorker:
         """Run an effect on the worker's thread; `answer` is called on the event loop."""
 
         def work() -> None:
-            self._tell(answer, self._do(effect))
+            post(self._loop, answer, self._do(effect))
 
         self._thread.submit(work)
 
@@ -64,17 +63,13 @@ class StoreWorker:
         if not self._thread.close(_CLOSE_TIMEOUT_S):
             _log.error("store.hangs", what="the disk does not answer; the last outcome may be missing")
 
-    def _tell(self, answer: Callable[..., None], *arguments: object) -> None:
-        with suppress(RuntimeError):  # the loop is closed: a hanging disk answered too late
-            self._loop.call_soon_threadsafe(answer, *arguments)
-
     def _open(self, directory: Path) -> None:
         try:
             opened = open_store(directory / DATABASE_NAME, time.time())
         except StoreError as error:
             _log.error("store.unavailable", why=str(error), what="missions are kept in memory until the daemon exits")
             self._store = store_in_memory()
-            self._tell(self._on_trouble, str(error))
+            post(self._loop, self._on_trouble, str(error))
             return
         self._store = opened.store
         if opened.set_aside is not None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings: flags override the environment, which overrides the configuration files, which override the defaults."""
 
+from service.settings.key import SettingsError
 from service.settings.load import default_state_dir, load_settings, takeoff_limit_m
-from service.settings.problem import SettingsError
 from service.settings.settings import DEFAULT_GCS, PassThroughRule, Settings, TlogLimits
 
 __all__ = [

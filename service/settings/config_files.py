@@ -3,15 +3,13 @@
 
 import difflib
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from service.machine.bounded_file import read_bounded
-from service.settings.key import short
-from service.settings.key_lines import key_lines
-from service.settings.problem import Problem
+from service.settings.key import Problem, short
 from service.settings.table import KEYS, TABLES
 
 DROP_INS = "conf.d"
@@ -19,6 +17,12 @@ _MAX_BYTES = 1 << 20
 #: Reported per file, in case another program's file was named by mistake.
 _MOST_UNKNOWN = 20
 _NAMES = frozenset(key.name for key in KEYS)
+#: One of these ends a value that began in an earlier line; other lines are skipped.
+_ENDS = ("]", '"""', "'''")
+#: The number of attempts at one value; if it does not end, the rest of the file has no line numbers.
+_MOST_LOOKS = 200
+
+Keys = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,3 +100,52 @@ def _flat(tables: Mapping[str, Any]) -> Iterable[tuple[tuple[str, ...], Any]]:
         if name in TABLES and isinstance(value, dict):
             for key, inner in value.items():
                 yield (name, key), inner
+
+
+def key_lines(text: str) -> Mapping[Keys, int]:
+    """The lines, from 1, in which tables and the keys in them are first named in a valid file.
+
+    The parser of the standard library does not provide them.
+    """
+    found: dict[Keys, int] = {}
+    table: Keys = ()
+    for number, statement, held in _statements(text):
+        names = list(_names(held))
+        if statement.lstrip().startswith("["):
+            table = names.pop()
+            found.setdefault(table, number)
+            # [zenoh.transport] also names zenoh.
+            found.setdefault(table[:1], number)
+        for name in names:
+            found.setdefault(table + name, number)
+    return found
+
+
+def _statements(text: str) -> Iterator[tuple[int, str, Mapping[str, Any]]]:
+    """Yield the shortest runs of lines that are valid TOML: a table's header, or a key with its value."""
+    statement, began, looks = "", 1, 0
+    for number, line in enumerate(text.split("\n"), 1):
+        if not statement:
+            began, looks = number, 0
+        may_end = not statement or any(end in line for end in _ENDS)
+        statement += line + "\n"
+        if not may_end:
+            continue
+        try:
+            held = tomllib.loads(statement)
+        except ValueError:
+            looks += 1
+            if looks == _MOST_LOOKS:
+                return
+            continue
+        yield began, statement, held
+        statement = ""
+
+
+def _names(held: Mapping[str, Any]) -> Iterator[Keys]:
+    """Yield the keys of a statement, one table level deep."""
+    for key, value in held.items():
+        yield (key,)
+        inner = value[-1] if isinstance(value, list) and value else value
+        if isinstance(inner, dict):
+            yield from ((key, name) for name in inner)

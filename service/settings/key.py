@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One setting: its name, its meaning, and how its value is read."""
+"""One setting: its name, its meaning, how its value is read, and the problems of a wrong one."""
 
 import tomllib
 from abc import ABC, abstractmethod
@@ -15,6 +15,25 @@ _repr.maxstring = _repr.maxother = _repr.maxlong = 80
 
 class Unfit(ValueError):
     """A value that cannot be used; the text continues a sentence after the key's name: "is 7, but must be ..."."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """`where`: file and line, environment variable or flag; may be empty. `text`: the problem, and the remedy."""
+
+    where: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.text}" if self.where else self.text
+
+
+class SettingsError(ValueError):
+    """Settings that cannot be used; one line per problem."""
+
+    def __init__(self, problems: Sequence[Problem] | str) -> None:
+        self.problems = (Problem("", problems),) if isinstance(problems, str) else tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
 class Reader(ABC):

@@ -9,9 +9,8 @@ from typing import Any
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from service.settings.addresses import GcsAddress, SerialFc, parse_gcs, split_gcs
 from service.settings.config_files import Given, nearest, read_files
-from service.settings.key import Unfit
+from service.settings.key import Problem, SettingsError, Unfit
 from service.settings.ports import port_conflicts
-from service.settings.problem import Problem, SettingsError
 from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
 from service.settings.table import KEYS
 from service.settings.web import WebSettings

@@ -2,11 +2,11 @@
 """Queries about the vehicle: state, history, mission/current and mission/list."""
 
 from bridge.bridge import Bridge
-from service.control.mission_data import Json
+from service.control.mission_data import Json, strict
 from service.daemon.api import MissionJobs
 from service.zenoh_link import keys
 from service.zenoh_link.history import History
-from service.zenoh_link.payload import Payloads, strict
+from service.zenoh_link.payload import Payloads
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.vehicle_data import VehicleData, mission_current
 

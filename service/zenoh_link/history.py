@@ -9,7 +9,7 @@ from pathlib import Path
 
 from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
-from service.machine.disk_thread import DiskThread
+from service.machine.threads import DiskThread
 from service.zenoh_link.logged_past import LoggedPast, read_logged_past
 from service.zenoh_link.time_range import parse_time_range
 

@@ -7,7 +7,7 @@ import zenoh
 
 from bridge.model.events import EventLog
 from service.control.mission_data import Json
-from service.zenoh_link.threads import post
+from service.machine.threads import post
 
 
 class Liveliness:

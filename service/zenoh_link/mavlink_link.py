@@ -7,9 +7,9 @@ import zenoh
 
 from bridge.gcs.station import Peer
 from service.links.gcs_events import GcsEvents
+from service.machine.threads import post
 from service.zenoh_link.keys import MAVLINK_OUT
 from service.zenoh_link.publisher import Publisher
-from service.zenoh_link.threads import post
 
 #: All subscribers are one peer: zenoh does not tell them apart.
 _READERS = Peer("zenoh", MAVLINK_OUT.suffix)

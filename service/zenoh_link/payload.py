@@ -2,7 +2,6 @@
 """Payloads: plain data in JSON or compact CBOR, with a version, a sequence number and a time."""
 
 import json
-import math
 from collections.abc import Callable, Hashable
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -74,17 +73,6 @@ def plain(thing: Any) -> Json:
     """Turn a dataclass into plain data, recursively. asdict() copies everything and takes five times as long."""
     names, values = _layout(type(thing))  # type: ignore[arg-type]  # a class can be hashed
     return dict(zip(names, map(_plain_value, values(thing)), strict=True))
-
-
-def strict(value: Any) -> Any:
-    """Replace numbers that JSON lacks: NaN ("not given") becomes null, infinity a text."""
-    if isinstance(value, dict):
-        return {key: strict(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [strict(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    return value
 
 
 def _plain_value(value: Any) -> Any:

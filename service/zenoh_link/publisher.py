@@ -11,9 +11,9 @@ import zenoh
 from zenoh import ext
 
 from service.control.mission_data import Json
+from service.machine.threads import post
 from service.zenoh_link.keys import STATE, SampleDelivery, ZenohKey
 from service.zenoh_link.payload import Payloads
-from service.zenoh_link.threads import post
 
 #: How soon after a sample its number is published, so that a subscriber notices if the last one was lost.
 _LAST_NUMBER_S = 1.0

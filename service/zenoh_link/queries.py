@@ -11,11 +11,11 @@ import zenoh
 
 from service.control.client import ControlError
 from service.control.mission_data import Json, to_json
+from service.machine.threads import post
 from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link.keys import UPLOAD
 from service.zenoh_link.payload import encoding_of
 from service.zenoh_link.session import SessionThread
-from service.zenoh_link.threads import post
 from storage.store_error import StoreError
 
 #: More at once are refused: each may hold a mission file.

@@ -13,8 +13,8 @@ import pytest
 import trustme
 
 from protocols.mission_file import write_qgc_wpl
+from service.settings.key import SettingsError
 from service.settings.load import load_settings
-from service.settings.problem import SettingsError
 from service.zenoh_link.keys import COMMANDS
 from tests.support.benches import Bench, Starter
 from tests.support.plan import judge, plain_plan, records_of

@@ -3,7 +3,7 @@
 
 import threading
 
-from service.machine.disk_thread import DiskThread
+from service.machine.threads import DiskThread
 
 
 def test_work_is_done_in_order_and_waited_for() -> None:

@@ -6,7 +6,7 @@ import tomllib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.settings.key_lines import key_lines
+from service.settings.config_files import key_lines
 from service.settings.sample import sample
 
 TEXT = '''# settings

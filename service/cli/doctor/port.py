@@ -9,14 +9,13 @@ from pathlib import Path
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.links.serial_ports import serial_ports
 from service.machine.documentation import page
-from service.machine.host import Host, Process
+from service.machine.host import LOGIN_PROGRAMS, Host, Process
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import FcAddress, SerialFc
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"
 _CMDLINES = ("/boot/firmware/cmdline.txt", "/boot/cmdline.txt")
-_LOGIN_PROGRAMS = ("agetty", "getty", "login")
 _RULES = ("/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d")
 _RULE = "60-naze-bridge.rules"
 
@@ -82,7 +81,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     # The firmware's name for the header's UART.
     names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
     found, remedies = [], []
-    if _getty(host, device.name):
+    if host.has_login(device.name):
         found.append(f"serial-getty@{device.name} runs there")
         remedies.append(f"sudo systemctl disable --now serial-getty@{device.name}.service")
     elif host.names("/etc/systemd/system/getty.target.wants", f"serial-getty@{device.name}.service"):
@@ -113,7 +112,7 @@ def check_holder(host: Host, fc: FcAddress) -> Checked | None:
     holder = holder_of_port(host, fc)
     if holder is None:
         return ok("other programs", f"no program has {device} open")
-    if holder.name in _LOGIN_PROGRAMS:
+    if holder.name in LOGIN_PROGRAMS:
         return None  # reported by the console's check
     who = f"{holder.name} (pid {holder.pid})"
     if holder.is_naze_bridge:
@@ -148,7 +147,3 @@ def _device(host: Host, fc: FcAddress) -> Path | None:
         return None
     device = host.resolve(fc.path)
     return device if host.path(device).exists() else None
-
-
-def _getty(host: Host, terminal: str) -> bool:
-    return any(process.name in _LOGIN_PROGRAMS and terminal in process.arguments[1:] for process in host.processes())

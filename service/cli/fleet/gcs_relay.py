@@ -9,9 +9,9 @@ import zenoh
 from bridge.gcs.station import Peer
 from bridge.gcs.stations import displaced
 from service.links.gcs_links import GcsLink, open_link
+from service.machine.threads import post
 from service.settings.addresses import GcsAddress
 from service.zenoh_link.keys import MAVLINK_IN, MAVLINK_OUT, full
-from service.zenoh_link.threads import post
 
 
 class GcsRelay:

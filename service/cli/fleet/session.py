@@ -79,34 +79,27 @@ def ask_each(
 ) -> Iterator[tuple[str, zenoh.Reply]]:
     """Query vehicles individually, some at a time, and yield the replies of each as they arrive."""
     replies: queue.SimpleQueue[tuple[str, zenoh.Reply | None]] = queue.SimpleQueue()
+
+    def start(name: str) -> None:
+        send_query(
+            session,
+            full(prefix, name, suffix),
+            lambda reply: replies.put((name, reply)),
+            lambda: replies.put((name, None)),
+            payload,
+            timeout_s,
+        )
+
     waiting, running = deque(names), 0
     while waiting or running:
         while waiting and running < AT_ONCE:
-            _start(session, full(prefix, waiting[0], suffix), waiting.popleft(), replies, payload, timeout_s)
+            start(waiting.popleft())
             running += 1
         name, reply = replies.get()
         if reply is None:
             running -= 1
         else:
             yield name, reply
-
-
-def _start(
-    session: zenoh.Session,
-    selector: str,
-    name: str,
-    replies: "queue.SimpleQueue[tuple[str, zenoh.Reply | None]]",
-    payload: bytes | None,
-    timeout_s: float,
-) -> None:
-    send_query(
-        session,
-        selector,
-        lambda reply: replies.put((name, reply)),
-        lambda: replies.put((name, None)),
-        payload,
-        timeout_s,
-    )
 
 
 def send_query(

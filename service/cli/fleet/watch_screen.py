@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The output of `fleet watch`: a screen for a person, lines for a program."""
 
+import os
+import select
+import sys
+import termios
 import time
-from collections.abc import Sequence
+import tty
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 
 import zenoh
@@ -12,7 +18,6 @@ from rich.text import Text
 
 from service.cli.fleet.conditions import Condition
 from service.cli.fleet.fleet_table import watch_table
-from service.cli.fleet.keyboard import scrolling, wait_for_scroll
 from service.cli.fleet.session import is_connected
 from service.cli.fleet.vehicle import FleetVehicle, in_order
 from service.cli.fleet.watch import Watch
@@ -24,6 +29,9 @@ SILENT_S = 70.0
 #: Lines without a vehicle: counts, column titles and rule, the last line, and an empty one.
 _OTHER_LINES = 5
 _LINKED = ("MSP", "MAVLink")
+#: Rows that a key scrolls; pages are scrolled by `page` rows.
+_ROWS = {b"j": 1, b"\x1b[B": 1, b"k": -1, b"\x1b[A": -1}
+_PAGES = {b" ": 1, b"\x1b[6~": 1, b"b": -1, b"\x1b[5~": -1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +57,13 @@ def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condit
     """Draw the fleet until KeyboardInterrupt."""
     console = Console(highlight=False)
     top = 0
-    with scrolling(), Live(console=console, auto_refresh=False, vertical_overflow="crop") as live:
+    with _scrolling(), Live(console=console, auto_refresh=False, vertical_overflow="crop") as live:
         while True:
             page = max(console.height - _OTHER_LINES, 1)
             rows = _rows(seen, conditions)
             top = max(0, min(top, len(rows) - page))
             live.update(screen(rows, top, page, is_connected=is_connected(session)), refresh=True)
-            top += wait_for_scroll(_REFRESH_S, page)
+            top += _wait_for_scroll(_REFRESH_S, page)
 
 
 def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool) -> Group | Text:
@@ -94,3 +102,27 @@ def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[ScreenRow]:
     rows = [ScreenRow(vehicle, age_s) for vehicle, age_s in zip(fleet, ages_s, strict=True)]
     rows = [row for row in rows if all(condition(row.vehicle) for condition in conditions)]
     return sorted(rows, key=lambda row: (row.vehicle.armed is not True, not row.problem, in_order(row.vehicle.name)))
+
+
+@contextmanager
+def _scrolling() -> Iterator[None]:
+    """Deliver keys as they are pressed, if standard input is a terminal."""
+    if not sys.stdin.isatty():
+        yield
+        return
+    before = termios.tcgetattr(sys.stdin)
+    try:
+        tty.setcbreak(sys.stdin)
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _wait_for_scroll(timeout_s: float, page: int) -> int:
+    """Wait for a key; the rows to scroll, 0 for none."""
+    if not sys.stdin.isatty():
+        select.select([], [], [], timeout_s)
+        return 0
+    ready, _, _ = select.select([sys.stdin], [], [], timeout_s)
+    key = os.read(sys.stdin.fileno(), 16) if ready else b""
+    return _ROWS.get(key, 0) + _PAGES.get(key, 0) * page

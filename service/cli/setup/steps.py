@@ -65,8 +65,7 @@ def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
     in_cmdline = bool(changes)
     for console in consoles:
         wanted = f"serial-getty@{console}.service"
-        is_running = any(process.name == "agetty" and console in process.arguments for process in host.processes())
-        if is_running or host.path(f"/etc/systemd/system/getty.target.wants/{wanted}").is_symlink():
+        if host.has_login(console) or host.path(f"/etc/systemd/system/getty.target.wants/{wanted}").is_symlink():
             changes.append(Run(("systemctl", "disable", *_now(host), wanted)))
     if changes:
         yield Step("free the UART on the header from the login console", changes, needs_reboot=in_cmdline)

@@ -1,14 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A thread for work on a disk that may hang: neither the event loop nor the end of the process waits for it."""
+"""Threads beside the event loop: the way back to it, and a thread for work on a disk that may hang.
+
+Neither the event loop nor the end of the process waits for the disk.
+"""
 
 import asyncio
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from queue import SimpleQueue
-from typing import TypeVar
+from typing import TypeVar, TypeVarTuple
 
 T = TypeVar("T")
+Arguments = TypeVarTuple("Arguments")
+
+
+def post(loop: asyncio.AbstractEventLoop, callback: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
+    """Call back on the loop; ignored if the loop has ended: zenoh, or a hanging disk, may notice that later."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(callback, *arguments)
 
 
 class DiskThread:
@@ -42,8 +52,7 @@ class DiskThread:
                 answer = work()
             except Exception as error:
                 failure = error
-            with suppress(RuntimeError):  # the loop is closed: a hanging disk answered too late
-                loop.call_soon_threadsafe(settle, answer, failure)
+            post(loop, settle, answer, failure)
 
         self.submit(run)
         return await answered
