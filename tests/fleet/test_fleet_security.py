@@ -131,7 +131,7 @@ def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
 def refused(listed: subprocess.CompletedProcess[str]) -> str:
     assert (listed.returncode, listed.stdout) == (1, ""), listed
     (sentence,) = listed.stderr.splitlines()
-    assert sentence.startswith("naze-bridge: cannot join the fleet:  "), sentence
+    assert sentence.startswith("naze-bridge: cannot join the fleet: "), sentence
     return sentence
 
 

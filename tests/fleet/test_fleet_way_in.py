@@ -51,7 +51,7 @@ def test_the_daemons_own_file_says_where(router: Router, tmp_path: Path) -> None
 def test_no_router() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     sentence = sentence_of("list", "--connect", endpoint)
-    assert sentence == f"naze-bridge: cannot join the fleet:  {endpoint}: connection refused"
+    assert sentence == f"naze-bridge: cannot join the fleet: {endpoint}: connection refused"
 
 
 def test_somebody_else_listens_there() -> None:
