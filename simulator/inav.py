@@ -42,6 +42,7 @@ class InavCommand(IntEnum):
     WP_MISSION_SAVE = 19
     WP_GETINFO = 20
     STATUS_EX = 150
+    RTC = 246
     SETTING = 0x1003
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
@@ -70,7 +71,7 @@ class InavFirmware:
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
-        self._clock = boot.now
+        self._clock = self._booted_at = boot.now
         self._busy = 0.0
         self.armed = False
         self._stick_loads = boot.faults.stick_loads
@@ -228,6 +229,9 @@ class InavFirmware:
                 return struct.pack("<I", round(flight.speed_ms * 100) + _WIND_CMS if self._options.pitot else 0)
             case InavCommand.INAV_MIXER:
                 return struct.pack("<BBBBBhBB", 0, 0, 0, self._options.platform, 0, -1, 12, 18)
+            case InavCommand.RTC:
+                unix_s = self._options.unix_s and self._options.unix_s + self._clock - self._booted_at
+                return struct.pack("<IH", int(unix_s), int(unix_s % 1 * 1000))
             case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
         usual = self._sensors.payload(command, craft)

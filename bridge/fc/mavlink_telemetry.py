@@ -16,7 +16,6 @@ from bridge.model.vehicle import (
     FlightState,
     GlobalPosition,
     GpsFix,
-    GpsTime,
     Health,
     Height,
     Orientation,
@@ -35,8 +34,6 @@ from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
-#: 2020: no GPS reports an earlier time.
-_EARLIEST_UNIX_S = 1_577_836_800
 #: The autopilot field of a heartbeat's payload. Cameras and gimbals send INVALID.
 _AUTOPILOT_AT = 5
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
@@ -188,10 +185,7 @@ class MavlinkTelemetry:
             self._vehicle.hear(Height(now, Source.MAVLINK, message.alt, message.climb))
 
     def _system_time(self, message: Message, now: float) -> None:
-        """An autopilot without a GPS time counts from its start."""
-        unix_s = message.time_unix_usec / 1e6
-        if unix_s > _EARLIEST_UNIX_S:
-            self._vehicle.hear(GpsTime(now, Source.MAVLINK, unix_s))
+        self._vehicle.hear_gps_time(now, Source.MAVLINK, message.time_unix_usec / 1e6)
 
     def _home_position(self, message: Message, _now: float) -> None:
         self._vehicle.hear_home(message.latitude, message.longitude)

@@ -22,6 +22,8 @@ from protocols.msp.telemetry import Sensor
 STALE_S = 1.4
 #: Before the first arming, home follows the craft's position. Smaller moves than this are the receiver's noise.
 _STANDING_M = 10.0
+#: 2020: no GPS reports an earlier time.
+_EARLIEST_UNIX_S = 1_577_836_800
 
 
 class Source(Enum):
@@ -280,6 +282,11 @@ class Vehicle:
             self._place_home(has_armed=False)
         if altitude_m is not None:
             self.home = replace(self.home, altitude_m=altitude_m)
+
+    def hear_gps_time(self, now: float, source: Source, unix_s: float) -> None:
+        """Take its UTC, seconds since 1970. Without a GPS time an autopilot counts from its start, and INAV says 0."""
+        if unix_s > _EARLIEST_UNIX_S:
+            self.hear(GpsTime(now, source, unix_s))
 
     def last(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, however old."""

@@ -24,6 +24,7 @@ class Msp(IntEnum):
     WP = 118
     BOXIDS = 119
     NAV_STATUS = 121
+    RTC = 246
     INAV_STATUS = 0x2000
     INAV_ANALOG = 0x2002
     INAV_AIR_SPEED = 0x2009

@@ -9,10 +9,12 @@ from protocols.msp.telemetry import Sensor
 _STATUS = struct.Struct("<HHHHBI")
 _ANALOG = struct.Struct("<BHHIIIIBH")
 _AIRSPEED = struct.Struct("<I")
+_RTC = struct.Struct("<IH")
 _PLATFORM_AT = 3
 STATUS_SIZE = 22
 ANALOG_SIZE = _ANALOG.size
 AIRSPEED_SIZE = _AIRSPEED.size
+RTC_SIZE = _RTC.size
 MIXER = 0x2010
 MIXER_SIZE = 9
 _ALL_SENSORS = sum(Sensor)
@@ -89,6 +91,14 @@ def decode_inav_analog(payload: bytes) -> InavAnalog | None:
 def decode_airspeed(payload: bytes) -> int | None:
     """Decode MSP2_INAV_AIR_SPEED: cm/s; None if it is too short."""
     return int(_AIRSPEED.unpack_from(payload)[0]) if len(payload) >= _AIRSPEED.size else None
+
+
+def decode_rtc(payload: bytes) -> float | None:
+    """Decode MSP_RTC: UTC, seconds since 1970, 0 until INAV has it from its GPS; None if it is too short."""
+    if len(payload) < _RTC.size:
+        return None
+    seconds, millis = _RTC.unpack_from(payload)
+    return float(seconds + millis / 1000)
 
 
 def decode_platform(payload: bytes) -> int | None:

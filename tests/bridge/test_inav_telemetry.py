@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bridge.model.vehicle import Health, MissionLeg, Power
+from bridge.model.vehicle import GpsTime, Health, MissionLeg, Power
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.nav import NavMode
@@ -99,6 +99,15 @@ def test_load_battery_percentage_and_cells_are_the_boards_own() -> None:
     status = station.said("SYS_STATUS")[-1]
     assert (status.load, status.battery_remaining) == (70, 88)
     assert 12_000 < status.voltage_battery < 12_700
+
+
+@pytest.mark.parametrize("unix_s", [0.0, 1_777_636_800.0])
+def test_its_time_is_known_once_it_has_it_from_its_gps(unix_s: float) -> None:
+    _, world, _ = introduced(unix_s=unix_s)
+    heard = world.bridge.session.vehicle.last(GpsTime)
+    assert (heard is not None) == bool(unix_s)
+    if heard is not None:
+        assert heard.unix_s - unix_s == pytest.approx(heard.heard_at, abs=0.1)
 
 
 def test_what_keeps_it_from_arming_is_told_when_it_changes() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's own readings: load, arming blockers, battery percentage and cells, airspeed (MSP v2)."""
+"""INAV's own readings: load, arming blockers, battery percentage and cells, airspeed (MSP v2), time."""
 
 from collections.abc import Mapping
 
@@ -11,10 +11,12 @@ from protocols.msp.frame import request
 from protocols.msp.inav import (
     AIRSPEED_SIZE,
     ANALOG_SIZE,
+    RTC_SIZE,
     STATUS_SIZE,
     decode_airspeed,
     decode_inav_analog,
     decode_inav_status,
+    decode_rtc,
 )
 from protocols.msp.nav import decode_wp
 from protocols.msp.telemetry import decode_analog
@@ -25,6 +27,7 @@ INAV_POLLS = (
     Poll(Msp.INAV_AIR_SPEED, request(Msp.INAV_AIR_SPEED), AIRSPEED_SIZE, 0.5),
     # For ATTITUDE's rates.
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, 0.1),
+    Poll(Msp.RTC, request(Msp.RTC), RTC_SIZE, 2.0),
 )
 _MAX_RSSI = 1023
 
@@ -69,6 +72,12 @@ def _airspeed(vehicle: Vehicle, payload: bytes, _controller: FlightController, n
         vehicle.hear(Airspeed(now, Source.MSP, speed_cms / 100))
 
 
+def _time(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
+    unix_s = decode_rtc(payload)
+    if unix_s is not None:
+        vehicle.hear_gps_time(now, Source.MSP, unix_s)
+
+
 def _home(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
     """MSP_WP 0. Its altitude is in cm; RAW_GPS has whole metres."""
     answer = decode_wp(payload)
@@ -83,4 +92,5 @@ INAV_DECODERS: Mapping[int, Decoder] = {
     Msp.INAV_AIR_SPEED: _airspeed,
     Msp.ANALOG: _analog,
     Msp.WP: _home,
+    Msp.RTC: _time,
 }
