@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cost of telemetry over MSP: CPU at 100 polls per second, the time from a reply to its datagram, and noise.
+"""The cost of telemetry over MSP: CPU, the time from a reply to its datagram, and noise.
 
 CPU: the daemon polls a simulated Naze that keeps the pace of a UART, and sends the 100 datagrams per second that one
-ground station requested. Latency: the other end of the terminal is in this process and replies at once; each attitude
-is numbered, so that a datagram is matched with its reply. Noise needs no port: a bridge that has found a flight
-controller gets it in simulated time.
+ground station requested, or only attitudes. Latency: the other end of the terminal is in this process and replies at
+once; each attitude is numbered, so that a datagram is matched with its reply. The floor of both is a bare loop that
+polls a board of its own at the same rates at the same time (benchmarks.floors). Noise needs no port: a bridge that has
+found a flight controller gets it in simulated time.
 """
 
 import math
@@ -18,17 +19,19 @@ import threading
 import time
 import tracemalloc
 import tty
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks.figure import Figure
+from benchmarks.figure import Figure, Floor
+from benchmarks.forwarders import cpu_s
 from benchmarks.idle import cpu_percent, listener, udpout
-from benchmarks.processes import BenchmarkError, daemon, simulated_naze
+from benchmarks.processes import BenchmarkError, daemon, floor_program, simulated_naze
 from bridge.bridge import Bridge
 from bridge.config import BridgeConfig
 from bridge.gcs.station import Peer
 from bridge.model.events import Level
+from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
@@ -45,8 +48,15 @@ _WISHES_HZ = {
     messages.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 21,
     messages.MAVLINK_MSG_ID_VFR_HUD: 21,
 }
+#: The same as polls, for the floor.
+_POLLS_HZ = {Msp.ATTITUDE: 50, Msp.RAW_GPS: 21, Msp.ALTITUDE: 21}
+_ATTITUDES_HZ = 50
+_ONLY_ATTITUDES_HZ = {row.msgid: 0 for row in TELEMETRY} | {messages.MAVLINK_MSG_ID_ATTITUDE: _ATTITUDES_HZ}
 _SETTLING_S = 2.0
+_WATCHED_S = 20
 _ANSWERS = 2000
+#: The daemon and the bare loop take turns, so that both see the same load of the machine.
+_ANSWERS_A_TURN = 100
 ATTITUDES = 1800
 _NOISE_BYTES = 10_000_000
 _CHUNK_BYTES = 1000
@@ -55,9 +65,9 @@ _SEED = 1
 
 
 def measure() -> list[Figure]:
-    """Measure all three."""
+    """Measure all four."""
     with tempfile.TemporaryDirectory() as name:
-        return [_cpu(Path(name)), *_latency(Path(name)), *_noise()]
+        return [_cpu(Path(name)), _attitude_cpu(Path(name)), *_latency(Path(name)), *_noise()]
 
 
 def _cpu(folder: Path) -> Figure:
@@ -72,27 +82,89 @@ def _cpu(folder: Path) -> Figure:
     return Figure(f"daemon at {POLLS_HZ} polls a second, CPU of one core", percent, "%", None, 5.0)
 
 
+def _attitude_cpu(folder: Path) -> Figure:
+    ours, bare = folder / "ours", folder / "bare"
+    ours.mkdir()
+    bare.mkdir()
+    with (
+        simulated_naze(ours) as board,
+        simulated_naze(bare) as bare_board,
+        listener() as ground,
+        listener() as bare_ground,
+        daemon(ours, board.link, udpout(ground)) as process,
+        _bare_loop(bare, bare_board.link, bare_ground, {Msp.ATTITUDE: _ATTITUDES_HZ}) as bare_pid,
+    ):
+        process.wait_for_event("fc.found")
+        _request(ground, _ONLY_ATTITUDES_HZ)
+        time.sleep(_SETTLING_S)
+        drain(ground)
+        drain(bare_ground)
+        pids = process.pid, bare_pid
+        before = [cpu_s(pid) for pid in pids]
+        count = bare_count = 0
+        for _ in range(_WATCHED_S):
+            time.sleep(1)
+            count += _count_attitudes(ground)
+            bare_count += _count_attitudes(bare_ground)
+        ours_s, bare_s = (cpu_s(pid) - spent for pid, spent in zip(pids, before, strict=True))
+    return Figure(
+        f"CPU per attitude at {_ATTITUDES_HZ} Hz, polls included",
+        ours_s / count * 1e6,
+        "us",
+        Floor(bare_s / bare_count * 1e6, "bare loop"),
+        2.0,
+        times_floor=True,
+    )
+
+
 def _latency(folder: Path) -> list[Figure]:
+    ours_ms: list[float] = []
+    bare_ms: list[float] = []
     with (
         instant_controller(folder / "instant") as controller,
+        instant_controller(folder / "instant-bare") as bare_controller,
         listener() as ground,
+        listener() as bare_ground,
         daemon(folder, folder / "instant", udpout(ground)) as process,
+        _bare_loop(folder, folder / "instant-bare", bare_ground, _POLLS_HZ),
     ):
         process.wait_for_event("fc.found")
         wish(ground)
         time.sleep(_SETTLING_S)
-        drain(ground)
         asked, began_at = controller.asked, time.perf_counter()
-        milliseconds = sorted(_wait_for_attitude(ground, controller) * 1000 for _ in range(_ANSWERS))
+        while len(ours_ms) < _ANSWERS:
+            ours_ms += _latencies_ms(ground, controller)
+            bare_ms += _latencies_ms(bare_ground, bare_controller)
         polls_hz = (controller.asked - asked) / (time.perf_counter() - began_at)
     if polls_hz < 0.95 * POLLS_HZ:
         raise BenchmarkError(f"only {polls_hz:.0f} polls a second were asked")
-    p99 = milliseconds[int(len(milliseconds) * 0.99)]
+    median = Floor(statistics.median(bare_ms), "bare loop")
+    p99 = Floor(_p99(bare_ms), "bare loop")
     return [
         Figure("polls a second that it was measured at", polls_hz, ""),
-        Figure(f"reply to datagram, median of {_ANSWERS}", statistics.median(milliseconds), "ms"),
-        Figure("reply to datagram, p99", p99, "ms", None, 2.0),
+        Figure(
+            f"reply to datagram, median of {_ANSWERS}", statistics.median(ours_ms), "ms", median, 2.0, times_floor=True
+        ),
+        Figure("reply to datagram, p99", _p99(ours_ms), "ms", p99, 2.0),
     ]
+
+
+@contextmanager
+def _bare_loop(folder: Path, link: Path, ground: socket.socket, polls_hz: Mapping[Msp, float]) -> Iterator[int]:
+    """Run the floor; yields its process id."""
+    rates = [f"{command:d}={rate_hz}" for command, rate_hz in polls_hz.items()]
+    with floor_program(folder, "attitude", str(link), str(ground.getsockname()[1]), *rates) as (pid, _):
+        yield pid
+
+
+def _latencies_ms(ground: socket.socket, controller: "Controller") -> list[float]:
+    """The delays of the next attitudes."""
+    drain(ground)
+    return [_wait_for_attitude(ground, controller) * 1000 for _ in range(_ANSWERS_A_TURN)]
+
+
+def _p99(values: list[float]) -> float:
+    return statistics.quantiles(values, n=100)[98]
 
 
 def _noise() -> list[Figure]:
@@ -139,11 +211,17 @@ def _noise() -> list[Figure]:
 
 
 def wish(ground: socket.socket) -> None:
-    """Request the rates, as a ground station does."""
+    """Request the rates for 100 polls a second, as a ground station does."""
+    _request(ground, _WISHES_HZ)
+
+
+def _request(ground: socket.socket, rates_hz: Mapping[int, float]) -> None:
+    """Request message rates; 0: never."""
     _, sender = ground.recvfrom(2048)
-    for msgid, rate_hz in _WISHES_HZ.items():
-        wish = messages.MAVLink_command_long_message(1, 1, 511, 0, msgid, 1e6 / rate_hz, 0, 0, 0, 0, 0)
-        ground.sendto(_frame(wish), sender)
+    for msgid, rate_hz in rates_hz.items():
+        interval_us = 1e6 / rate_hz if rate_hz else -1
+        request = messages.MAVLink_command_long_message(1, 1, 511, 0, msgid, interval_us, 0, 0, 0, 0, 0)
+        ground.sendto(_frame(request), sender)
 
 
 def _frame(message: messages.MAVLink_message) -> bytes:
@@ -158,6 +236,18 @@ def drain(ground: socket.socket) -> None:
             ground.recv(2048)
     except BlockingIOError:
         ground.settimeout(10)
+
+
+def _count_attitudes(ground: socket.socket) -> int:
+    """Read the datagrams received so far; returns how many attitudes they hold."""
+    ground.setblocking(False)
+    count = 0
+    try:
+        while True:
+            frames = MavlinkSplitter().feed(ground.recv(2048))
+            count += sum(frame.msgid == messages.MAVLINK_MSG_ID_ATTITUDE for frame in frames)
+    except BlockingIOError:
+        return count
 
 
 def _wait_for_attitude(ground: socket.socket, controller: "Controller") -> float:
