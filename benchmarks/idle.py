@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The cost of an idle daemon: CPU, memory, and the time from its start to its first heartbeat.
 
-It polls a simulated Naze behind a pseudo-terminal at 115200 baud and sends telemetry to one ground station over UDP.
-The Naze runs in another process and is not counted.
+It polls a simulated Naze behind a pseudo-terminal at 115200 baud and sends telemetry to one UDP address: first no
+station answers from there, then one that requests nothing, then one that requests Mission Planner's rates. The Naze
+runs in another process and is not counted.
 """
 
 import os
@@ -11,11 +12,15 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.figure import Figure, Floor
 from benchmarks.processes import ENVIRONMENT, Board, daemon, floor_program, simulated_naze
+from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter
 
@@ -23,6 +28,20 @@ _SETTLING_S = 3.0
 _WATCHED_S = 20.0
 _STARTS = 7
 _DIALECT = "from pymavlink.dialects.v20 import ardupilotmega"
+#: Hz by stream.
+_MISSION_PLANNER_HZ = {
+    messages.MAV_DATA_STREAM_EXTENDED_STATUS: 2,
+    messages.MAV_DATA_STREAM_POSITION: 2,
+    messages.MAV_DATA_STREAM_EXTRA1: 4,
+    messages.MAV_DATA_STREAM_EXTRA2: 4,
+    messages.MAV_DATA_STREAM_EXTRA3: 2,
+    messages.MAV_DATA_STREAM_RAW_SENSORS: 2,
+    messages.MAV_DATA_STREAM_RC_CHANNELS: 2,
+}
+_MISSION_PLANNER = [
+    messages.MAVLink_request_data_stream_message(1, 1, stream, rate_hz, 1)
+    for stream, rate_hz in _MISSION_PLANNER_HZ.items()
+]
 LIBRARIES = f"import asyncio, sqlite3, serial, structlog, fastcrc; {_DIALECT}"
 
 
@@ -38,18 +57,42 @@ def _idle(folder: Path, board: Board) -> list[Figure]:
         bare_percent = cpu_percent(pid)
     with listener() as ground, daemon(folder, board.link, udpout(ground)) as process:
         process.wait_for_event("fc.found")
-        percent = cpu_percent(process.pid)
+        unanswered_percent = cpu_percent(process.pid)
+        with _connected(ground):
+            percent = cpu_percent(process.pid)
+        with _connected(ground, _MISSION_PLANNER):
+            mission_planner_percent = cpu_percent(process.pid)
         memory_mb = resident_mb(process.pid)
+    floor = Floor(bare_percent, "bare polls")
     return [
-        Figure(
-            f"idle daemon, CPU of one core over {_WATCHED_S:.0f} s",
-            percent,
-            "%",
-            Floor(bare_percent, "bare polls"),
-            2.0,
-        ),
+        Figure("idle daemon, CPU of one core, no station has answered", unanswered_percent, "%", None, 2.0),
+        Figure("idle daemon, CPU of one core, default rates", percent, "%", floor, 2.0),
+        Figure("idle daemon, CPU of one core, Mission Planner's rates", mission_planner_percent, "%", None, 2.0),
         Figure("idle daemon, resident", memory_mb, "MB", Floor(libraries_mb(LIBRARIES), "its libraries"), 40.0),
     ]
+
+
+@contextmanager
+def _connected(ground: socket.socket, requests: Sequence[messages.MAVLink_message] = ()) -> Iterator[None]:
+    """Answer as a ground station: send requests, then a heartbeat every second."""
+    writer = FrameWriter(255, 190)
+    heartbeat = messages.MAVLink_heartbeat_message(messages.MAV_TYPE_GCS, messages.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3)
+    _, vehicle = ground.recvfrom(2048)
+    ended = threading.Event()
+
+    def beat() -> None:
+        while not ended.wait(1.0):
+            ground.sendto(writer.frame(pack(heartbeat), 2), vehicle)
+
+    for message in (heartbeat, *requests):
+        ground.sendto(writer.frame(pack(message), 2), vehicle)
+    thread = threading.Thread(target=beat)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def _starts(folder: Path, board: Board) -> list[Figure]:

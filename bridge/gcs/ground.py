@@ -100,6 +100,10 @@ class Ground:
             self._everyone = self._count_everyone()
         return self._everyone
 
+    def unheard(self) -> list[Peer]:
+        """The default peers that are not connected: nothing may be listening there."""
+        return [peer for peer in self._default_peers if self._stations.is_unknown(peer)]
+
     def _count_everyone(self) -> list[Peer]:
         heard = self._stations.peers()
         answered = {peer.link for peer in heard}

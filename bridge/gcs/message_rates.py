@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Message rates of each ground station: as requested, else the defaults. Sans-IO."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from math import inf
 
@@ -13,6 +13,8 @@ from bridge.gcs.station import Peer
 _MOST_PER_S = 2400
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
+#: The shortest interval for an unwatched peer, s. The default rates would cost a Pi Zero twice the CPU.
+_UNWATCHED_S = 0.1
 
 
 class MessageRates:
@@ -23,6 +25,8 @@ class MessageRates:
         self._requested: dict[Peer, dict[int, float]] = {}
         self._due: dict[tuple[Peer, int], float] = {}
         self._shares: dict[Peer, TokenBucket] = {}
+        #: Peers at whose end there may be no station. They get no message more than ten times a second.
+        self.unwatched: Collection[Peer] = ()
 
     def knows(self, msgid: int) -> bool:
         """True if the vehicle has such a message."""
@@ -39,7 +43,8 @@ class MessageRates:
     def interval_s(self, peer: Peer, msgid: int) -> float:
         """The interval requested by a ground station, or the default."""
         requested = self._requested.get(peer)
-        return self._defaults[msgid] if requested is None else requested.get(msgid, self._defaults[msgid])
+        interval_s = self._defaults[msgid] if requested is None else requested.get(msgid, self._defaults[msgid])
+        return max(interval_s, _UNWATCHED_S) if peer in self.unwatched else interval_s
 
     def fastest_s(self, msgid: int, peers: Iterable[Peer]) -> float:
         """The shortest interval of `peers`."""

@@ -121,6 +121,7 @@ class OwnVehicle:
         self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
         self._rates.keep(everyone)
+        self._rates.unwatched = () if self._session.vehicle.armed else self._ground.unheard()
         self._set_polls(everyone)
         self._ground.introduce(self._heartbeat())
         for msgid, make in self._ticked.items():

@@ -243,6 +243,32 @@ def test_the_rates_without_a_wish(baud: int, attitude_hz: float, position_hz: fl
     assert polls(world)[Msp.STATUS] / 30 == pytest.approx(status_hz, rel=0.2)
 
 
+def test_an_address_without_a_station_gets_ten_a_second_until_one_answers_or_the_craft_arms() -> None:
+    world = World(SimOptions(), speeds=(115200,))
+    station = GroundStation(world)
+    world.bridge.ground.add_default_peer(station.peer, until_answered=False)
+    world.run(3)
+    station.take()
+    world.run(10)
+    assert rate_hz(station, "ATTITUDE", 10) == pytest.approx(10, abs=1)
+    assert rate_hz(station, "GPS_RAW_INT", 10) == pytest.approx(5, abs=1)
+    world.faults.armed = True
+    world.run(3)
+    station.take()
+    world.run(10)
+    assert rate_hz(station, "ATTITUDE", 10) == pytest.approx(25, abs=2)
+    world.faults.armed = False
+    world.run(3)
+    station.take()
+    world.run(10)
+    assert rate_hz(station, "ATTITUDE", 10) == pytest.approx(10, abs=1)
+    beat(station)
+    world.run(2)
+    station.take()
+    world.run(10)
+    assert rate_hz(station, "ATTITUDE", 10) == pytest.approx(25, abs=2)
+
+
 def test_a_bad_line_slows_the_polls_and_a_good_one_brings_them_back() -> None:
     world, station = flown(5)
     rates = []
