@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the bridge decides. Sans-IO: time and bytes are passed in, effects are handed out."""
+"""The bridge's decisions. Sans-IO: time and bytes are passed in, effects are returned."""

@@ -45,7 +45,7 @@ class ActionResult(Enum):
     OCCUPIED = "Wait for the mission transfer to end"
     NO_SENSOR = "The flight controller has no such sensor"
     NO_ANSWER = "No answer from the flight controller"
-    REFUSED = "The flight controller does not know this"
+    REFUSED = "Not supported by the flight controller"
 
 
 class FcActions:

@@ -76,7 +76,7 @@ class Found:
 def visit_order(
     known: int | None, speeds: Sequence[int | None], first: Sequence[int | None] = ()
 ) -> Iterator[int | None]:
-    """Yield speeds for ever; every other one is the last good speed, to which a rebooting board returns."""
+    """Yield speeds forever; every other one is the last good speed, to which a rebooting board returns."""
     yield from first
     others = [speed for speed in speeds if speed != known] or [known]
     while True:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MSP requests of other programs (INAV Configurator, MultiWiiConf, mwp) to a disarmed flight controller. Sans-IO.
 
-Each request is a conversation of its own, so that it never mixes with a mission transfer, and telemetry polls go on
-between two of them. MSP has an error reply but no place for a reason: that is in the log and in `status`.
+Each request is a conversation, so it never mixes with a mission transfer, and telemetry polls continue in between.
+MSP's error reply cannot carry a reason: that is in the log and in `status`.
 """
 
 from collections.abc import Callable
@@ -15,9 +15,9 @@ from bridge.line.runner import Runner
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, request
 from protocols.msp.hazards import is_clean
 
-#: Never carried: SET_RAW_RC and SET_MOTOR move the craft, REBOOT and SET_PASSTHROUGH take the line away from everyone.
+#: Never forwarded: SET_RAW_RC and SET_MOTOR move the craft, REBOOT and SET_PASSTHROUGH disconnect everyone.
 _NEVER = {68: "REBOOT", 200: "SET_RAW_RC", 214: "SET_MOTOR", 245: "SET_PASSTHROUGH"}
-#: Without a payload a request is a question, except for these: calibrations, RESET_CONF, EEPROM_WRITE.
+#: Without a payload a request only reads, except for these: calibrations, RESET_CONF, EEPROM_WRITE.
 _ACTIONS = frozenset((205, 206, 208, 250))
 #: With a payload it is a change, except for these: WP, DATAFLASH_READ, COMMON_SETTING, COMMON_SETTING_INFO,
 #: COMMON_PG_LIST.
@@ -29,7 +29,7 @@ _MAX_PENDING = 16
 
 
 class MspSharing:
-    """Carries requests one at a time. `request` returns why one is refused, or "" if it is carried."""
+    """Forwards requests one at a time. `request` returns the reason for a refusal, "" if there is none."""
 
     def __init__(self, session: FcSession, runner: Runner) -> None:
         self._session = session
@@ -37,7 +37,7 @@ class MspSharing:
         self._pending = 0
 
     def request(self, frame: MspFrame, answer: Callable[[MspFrame], None], now: float, *, may_write: bool) -> str:
-        """Carry a request; `answer` gets the reply, or nothing if the flight controller does not answer."""
+        """Forward a request; `answer` gets the reply, or is not called if the flight controller does not reply."""
         why = self._refusal(frame, may_write=may_write)
         if why:
             return why
@@ -60,7 +60,7 @@ class MspSharing:
         if self._pending >= _MAX_PENDING:
             return "too many requests at once"
         if frame.command in _NEVER:
-            return f"{_NEVER[frame.command]} is never passed on"
+            return f"{_NEVER[frame.command]} is never forwarded"
         if not may_write and is_change(frame):
             return f"command {frame.command} changes something: set write = true in its [[share]] to allow that"
         if not (link.any_byte or is_clean(request(frame.command, frame.payload))):
@@ -71,7 +71,7 @@ class MspSharing:
 
 
 def is_change(frame: MspFrame) -> bool:
-    """Whether a request may change something on the flight controller."""
+    """True if a request may change something on the flight controller."""
     if frame.payload:
         return frame.command not in _QUESTIONS_WITH_PAYLOAD
     return frame.command in _ACTIONS

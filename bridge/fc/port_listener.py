@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Listens to a serial port before anything is sent there: is it a GPS receiver, or a telemetry radio? Sans-IO.
+"""Listens to a serial port before anything is sent, to detect GPS receivers and telemetry radios. Sans-IO.
 
 A GPS receiver sends at least once a second. A SiK radio puts RADIO_STATUS of its own (system 51, component 68) between
-the frames of the other end, which is a ground station. Both are told from a flight controller by whole frames only.
-What stays silent, or is not understood at any speed, may be a flight controller: autosense goes on with it.
+the frames of the other end, which is a ground station. Only complete frames count. A device that stays silent, or is
+not understood at any speed, may be a flight controller and is left to autosense.
 """
 
 from protocols.gps_receiver import GpsWatch
@@ -25,7 +25,7 @@ class OtherDeviceWatch:
 
     def __init__(self) -> None:
         self.what = ""
-        #: A MAVLink vehicle was heard: that is one.
+        #: A MAVLink vehicle was heard: a flight controller.
         self.is_vehicle = False
         self._gps = GpsWatch()
         self._mavlink = MavlinkSplitter()
@@ -48,7 +48,7 @@ class OtherDeviceWatch:
 
 
 class PortListener:
-    """One port. Set it to `speed`, feed bytes and time until `is_done`; `what` is empty if it may be asked."""
+    """One port. Set it to `speed`, feed bytes and time until `is_done`; `what` is empty if it may be probed."""
 
     def __init__(self, now: float) -> None:
         self._speeds = iter(LISTENING_SPEEDS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The profile of a flight controller: everything in which one kind differs from another.
+"""The profile of a flight controller: everything specific to one kind of board.
 
 `bridge.controllers.table` lists the profiles. To add a flight controller, write its profile in a file of its own under
 `bridge/controllers/` and add it to that list; nothing else asks what kind of board it is.
@@ -50,7 +50,7 @@ class Profile:
     open_store: how missions are written to it, or None with `no_missions` as the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
-    is_passed_through: an autopilot that represents itself to ground stations. It is never spoken for.
+    is_passed_through: an autopilot that represents itself to ground stations. The bridge sends nothing in its name.
     restarts_after_calibration: it reboots by itself when a calibration is done.
     notice: a warning for the pilot while this profile is active.
     """

@@ -74,7 +74,7 @@ class FcSession:
 
     @property
     def vehicle(self) -> Vehicle:
-        """What it has told, kept when it is lost."""
+        """Its readings, kept when it is lost."""
         return self._port.vehicle
 
     @property
@@ -146,7 +146,7 @@ class FcSession:
         return output + self.state.take_output()
 
     def settle_telemetry(self) -> None:
-        """Read what a passed-through autopilot has sent into the vehicle."""
+        """Update the vehicle from the messages of a passed-through autopilot."""
         if isinstance(self.state, Mavlink):
             self.state.telemetry.settle()
 
@@ -156,7 +156,7 @@ class FcSession:
             self._port.output.append(frame)
 
     def _handle(self, event: Event, now: float) -> None:
-        """Go where the table says."""
+        """Change the state by the table."""
         before = self.state
         after = TRANSITIONS[type(before)][event.spoken if isinstance(event, Found) else type(event)]
         if not isinstance(event, Identified):

@@ -163,7 +163,7 @@ class Ground:
         return [frame for frame in frames if (frame.sysid, frame.compid) != (self._sysid, self._compid)]
 
     def admits(self, peer: Peer, now: float) -> bool:
-        """False if a frame is not to be noted, because it comes from one of too many new addresses."""
+        """False if a frame must be ignored, because it comes from one of too many new addresses."""
         standing = self._standing(peer)
         if standing is Standing.PROVEN or not self._stations.is_unknown(peer):
             return True
@@ -320,7 +320,7 @@ class Ground:
         writer = self._writers.get(peer)
         if writer is None:
             writer = FrameWriter(self._sysid, self._compid, self._signers.get(peer.link))
-            # A late answer to a peer that has left must not keep a writer for ever.
+            # A late reply to a peer that has left must not keep a writer forever.
             if peer in self.everyone():
                 self._writers[peer] = writer
         return writer

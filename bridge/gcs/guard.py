@@ -2,7 +2,7 @@
 """Access control: the one place that every frame from a ground station passes first. Sans-IO.
 
 Every peer that reaches a link may read. Everything else may change what the aircraft does, even a message that does
-not exist yet: so the lists here name the messages that pass without proof, not those that need it.
+not exist yet: so the lists here name the messages allowed without proof, not those that need it.
 """
 
 from collections import Counter
@@ -103,8 +103,8 @@ class Standing(Enum):
     """The rights that a peer has proven."""
 
     LISTENER = "may only read"
-    OPEN = "its link asks for nothing"
-    PROVEN = "has the key or the address that its link asks for"
+    OPEN = "its link requires nothing"
+    PROVEN = "has the key or the address that its link requires"
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ class Peer(NamedTuple):  # hashed several times for each message: as a tuple, in
 
     @property
     def host(self) -> Hashable:
-        """The machine: several peers may be on one."""
+        """The host, which may have several peers."""
         return self.key[0] if isinstance(self.key, tuple) else self.key
 
     def __str__(self) -> str:

@@ -111,11 +111,11 @@ class MavlinkLine:
 
 
 class _HarakiriSender:
-    """Makes frames in which no trap's byte stands three times in a row, nor across the border to the frame before.
+    """Makes frames without three equal hazard bytes in a row, also across the boundary to the previous frame.
 
     Three 0x0D enter the CLI in any protocol; '#' and 'R' count only in AUTOSENSE, but it can fall back to that at any
     moment. MAVLink has no masking as our MSP extension has: only the sequence number may be chosen, and with it
-    changes the CRC. A run within the payload cannot be helped.
+    changes the CRC. A run within the payload cannot be avoided.
     """
 
     def __init__(self) -> None:

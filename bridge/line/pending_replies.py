@@ -9,13 +9,13 @@ from bridge.line.msp_link import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES
 
 
 class PendingReplies:
-    """Reply bytes that are owed, by the speed at which they were asked for: at another one nothing is understood."""
+    """Pending reply bytes, by the speed of their requests: at another speed the board understood nothing."""
 
     def __init__(self) -> None:
         self._owed: dict[int | None, list[tuple[float, int]]] = {}  # until when, bytes; the oldest first
 
     def add(self, speed: int | None, size: int, asked_at: float) -> None:
-        """Take note of a question whose reply has `size` bytes."""
+        """Add a request whose reply has `size` bytes."""
         self._owed.setdefault(speed, []).append((asked_at + LONGEST_STALL_S, size))
 
     def room(self, speed: int | None, now: float) -> int:
@@ -31,7 +31,7 @@ class PendingReplies:
         return len(self._present(speed, now))
 
     def heard(self, speed: int | None, size: int, now: float) -> None:
-        """A reply of `size` bytes has come, or of none something else: it goes on, and the rest is on its way."""
+        """The board has resumed with a reply of `size` bytes (0: with other data), so the rest is on its way."""
         rest: list[tuple[float, int]] = []
         left_ring_at = now
         for until, owed in self._present(speed, now):

@@ -25,7 +25,7 @@ from bridge.line.msp_link import MspLink
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
 
-#: A failing SD card may hang for ever, and the flight controller's conversations wait behind it. Mission Planner waits
+#: A failing SD card may hang forever, and the flight controller's conversations wait behind it. Mission Planner waits
 #: 5 s for its final ack.
 _STORE_PATIENCE_S = 3.0
 

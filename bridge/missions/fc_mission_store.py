@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The interface between missions and the flight controllers that store them.
 
-A dialect is one kind of flight controller: its rules, and how a list is written, verified and read back.
+Each kind of flight controller has its own way to write, verify and read a list back:
 `bridge.controllers.harakiri.mission_store` and `bridge.controllers.harakiri.mavlink_missions` are two.
 """
 
@@ -43,14 +43,14 @@ class PushFailure(Enum):
     WRITES_SPENT = "the flight controller limits flash wear: one write in 5 minutes now, no limit after a restart"
     NO_SPACE = "the list does not fit the flight controller"
     REFUSED = "the flight controller refused a record"
-    UNSAFE = "an item's bytes would set off a trap of the firmware: move a waypoint a little"
+    UNSAFE = "an item's bytes would trigger a firmware bug: move a waypoint a little"
     FLASH = "the flight controller could not write its flash; its old mission is kept"
     NO_ANSWER = "the flight controller does not answer; its old mission is kept: write it again"
-    OUT_OF_TIME = "the flight controller did not take it in time; its old mission is kept: check the wiring"
+    OUT_OF_TIME = "the flight controller did not finish in time; its old mission is kept: check the wiring"
     STOPPED = "naze-bridge was stopped meanwhile; the old mission is kept"
     UNCERTAIN = "Link lost while writing: checked when it is back"
-    INCOMPLETE = "broken off: the flight controller holds no mission to fly now; write it again"
-    ARMED_MEANWHILE = "armed meanwhile: the flight controller holds no mission to fly now; disarm, write it again"
+    INCOMPLETE = "interrupted: the flight controller has no mission to fly now; write it again"
+    ARMED_MEANWHILE = "armed meanwhile: the flight controller has no mission to fly now; disarm, write it again"
     NOT_SAVED = "the mission is there but not saved: it is lost at power-off; write it again"
 
 

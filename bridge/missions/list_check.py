@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The check of a mission list, item by item, by the rules of the flight controller's dialect.
+"""The check of a mission list, item by item, by the rules of one kind of flight controller.
 
 One controller's rules are a `MissionRules` and its `ListCheck`; `bridge.controllers.harakiri.check` is an example.
 """

@@ -67,7 +67,7 @@ class MissionChange:
 _NOT_LOADED = MissionChange("No mission is loaded: disarm to load the saved one", is_warning=True)
 _ERASED_SOURCE = "copy from the flight controller"
 _ERASED = "erased there to make room; `naze-bridge missions restore` writes it again"
-_NO_COPY = "Nothing written: a mission that does not fit beside it could not be copied to the Pi"
+_NO_COPY = "Nothing written: a mission that does not fit next to it could not be copied to the Pi"
 NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
 _STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
@@ -358,7 +358,7 @@ class MissionService:
             elif mission.before == held.identity or (mission.before is None and held.records):
                 outcome, text = Outcome.FAILED, "The mission did not arrive: old mission kept, write it again"
             else:
-                outcome, text = Outcome.FAILED, "The mission did not arrive whole: write it again"
+                outcome, text = Outcome.FAILED, "The mission arrived incomplete: write it again"
             if mission.number is not None:
                 yield from conclude(mission.number, outcome, text)
             if mission.identity is not None:

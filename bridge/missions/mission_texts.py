@@ -26,7 +26,7 @@ def summary(sent: int, verdict: Verdict[Any]) -> str | None:
     differing = len(warnings) - dropped - relative - raised - home
     counts = {"dropped": dropped, "heights relative": relative, "raised from 0": raised, "flown differently": differing}
     news = [f"{count} {what}" for what, count in counts.items() if count]
-    return f"{len(verdict.items)} of {sent} stored: {', '.join(news) or 'look at home'}"
+    return f"{len(verdict.items)} of {sent} stored: {', '.join(news) or 'check home'}"
 
 
 def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The published state of a vehicle, in groups of named values: for zenoh, the web page and the command line.
 
-None means "not known". The notes beside the fields are part of the published schemas (service/zenoh_link/schemas).
+None means "not known". The notes on the fields are part of the published schemas (service/zenoh_link/schemas).
 """
 
 from dataclasses import dataclass
@@ -45,13 +45,13 @@ class Position:
     lat_deg: Annotated[float | None, "WGS 84"] = None
     lon_deg: Annotated[float | None, "WGS 84"] = None
     altitude_m: Annotated[float | None, "above the sea, by GPS"] = None
-    height_m: Annotated[float | None, "above the place of the launch, as the flight controller estimates it"] = None
+    height_m: Annotated[float | None, "above the launch point, estimated by the flight controller"] = None
     climb_m_s: Annotated[float | None, "upwards is positive"] = None
     north_m_s: Annotated[float | None, "speed over ground, northward part"] = None
     east_m_s: Annotated[float | None, "speed over ground, eastward part"] = None
     home_lat_deg: Annotated[float | None, "home: where the vehicle was armed; before that, its current position"] = None
     home_lon_deg: Annotated[float | None, "home: where the vehicle was armed; before that, its current position"] = None
-    home_distance_m: Annotated[float | None, "way to home"] = None
+    home_distance_m: Annotated[float | None, "distance to home"] = None
     home_direction_deg: Annotated[float | None, "direction of home, clockwise from north"] = None
     age_s: Age = None
 
@@ -61,7 +61,7 @@ class Gps:
     """The satellite receiver's status."""
 
     fix: Annotated[str | None, "none, 2D or 3D"] = None
-    satellites: Annotated[int | None, "how many are used"] = None
+    satellites: Annotated[int | None, "satellites used"] = None
     hdop: Annotated[float | None, "horizontal dilution of precision"] = None
     ground_speed_m_s: Annotated[float | None, "speed over ground"] = None
     course_deg: Annotated[float | None, "direction of the movement, clockwise from north"] = None
@@ -95,9 +95,9 @@ class Status:
 
     armed: bool | None = None
     mode: Annotated[str | None, "ACRO, STABILIZE, ALT_HOLD, LOITER, RTL or AUTO; an autopilot's own: its number"] = None
-    sensors: Annotated[tuple[str, ...] | None, "what is on board and answers"] = None
-    cycle_time_us: Annotated[int | None, "one turn of its main loop"] = None
-    i2c_errors: Annotated[int | None, "failed talks with a sensor since its start"] = None
+    sensors: Annotated[tuple[str, ...] | None, "sensors on board that respond"] = None
+    cycle_time_us: Annotated[int | None, "main loop time"] = None
+    i2c_errors: Annotated[int | None, "I2C errors since its start"] = None
     age_s: Age = None
 
 
@@ -106,12 +106,12 @@ class Link:
     """The link between the bridge and its flight controller."""
 
     state: Annotated[str, "no port, searching, identifying, MSP, MAVLink or FrSky"]
-    flight_controller: Annotated[str | None, "who it is"] = None
+    flight_controller: Annotated[str | None, "its name"] = None
     speed_baud: Annotated[int | None, "speed of the port"] = None
-    round_trip_ms: Annotated[float | None, "from a question to its answer"] = None
-    requests_lost: Annotated[int | None, "questions without an answer since it was found"] = None
-    bad_checksums: Annotated[int | None, "damaged answers since it was found"] = None
-    ground_stations: Annotated[tuple[str, ...], "who is heard over MAVLink"] = ()
+    round_trip_ms: Annotated[float | None, "from a request to its reply"] = None
+    requests_lost: Annotated[int | None, "requests without a reply since it was found"] = None
+    bad_checksums: Annotated[int | None, "damaged replies since it was found"] = None
+    ground_stations: Annotated[tuple[str, ...], "connected over MAVLink"] = ()
 
 
 @dataclass(frozen=True, slots=True)

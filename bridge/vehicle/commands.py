@@ -33,7 +33,7 @@ _ASKS_FOR = {
 }
 
 _FLY = "It is flown with the transmitter"
-_MOTORS = "Motors and servos are not driven from here"
+_MOTORS = "Motors and servos cannot be driven from here"
 #: Commands that would act on the aircraft: command number -> text for the pilot.
 _REFUSED = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: "Arm and disarm with the transmitter sticks",
@@ -41,7 +41,7 @@ _REFUSED = {
     messages.MAV_CMD_MISSION_START: "A mission is started with the transmitter",
     messages.MAV_CMD_DO_SET_MISSION_CURRENT: "The current waypoint cannot be set",
     messages.MAV_CMD_DO_PAUSE_CONTINUE: "A mission is paused with the transmitter",
-    messages.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "The flight controller is not rebooted from here",
+    messages.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "The flight controller cannot be rebooted from here",
     messages.MAV_CMD_NAV_TAKEOFF: "Take off with the transmitter",
     messages.MAV_CMD_NAV_LAND: "Land with the transmitter",
     messages.MAV_CMD_NAV_RETURN_TO_LAUNCH: "Return with the transmitter switches",

@@ -15,7 +15,7 @@ from bridge.model.verdict import Result, Verdict
 from bridge.vehicle.mission_context import MissionContext
 from protocols.mission_item import MissionItem, MissionResult
 
-_WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the mission that is there")
+_WOULD_ERASE = Refusal(MissionResult.DENIED, "No item can be stored: this would erase the current mission")
 
 
 class LocalMissions:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-Uploads run one at a time, in the order of their MISSION_COUNT, unless lists arrive so slowly or so many at once that
-the others would be locked out: then they arrive side by side, and are only written one at a time. Mission Planner loses
+Uploads run one at a time, in the order of their MISSION_COUNT, unless slow or numerous lists would lock out the
+others: then they are received in parallel, and only written one at a time. Mission Planner loses
 packets of its own and takes any ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed
 in docs/ground-stations.md.
 """
@@ -47,7 +47,7 @@ from protocols.mission_item import MissionItem, MissionResult
 MISSION_TYPE_MISSION = 0
 MISSION_TYPE_ALL = 255
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
-_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "This upload is not known here: write it again")
+_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 #: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
 _REMINDERS_S = (2.0, 4.0)
 #: The limit of uploads at a time. Of more, the one with the slowest progress ends.
@@ -193,7 +193,7 @@ class MissionUploads:
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: its uploads end without waiting for the timeout."""
         gone = [upload for upload in self._undelivered() if upload.station.peer == peer]
-        self._end(gone, _cancelled("ended by hanging up"), now)
+        self._end(gone, _cancelled("ended: disconnected"), now)
 
     def stop(self, now: float) -> None:
         """The bridge is stopping: uploads that have not reached the flight controller end."""
@@ -256,7 +256,7 @@ class MissionUploads:
         """Continue the uploads whose turn has come."""
         for upload in self._in(Waiting, Complete):
             if upload not in self._in(Waiting, Complete):
-                # The end of one before it has continued this one.
+                # The end of an earlier one has already continued it.
                 continue
             if isinstance(upload.state, Complete):
                 refusal = self._missions.acquire(upload)

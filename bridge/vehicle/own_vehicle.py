@@ -33,7 +33,7 @@ _TICK_S = 1.0
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: Home, and what prevents arming, are repeated for newcomers no more often.
 _REPEAT_S = 5.0
-#: Without a reading for so long, SYS_STATUS is sent all the same, to say that nothing is known.
+#: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
 _SILENT_S = 3.0
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
@@ -97,7 +97,7 @@ class OwnVehicle:
         self._announced: _ShownState | None = None
 
     def newcomer(self, peer: Peer) -> None:
-        """Greet a new ground station with faster heartbeats, so that it connects sooner, and soon with home."""
+        """Send a new ground station faster heartbeats, so that it connects sooner, and soon home."""
         self._is_news_wanted = True
         self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
@@ -105,7 +105,7 @@ class OwnVehicle:
         self._ground.greet(peer, self._make_heartbeat())
         everyone = self._ground.everyone()
         if len(everyone) == 1:
-            # Beside others its rates are counted at the next tick: addresses may be made up by the thousand.
+            # If there are others, its rates count from the next tick: addresses may be made up by the thousand.
             self._set_polls(everyone)
 
     def tick(self, now: float) -> None:

@@ -519,7 +519,7 @@ def test_items_of_an_upload_that_a_killed_daemon_knew_of_are_answered_at_once() 
         world.run(0.45)
     assert set(acks(station)) == {A.OPERATION_CANCELLED}
     assert len(acks(station)) == 9
-    assert station.texts() == ["This upload is not known here: write it again"]
+    assert station.texts() == ["Unknown upload: write it again"]
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 

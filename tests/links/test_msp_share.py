@@ -84,8 +84,8 @@ async def test_questions_are_answered_beside_telemetry(is_v2: bool) -> None:
     [
         (False, SET_PID, bytes(30), "set write = true"),
         (False, EEPROM_WRITE, b"", "set write = true"),
-        (True, SET_MOTOR, bytes(16), "SET_MOTOR is never passed on"),
-        (True, REBOOT, b"", "REBOOT is never passed on"),
+        (True, SET_MOTOR, bytes(16), "SET_MOTOR is never forwarded"),
+        (True, REBOOT, b"", "REBOOT is never forwarded"),
         (True, SET_PID, b"\x0d\x0d\x0d" + bytes(27), "could open this flight controller's command line"),
     ],
 )

@@ -37,7 +37,7 @@ _METRES_PER_E7 = 0.0111
 
 @dataclass(frozen=True, slots=True)
 class HarakiriRules:
-    """The inputs of the rules from the flight controller and the settings.
+    """The rules' inputs from the flight controller and the settings.
 
     capacity: records, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: the highest take-off.
     is_single_precision: the list is written over its MAVLink, which moves places a little.
@@ -140,7 +140,7 @@ class HarakiriCheck(ListCheck):
         why = "not supported"
         if item.command == Command.DO_SET_ROI_NONE:
             self._roi_known = False
-            why = "no ROI is known from here on"
+            why = "no ROI from here on"
         self._note(item, "command", item.command, DROPPED, why)
 
     def _drops(self, item: MissionItem, rule: CommandRule) -> bool:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Missions for a Harakiri that answers only MAVLink, by its own mission messages (baseflight_mavlink.c).
 
-It takes only MISSION_ITEM, with coordinates in single precision, one item at a time, and drops a transfer after
+It accepts only MISSION_ITEM, with coordinates in single precision, one item at a time, and drops a transfer after
 500 ms. A second later it writes the partial list in its RAM to flash. But any error in between makes it reload the old
 list: so after a failure the bridge sends an item that is out of sequence. `bridge.line.mavlink_line` avoids the traps
 of its serial port; an item that cannot be sent safely rejects the list.
 
-A written list is read back, item by item. The rules make places of which single precision loses nothing more.
+A written list is read back, item by item. The rules round coordinates so that they survive single precision unchanged.
 """
 
 from collections.abc import Sequence

@@ -129,7 +129,7 @@ class NavCheck(ListCheck):
         if item.command == Command.NAV_LAND:
             if missing_coordinate(item) and self._records and self._records[-1].action == NavAction.RTH:
                 self._records[-1] = replace(self._records[-1], p1=LANDS.high)
-                return self._drop(item, "command", item.command, "the RTL before it lands now")
+                return self._drop(item, "command", item.command, "the RTL before it now lands")
             item = placed_landing(item, self._records, self._note)
         if rule.position and (missing := missing_coordinate(item)) and not self._flew_home():
             return self._drop(item, *missing, "no Lat/Long")
@@ -176,13 +176,13 @@ class NavCheck(ListCheck):
                 self._sent_as[len(self._records)] = command
                 return NavRecord(NavAction.SET_POI, *place, alt_cm, 0, 0, datum)
         if item.command == Command.NAV_LOITER_TURNS:
-            self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "it flies no circles", News.WARNING)
+            self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "circles not supported", News.WARNING)
         return NavRecord(NavAction.WAYPOINT, *place, alt_cm, speed, 0, datum)
 
     def _take_heading(self, item: MissionItem) -> RejectingFinding | None:
         """CONDITION_YAW becomes SET_HEAD: an absolute heading, turned to at the flight controller's own rate."""
         if math.isfinite(item.p4) and item.p4 != 0:
-            return self._drop(item, "p4", item.p4, "it turns to no relative heading")
+            return self._drop(item, "p4", item.p4, "relative headings are not supported")
         if not math.isfinite(item.p1):
             return self._drop(item, "p1", given(item.p1), "no heading is given")
         heading = math.trunc(item.p1) % _FULL_CIRCLE
@@ -216,7 +216,7 @@ class NavCheck(ListCheck):
     def _take_speed(self, item: MissionItem) -> RejectingFinding | None:
         """DO_CHANGE_SPEED is the speed of the legs that follow."""
         if not self._profile.leg_speed:
-            return self._drop(item, "command", item.command, "its legs have no speeds")
+            return self._drop(item, "command", item.command, "leg speeds are not supported")
         if fault := self._speed.fault(item):
             return self._drop(item, *fault)
         if item.p3 not in _NO_THROTTLE:
@@ -236,7 +236,7 @@ class NavCheck(ListCheck):
             self._drop(lost, "command", lost.command, "no leg follows")
         if not self._profile.ends_on_any_record:
             legs = [place for place, record in enumerate(self._records) if record.action not in _TURNS]
-            self._cut(legs[-1] + 1, "it flies past the end of a list that ends with this")
+            self._cut(legs[-1] + 1, "the mission would not end after it")
         self._cut(flown_size(self._records), "never flown: the RTL before it ends the mission")
         return self._refuse_without_legs() or self._refuse_as_flown()
 
@@ -256,18 +256,18 @@ class NavCheck(ListCheck):
     def _refuse_as_flown(self) -> RejectingFinding | None:
         """Reject a list that is flown differently than it reads, and warn about such legs."""
         if self._profile.jumps_back_only and (place := jump_within_jump(self._records)) is not None:
-            why = "a jump within another's loop never ends"
+            why = "a jump inside another jump's loop never ends"
             return reject(MissionResult.INVALID_PARAM1, self._sent[place], "p1", why)
         for item, record in zip(self._sent, self._records, strict=True):
             lands = record.p1 > 0
             if record.action != NavAction.RTH or self._profile.own_rth_landing:
                 continue
             if lands != lands_after_rth(self._records):
-                why = f"it would {'hover' if lands else 'land'}, as the last item says: put this RTL last"
+                why = f"it would {'hover' if lands else 'land'} because of the last item: put this RTL last"
                 return reject(MissionResult.INVALID_PARAM1, item, "p1", why)
         for place, item in self._jumps.wanted:
             if place < len(self._records) and self._speed_differs(place, item):
-                self._warn(item, "p1", "the legs after it are flown at their own speeds again")
+                self._warn(item, "p1", "later legs are flown at their own speeds again")
         return None
 
     def _speed_differs(self, place: int, jump: MissionItem) -> bool:
@@ -287,7 +287,7 @@ class NavCheck(ListCheck):
             why = f"Lost from the old list, which items cannot show: {lost}"
             self._findings.append(Finding(None, "count", len(self._rules.former), len(records), why, news=News.WARNING))
         for mission in erased(self._rules.others, self._profile.capacity - len(records)):
-            why = f"Mission of {len(mission)} records does not fit beside it: erased, a copy is kept on the Pi"
+            why = f"Mission of {len(mission)} records does not fit next to it: erased, a copy is kept on the Pi"
             self._findings.append(Finding(None, "count", len(mission), 0, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as)

@@ -47,5 +47,5 @@ class Jumps:
         if self.back_only:
             return None if target < place else "it can only jump back"
         if place == 0 or abs(target - place) < _NEAREST:
-            return "no jump to the item beside it"
+            return "it cannot jump to an adjacent item"
         return None

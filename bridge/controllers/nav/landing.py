@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The place of a LAND that has none: ground stations send it without a position, or with altitude 0."""
+"""The place of a LAND without one: ground stations send it without a position, or with altitude 0."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,7 +11,7 @@ from protocols.msp.nav import LEGS, NavRecord
 
 
 def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) -> MissionItem:
-    """Fill in a LAND's missing position and altitude from the leg before.
+    """Fill in a LAND's missing position and altitude from the previous leg.
 
     INAV flies there at the LAND's own altitude: at 0 m it would hit any obstacle.
     """
@@ -19,8 +19,8 @@ def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) 
     if before is None:
         return item
     if missing_coordinate(item):
-        note(item, "lat_e7", item.lat_e7, before.lat_e7, "not given, where it is")
-        note(item, "lon_e7", item.lon_e7, before.lon_e7, "not given, where it is")
+        note(item, "lat_e7", item.lat_e7, before.lat_e7, "not given, end of the leg before")
+        note(item, "lon_e7", item.lon_e7, before.lon_e7, "not given, end of the leg before")
         item = replace(item, lat_e7=before.lat_e7, lon_e7=before.lon_e7)
     if round(item.alt_m * 100) <= 0 < before.alt_cm:
         height_m = before.alt_cm / 100

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The states of the line to a flight controller, their events, and what outlives them. Sans-IO.
 
-Every state takes bytes and time, reports an event when it ends, and has a deadline: no state can wait for ever.
+Every state takes bytes and time, reports an event when it ends, and has a deadline: no state can wait forever.
 `bridge.fc.session` has the table of which event leads where.
 """
 
@@ -91,7 +91,7 @@ class State(ABC):
     """One state. `receive` and `tick` return the event that ends it, or None."""
 
     name: ClassVar[str]
-    #: Whether the flight controller is still being looked for.
+    #: True while the flight controller is being searched for.
     is_searching: ClassVar[bool] = False
     #: Why the board cannot be used and what the pilot must do; empty if nothing.
     trouble: ClassVar[str] = ""
@@ -120,7 +120,7 @@ class State(ABC):
         return []
 
     def unanswered(self) -> PendingReplies:
-        """Replies that may still come: a board that stood still sends them all at once."""
+        """Replies that may still arrive: a stalled board sends them all at once when it resumes."""
         return PendingReplies()
 
     @property
@@ -141,5 +141,5 @@ class Closed(State):
         """Nothing is due."""
 
     def deadline(self) -> float:
-        """Only an open port leads out of here."""
+        """Only opening the port ends this state."""
         return inf

@@ -10,15 +10,15 @@ from protocols.msp.frame import Direction, MspParser
 
 #: A person may be typing: nothing is sent until the line has been quiet for this long, and then once in this time.
 _QUIET_S = 3.0
-#: Two requests without an echo: it restarts, or has no power.
+#: Two requests without an echo: it is restarting, or has no power.
 _SILENCE_S = 7.0
 
 
 class Cli(State):
-    """Somebody left the board in its command line, or a terminal program opened it.
+    """The board was left in its command line, or a terminal program opened it.
 
-    Sent are only whole requests without a line end, and DEL, which takes them off the line again: neither is a command,
-    and the pilot's `exit` is not appended to something else. A reply or a heartbeat shows that it is back.
+    Sends only complete requests without a line end, and DEL, which erases them from the line: neither is a command, and
+    neither ends up in front of the pilot's `exit`. A reply or a heartbeat shows that it is back.
     """
 
     name = "command line"

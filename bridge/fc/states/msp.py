@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MSP is answered: the board is being identified, and then polled."""
+"""The states of an MSP line: the board is being identified, or polled."""
 
 from collections.abc import Sequence
 from math import inf
@@ -111,7 +111,7 @@ class MspLine(State):
         return surplus >= 0 and surplus >= self.link.outstanding_bytes
 
     def _silence(self, now: float) -> Event | None:
-        """Leave MSP when it is not answered any more: for MAVLink if that is heard instead, else to search."""
+        """Leave MSP when it is no longer answered: for MAVLink if that is heard instead, else to search."""
         if now < self._silent_since() + self._silence_s:
             return None
         heard = self._foreign.mavlink
@@ -147,14 +147,14 @@ class Identifying(MspLine):
         return self._end
 
     def tick(self, now: float) -> Event | None:
-        """As on any MSP line, and not for ever."""
+        """As on any MSP line, up to a deadline."""
         event = super().tick(now)
         if event is None and now >= self._give_up_at:
             return Lost(f"not identified within {_IDENTIFY_TIMEOUT_S:.0f} s", pending=self.unanswered())
         return event
 
     def deadline(self) -> float:
-        """As on any MSP line, and not for ever."""
+        """As on any MSP line, up to a deadline."""
         return min(super().deadline(), self._give_up_at)
 
     def _silent_since(self) -> float:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The protocol and speed of a port are looked for."""
+"""Searches for the protocol and speed of a port."""
 
 from bridge.fc.autosense import Autosense, Spoken
 from bridge.fc.states.base import Event, Lost, Port, PortOpened, State
 
 
 class Searching(State):
-    """The protocol and speed are looked for."""
+    """The protocol and speed are being searched for."""
 
     name = "searching"
     is_searching = True
