@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes to typed messages and back. Nothing here opens a port, reads a clock or sleeps."""
+"""Converts bytes to typed messages and back. Opens no port, reads no clock, never sleeps."""

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Single precision as a flight controller computes with it."""
+"""Single-precision arithmetic, as on a flight controller."""
 
 import struct
 
 _FLOAT = struct.Struct("<f")
 _BITS = struct.Struct("<i")
-#: Beyond, packing fails.
+#: Larger numbers cannot be packed.
 _LARGEST = 3e38
 
 

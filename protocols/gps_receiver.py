@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recognises a GPS receiver by what it sends unasked: NMEA sentences (NMEA 0183) and UBX frames (u-blox).
+"""Recognises a GPS receiver by its unsolicited NMEA sentences (NMEA 0183) or UBX frames (u-blox).
 
-Nothing here is decoded. It keeps such a port from being taken for a flight controller's.
+The data is not decoded.
 """
 
 import re
@@ -12,19 +12,19 @@ _NMEA = re.compile(rb"\$((?:G[A-Z]|BD|P)[A-Z]{3},[ -)+-~]{0,90})\*([0-9A-F]{2})"
 _UBX_SYNC = b"\xb5\x62"
 _UBX_FRAME = 8
 _UBX_LONGEST = 1024
-#: More than the longest NMEA sentence and a usual UBX frame.
+#: Longer than any NMEA sentence and usual UBX frame.
 _KEPT = 1200
 
 
 class GpsWatch:
-    """Feed bytes; `heard` names the protocol once a whole sentence or frame with a right checksum was there."""
+    """Feed bytes; `heard` names the protocol after a complete sentence or frame with a valid checksum."""
 
     def __init__(self) -> None:
         self.heard = ""
         self._data = b""
 
     def feed(self, data: bytes) -> None:
-        """Take bytes as they come."""
+        """Take received bytes."""
         if self.heard:
             return
         self._data = (self._data + data)[-_KEPT:]

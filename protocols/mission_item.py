@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One mission item as a ground station sends it, by message or in a file."""
+"""A mission item as sent in a message or a file."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class Command(IntEnum):
-    """MAV_CMD numbers that mean something to a flight controller of the MultiWii family."""
+    """MAV_CMD numbers that MultiWii-family flight controllers support."""
 
     NAV_WAYPOINT = 16
     NAV_LOITER_UNLIM = 17
@@ -26,7 +26,7 @@ class Command(IntEnum):
 
 
 class Frame(IntEnum):
-    """MAV_FRAME numbers that the rules name."""
+    """MAV_FRAME numbers used by the rules."""
 
     GLOBAL = 0
     MISSION = 2
@@ -38,7 +38,7 @@ class Frame(IntEnum):
 
 
 class MissionResult(IntEnum):
-    """MAV_MISSION_RESULT: what a MISSION_ACK says. ERROR is never a final word (docs/ground-stations.md)."""
+    """MAV_MISSION_RESULT, the result in a MISSION_ACK. ERROR is never a final reply (docs/ground-stations.md)."""
 
     ACCEPTED = 0
     ERROR = 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all flight controllers' stored records have in common: bytes, and a list's identity by their checksum."""
+"""The interface of all flight controllers' stored records: their bytes, and a list's checksum."""
 
 import zlib
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ class MissionRecord(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ListIdentity:
-    """What identifies a stored list: number of records and CRC-32 over their bytes (0 for none)."""
+    """The identity of a stored list: number of records and CRC-32 over their bytes (0 for none)."""
 
     count: int
     checksum: int

@@ -2,7 +2,7 @@
 """Telemetry logs (.tlog) as Mission Planner, MAVProxy and pymavlink write and replay them.
 
 A record is 8 bytes, big-endian: microseconds since the Unix epoch, then the frame as it was on the wire.
-Two things are never in a log of ours: a signature, which Mission Planner could only check with the key of then, and
+Our logs never contain signatures, which Mission Planner could only check with the key used at the time, or
 SETUP_SIGNING, which carries the key.
 """
 
@@ -15,7 +15,7 @@ from protocols.mavlink.dialect import CRC_EXTRA, messages
 from protocols.mavlink.frame import MAGIC_V1, MAGIC_V2, MavlinkFrame, MavlinkSplitter
 
 _STAMP_SIZE = 8
-#: pymavlink takes the two lowest bits for the number of a link.
+#: pymavlink uses the two lowest bits as a link number.
 _LINK_BITS = 0b11
 _CRC_SIZE = 2
 _SIGNATURE_SIZE = 13
@@ -31,14 +31,14 @@ _HEADERS = {MAGIC_V1: 6, MAGIC_V2: 10}
 
 @dataclass(frozen=True, slots=True)
 class TlogRecord:
-    """A frame, and when it was sent or received, in microseconds since the Unix epoch."""
+    """A frame, and the time it was sent or received, in microseconds since the Unix epoch."""
 
     at_us: int
     frame: MavlinkFrame
 
 
 def tlog_record(frame: bytes, at_us: int) -> bytes:
-    """Return the record of a whole, checked frame of the dialect; nothing for one that must not be in a log."""
+    """Return the record of a complete, valid frame of the dialect; empty for one that must not be logged."""
     # (MAVLink 1 can neither be signed nor name SETUP_SIGNING.)
     if frame[0] == MAGIC_V2:
         if frame[_MSGID] == _SETUP_SIGNING:
@@ -69,7 +69,7 @@ def read_tlog(data: bytes, msgids: Container[int] | None = None) -> Iterator[Tlo
 
 
 def heartbeat_type(frame: bytes) -> int | None:
-    """Return the MAV_TYPE that a whole frame announces; None if it is not a HEARTBEAT."""
+    """Return the MAV_TYPE in a HEARTBEAT frame; None for other messages."""
     found = MavlinkFrame(frame)
     if found.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
         return None
@@ -83,7 +83,7 @@ def first_stamp_us(records: bytes) -> int:
 
 
 def _frame_end(data: bytes, start: int) -> int | None:
-    """Where the frame at `start` would end; None if none begins there."""
+    """The end of the frame at `start`; None if none begins there."""
     header = _HEADERS.get(data[start])
     if header is None or len(data) < start + header:
         return None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """UART captures (.uart): the bytes read from and written to a flight controller's port, with time and speed.
 
-One JSON object a line, each line for itself, so a capture may be appended to, cut with head and tail, and torn:
+One independent JSON object per line, so a capture can be appended to, cut with head and tail, or truncated by a crash:
 
     {"naze-bridge-uart":1,"started":"2026-11-21T06:33:06Z"}  the daemon began to record
     {"t":0.010204,"baud":115200,"open":""}                   the port was opened
@@ -19,12 +19,12 @@ from enum import Enum
 
 _MARK = "naze-bridge-uart"
 _VERSION = 1
-#: What passes between the last line of one recording and the first of the next in the same file.
+#: The assumed time between two recordings in the same file.
 _PAUSE_S = 1.0
 
 
 class UartDeed(Enum):
-    """What happened at the port."""
+    """An event at the port."""
 
     OPEN = "open"
     READ = "read"
@@ -33,8 +33,8 @@ class UartDeed(Enum):
 
 
 _DEEDS = {deed.value.encode(): deed for deed in UartDeed}
-#: A whole line of ours, as it is written: there may be millions, and a search costs a tenth of reading each as JSON.
-#: Times have at most ten years; what says more is damaged.
+#: A complete line as written here: there may be millions, and matching costs a tenth of parsing JSON. A time above ten
+#: years is damage.
 _LINE = re.compile(
     rb'^(?:(?P<mark>\{"' + _MARK.encode() + rb'":).*'
     rb'|\{"t":(?P<t>\d{1,9}(?:\.\d{1,6})?),"baud":(?P<baud>null|[1-9]\d{0,8}),'
@@ -56,20 +56,20 @@ class UartEvent:
 
 
 def capture_header(started: str) -> bytes:
-    """Return the line with which a recording begins. `started`: time in UTC, for people."""
+    """Return the first line of a recording. `started`: time in UTC, for people."""
     return f'{{"{_MARK}":{_VERSION},"started":{json.dumps(started)}}}\n'.encode()
 
 
 def capture_line(event: UartEvent) -> bytes:
     """Return an event's line."""
     speed = "null" if event.speed is None else event.speed
-    # Hex needs no escapes, and these lines are many.
+    # Hex needs no escapes, and there are many such lines.
     content = f'"{event.data.hex()}"' if event.deed in _WITH_DATA else json.dumps(event.text)
     return f'{{"t":{event.at:.6f},"baud":{speed},"{event.deed.value}":{content}}}\n'.encode()
 
 
 def is_capture(beginning: bytes) -> bool:
-    """True if a file that starts with these bytes is a capture that may be appended to."""
+    """True if a file that starts with these bytes is a capture and can be appended to."""
     return beginning.startswith(f'{{"{_MARK}":'.encode())
 
 

@@ -28,7 +28,7 @@ class WpRecord:
 
     lat_e7, lon_e7: degrees * 1e7. height_m: above the launch point. roi_heading: 1 = nose to the region of interest.
     time: LOITER_TIME seconds 1..255, WAYPOINT 1 = brake. radius_m: hit radius. turns: LOITER_TURNS, negative CCW.
-    `command` is a plain int because a flight controller may hold a number that we do not know.
+    `command` is a plain int because a flight controller may have an unknown number.
     """
 
     lat_e7: int
@@ -60,6 +60,6 @@ def unpack_record(data: bytes) -> WpRecord:
 
 
 def unpack_records(data: bytes) -> list[WpRecord]:
-    """Read every whole record in `data`; a shorter rest is ignored."""
+    """Read every complete record in `data`; a shorter rest is ignored."""
     whole = len(data) - len(data) % RECORD_SIZE
     return [WpRecord(*fields) for fields in _LAYOUT.iter_unpack(data[:whole])]

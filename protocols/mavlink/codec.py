@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Messages from frames and frames from messages, for the messages that the bridge itself reads or writes."""
+"""Decodes and encodes the messages that the bridge itself reads or writes."""
 
 import struct
 from collections.abc import Callable
@@ -49,14 +49,14 @@ def _payload_alone(_packer: None, _crc_extra: int, payload: bytes, *, force_mavl
 
 
 def pack(message: Message) -> Packed:
-    """Pack a message's fields, once for all who get it.
+    """Pack a message's fields, once for all receivers.
 
-    MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them all the
-    same. A message that the dialect lacks is packed already.
+    MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size; pymavlink packs them
+    anyway. A message that the dialect lacks is already packed.
     """
     if isinstance(message, Packed):
         return message
-    # pymavlink would add a header and a CRC, which takes as long as everything else that is done for a message.
+    # pymavlink would add a header and a CRC, which takes as long as all other work for a message.
     message._pack = _payload_alone  # noqa: SLF001
     payload: bytes = message.pack(None)
     del message._pack  # noqa: SLF001
@@ -67,7 +67,7 @@ def pack(message: Message) -> Packed:
 class FrameWriter:
     """Makes the frames of one sender to one receiver.
 
-    Each receiver has a sequence number of its own: ground stations show gaps in it as a bad link. `sign` returns the
+    Each receiver has its own sequence numbers: ground stations show gaps as a bad link. `sign` returns the
     signature of a MAVLink 2 frame; MAVLink 1 has none.
     """
 
@@ -78,7 +78,7 @@ class FrameWriter:
         self._seq = 0
 
     def frame(self, packed: Packed, version: int) -> bytes:
-        """Return a whole frame of MAVLink 1 or 2; of 2 if MAVLink 1 has no such message."""
+        """Return a frame of MAVLink 1 or 2; always 2 if MAVLink 1 has no such message."""
         seq, self._seq = self._seq, (self._seq + 1) & 0xFF
         msgid = packed.msgid
         if version == 1 and not packed.is_v2_only:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a mission command is called where a person reads it."""
+"""The names of mission commands for people."""
 
 from protocols.mavlink.dialect import messages
 

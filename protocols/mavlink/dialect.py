@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The MAVLink dialect that the bridge itself speaks: pymavlink's generated message classes.
 
-ardupilotmega is the dialect because ground stations take the vehicle for an ArduCopter: they ask it
+ardupilotmega is the dialect because ground stations treat the vehicle as an ArduCopter: they send it
 AUTOPILOT_VERSION_REQUEST, for instance.
 """
 
@@ -16,10 +16,10 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 
-#: CRC_EXTRA by message id, for every message that can be passed on, not only those of the dialect.
+#: CRC_EXTRA by message id, for all messages that can be forwarded, not only the dialect's.
 CRC_EXTRA: dict[int, int] = {msgid: known.crc_extra for msgid, known in MESSAGE_FORMATS.items()}
 
-#: A decoded or not yet packed message; pymavlink's classes carry no types of their own.
+#: A decoded or not yet packed message; pymavlink's classes are untyped.
 Message: TypeAlias = Any
 
 __all__ = ["CRC_EXTRA", "Message", "messages"]

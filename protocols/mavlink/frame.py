@@ -20,9 +20,9 @@ _SIGNATURE_SIZE = 13
 _SIGNED = 0x01
 
 _MAGIC = re.compile(rb"[\xfd\xfe]")
-#: CRC_EXTRA by what the header says. MAVLink 2: by the message id's bytes; its payload may be shorter than the
-#: message, without its trailing zeros, or longer, with extensions that are newer than we are. MAVLink 1: by payload
-#: size and message id. It has no extensions, but pymavlink sends them all the same, and mavlink's C parser takes them.
+#: CRC_EXTRA by header fields. MAVLink 2: by the message id's bytes; its payload may be shorter than the message,
+#: without trailing zeros, or longer, with newer extensions. MAVLink 1: by payload size and message id. It has no
+#: extensions, but pymavlink sends them anyway, and mavlink's C parser accepts them.
 _CRC_EXTRA_V2 = {msgid.to_bytes(3, "little"): bytes((known.crc_extra,)) for msgid, known in MESSAGE_FORMATS.items()}
 _CRC_EXTRA_V1 = {
     (size, msgid): bytes((known.crc_extra,))
@@ -32,9 +32,9 @@ _CRC_EXTRA_V1 = {
 }
 
 
-@dataclass(slots=True)  # not frozen: that doubles the price of making one, and thousands are made in a second
+@dataclass(slots=True)  # not frozen: that doubles the time to create one, and there are thousands per second
 class MavlinkFrame:
-    """One frame whose CRC is right. `raw` is the whole of it, signature included."""
+    """A frame with a valid CRC. `raw` is the whole frame, signature included."""
 
     raw: bytes
 
@@ -45,7 +45,7 @@ class MavlinkFrame:
 
     @property
     def seq(self) -> int:
-        """The sender's running number, 0..255."""
+        """The sender's sequence number, 0..255."""
         raw = self.raw
         return raw[4] if raw[0] == MAGIC_V2 else raw[2]
 
@@ -63,18 +63,18 @@ class MavlinkFrame:
 
     @property
     def msgid(self) -> int:
-        """Which message it is."""
+        """The message id."""
         raw = self.raw
         return raw[7] | raw[8] << 8 | raw[9] << 16 if raw[0] == MAGIC_V2 else raw[5]
 
     @property
     def is_signed(self) -> bool:
-        """Whether a signature follows the CRC; whether that is right is not known here."""
+        """True if a signature follows the CRC; it is not checked here."""
         return self.raw[0] == MAGIC_V2 and bool(self.raw[2] & _SIGNED)
 
     @property
     def payload(self) -> bytes:
-        """The message's bytes; MAVLink 2 leaves trailing zeros out."""
+        """The message's bytes; MAVLink 2 omits trailing zeros."""
         start = _HEADER_V2 if self.raw[0] == MAGIC_V2 else _HEADER_V1
         return self.raw[start : start + self.raw[1]]
 
@@ -82,12 +82,12 @@ class MavlinkFrame:
 class MavlinkSplitter:
     """Finds frames in a byte stream. Never raises: other bytes are counted and skipped.
 
-    After a CRC failure the search resumes ONE byte later, so a frame behind a false or cut header is not lost.
+    After a CRC failure the search resumes ONE byte later, so a frame behind a false or truncated header is not lost.
     A header is rejected at once if its message is unknown (the CRC could not be checked), if a MAVLink 1 size does
     not fit the message, or if it has an unknown incompatibility flag, as the protocol requires.
 
-    Any other header is trusted until its frame is complete, or until `reset`. A cut frame therefore delays the bytes
-    behind it, 279 at most. Frames inside an incomplete frame are not returned: a log downloaded over MAVLink contains
+    Any other header is trusted until its frame is complete, or until `reset`. A truncated frame therefore delays at
+    most 279 following bytes. Frames inside an incomplete frame are not returned: a log downloaded over MAVLink contains
     whole frames as data.
 
     A signature has no CRC. If part of it is missing, the next frame starts inside it, so it is scanned like noise.
@@ -95,7 +95,7 @@ class MavlinkSplitter:
 
     def __init__(self) -> None:
         self._buffer = b""
-        self.bad_frames = 0  # of a known message, whose CRC was wrong
+        self.bad_frames = 0  # of a known message, with a wrong CRC
         self.skipped_bytes = 0
 
     @property
@@ -104,7 +104,7 @@ class MavlinkSplitter:
         return bool(self._buffer)
 
     def feed(self, data: bytes) -> list[MavlinkFrame]:
-        """Take received bytes; return the frames that they complete."""
+        """Take received bytes; return the completed frames."""
         return self._split(self._buffer + data, is_end=False)
 
     def reset(self) -> list[MavlinkFrame]:
@@ -114,7 +114,7 @@ class MavlinkSplitter:
     def _split(self, data: bytes, *, is_end: bool) -> list[MavlinkFrame]:
         """Return the frames in `data` and keep its incomplete rest; at an end there is no rest.
 
-        All in one loop, without a call per frame but the CRC's: this is what passing a frame on costs.
+        One loop, with no call per frame except the CRC's: this is the main cost of forwarding a frame.
         """
         frames: list[MavlinkFrame] = []
         start, size = 0, len(data)

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 _HEADER = struct.Struct("<HBBBBBBI")
 _PAYLOAD_SIZE = 251
 _NAK = 129
-#: The one code that Mission Planner takes for an end: it ignores "unknown command" and repeats for 70 s.
+#: The only code that ends Mission Planner's request: it ignores "unknown command" and repeats for 70 s.
 _FAIL_ERRNO = 2
 _EOPNOTSUPP = 95
 
 
 def refuse(payload: Sequence[int]) -> list[int] | None:
-    """Return the payload of the refusal of a request's payload; None if that is not a request."""
+    """Return the payload of the NAK to a request's payload; None if it is not a request."""
     request = bytes(payload)
     if len(request) < _HEADER.size:
         return None

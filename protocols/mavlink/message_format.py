@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What framing and routing must know of a message: nothing of its meaning."""
+"""The properties of a message that framing and routing need."""
 
 from typing import NamedTuple
 
 
 class MessageFormat(NamedTuple):
-    """How one kind of message is checked and measured; sizes and places are bytes of the payload.
+    """The checksum seed and layout of one kind of message; sizes and places are in bytes of the payload.
 
-    Sizes: `full_size` with extension fields; `base_size` without, which is what MAVLink 1 carries (None: it cannot,
-    the id is above 255). Places: None if the message has no such field.
+    Sizes: `full_size` with extension fields; `base_size` without, as in MAVLink 1 (None: the id is above 255, so not in
+    MAVLink 1). Places: None if the message has no such field.
     """
 
     crc_extra: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MissionItem to and from MISSION_ITEM and MISSION_ITEM_INT (https://mavlink.io/en/services/mission.html)."""
+"""Converts MissionItem to and from MISSION_ITEM and MISSION_ITEM_INT (https://mavlink.io/en/services/mission.html)."""
 
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionItem, degrees_to_e7
@@ -11,7 +11,7 @@ def item_from_float_message(message: Message) -> MissionItem:
 
 
 def item_from_int_message(message: Message) -> MissionItem:
-    """Read MISSION_ITEM_INT: its coordinates are taken to the bit."""
+    """Read MISSION_ITEM_INT: its coordinates are exact."""
     return _item(message, message.x, message.y)
 
 

@@ -2,7 +2,8 @@
 """MAVLink 2 message signing (https://mavlink.io/en/guide/message_signing.html).
 
 A signed frame ends in 13 bytes: a link id, a timestamp of 48 bits in 10 us since 2015-01-01, and the first 6 bytes of
-the SHA-256 of key, frame, link id and timestamp. It proves the sender and rules out replays; nothing is encrypted.
+the SHA-256 of key, frame, link id and timestamp. It authenticates the sender and prevents replays; nothing is
+encrypted.
 """
 
 from collections.abc import Callable
@@ -15,19 +16,19 @@ from protocols.mavlink.frame import MavlinkFrame
 TICKS_PER_S = 100_000
 #: 2015-01-01 in seconds since the Unix epoch.
 EPOCH_UNIX_S = 1_420_070_400
-#: What a stream that was not heard before may lag behind us.
+#: The maximum lag of a new stream behind our timestamp.
 TOLERANCE = 60 * TICKS_PER_S
 _MAX_TIMESTAMP = (1 << 48) - 1
 _TIMESTAMP_SIZE = 6
 _DIGEST_SIZE = 6
 _SIGNATURE_SIZE = 1 + _TIMESTAMP_SIZE + _DIGEST_SIZE
 
-#: Who numbers its timestamps: sysid, compid, link id.
+#: A stream of timestamps: sysid, compid, link id.
 Stream = tuple[int, int, int]
 
 
 def key_from_passphrase(passphrase: str) -> bytes:
-    """Return the key of 32 bytes that Mission Planner and MAVProxy make of a passphrase."""
+    """Return the 32-byte key that Mission Planner and MAVProxy derive from a passphrase."""
     return sha256(passphrase.encode()).digest()
 
 
@@ -47,7 +48,7 @@ class Timestamps:
         self.last = min(at_least, _MAX_TIMESTAMP)
 
     def now(self) -> int:
-        """Return the current timestamp, without using it up."""
+        """Return the current timestamp without consuming it."""
         return max(self.last, ticks(self._clock()))
 
     def take(self) -> int:
@@ -61,7 +62,7 @@ class Timestamps:
 
 
 class Check(Enum):
-    """What a frame's signature is worth. The value is how the pilot is told."""
+    """The validity of a frame's signature. The value is the text for the pilot."""
 
     VALID = "signed"
     UNSIGNED = "not signed"
@@ -74,7 +75,7 @@ class Check(Enum):
 class Signing:
     """One key and the timestamps used with it. Links with the same key share one instance.
 
-    `refused_until`: up to this timestamp an earlier run may have heard a frame and not remember it.
+    `refused_until`: an earlier run may have heard frames up to this timestamp without storing that.
     """
 
     def __init__(self, key: bytes, timestamps: Timestamps, refused_until: int = -1) -> None:
@@ -82,16 +83,16 @@ class Signing:
         self._timestamps = timestamps
         self._refused_until = refused_until
         self._heard: set[Stream] = set()
-        #: The last timestamp of each stream. Those of an earlier run may be put in before the first frame.
+        #: The last timestamp of each stream. Those of an earlier run may be added before the first frame.
         self.streams: dict[Stream, int] = {}
 
     def signature(self, frame: bytes, link_id: int) -> bytes:
-        """Return the 13 bytes that end a MAVLink 2 frame whose flags say that it is signed."""
+        """Return the 13 signature bytes of a MAVLink 2 frame whose flags mark it as signed."""
         stamp = bytes((link_id,)) + self._timestamps.take().to_bytes(_TIMESTAMP_SIZE, "little")
         return stamp + self._digest(frame + stamp)
 
     def check(self, frame: MavlinkFrame) -> Check:
-        """Check a signature. One that is valid is so only once."""
+        """Check a signature. Each is valid only once."""
         if not frame.is_signed:
             return Check.UNSIGNED
         raw = frame.raw
@@ -103,7 +104,7 @@ class Signing:
             return Check.REPLAYED
         if timestamp <= self._refused_until:
             return Check.UNSURE
-        # A stream of an earlier run is held to both rules: it may have been recorded while we were off.
+        # Both rules apply to a stream of an earlier run: it may have been recorded while the bridge was off.
         if stream not in self._heard and timestamp + TOLERANCE < self._timestamps.now():
             return Check.LATE
         self._heard.add(stream)

@@ -8,7 +8,7 @@ from protocols.mavlink.message_table import MESSAGE_FORMATS
 
 _HEADER_V1 = 6
 _HEADER_V2 = 10
-#: Where target_system and target_component stand in the payload, by the message id's bytes in the header: three in
+#: Offsets of target_system and target_component in the payload, by the message id's bytes in the header: three in
 #: MAVLink 2, one in MAVLink 1.
 _PLACES = {
     msgid.to_bytes(size, "little"): (known.target_system_at, known.target_component_at)
@@ -20,9 +20,9 @@ _PLACES = {
 
 
 def without_target(frames: Sequence[MavlinkFrame]) -> list[bytes] | None:
-    """Return the bytes of frames none of whose messages has a target, as telemetry has none; else None.
+    """Return the frames' bytes if none of their messages has a target field, as in telemetry; else None.
 
-    One look at all that came together: this is done with every frame that is passed on.
+    One check for all frames that arrived together, because it runs for every forwarded frame.
     """
     raws = [frame.raw for frame in frames]
     for raw in raws:
@@ -32,9 +32,9 @@ def without_target(frames: Sequence[MavlinkFrame]) -> list[bytes] | None:
 
 
 def target_of(frame: MavlinkFrame) -> tuple[int, int]:
-    """Return the system and the component that a frame is meant for.
+    """Return the target system and component of a frame.
 
-    0 is for all: the message has no such field, or MAVLink 2 has left it out with the trailing zeros.
+    0 means all: the message has no such field, or MAVLink 2 has omitted it with the trailing zeros.
     """
     raw = frame.raw
     is_v2 = raw[0] == MAGIC_V2

@@ -19,9 +19,8 @@ def write_mission_file(items: Sequence[MissionItem], name: str) -> str:
 def read_mission_file(data: bytes, name: str, note: Note = no_note) -> list[MissionItem]:
     """Read a QGC WPL 110, a QGroundControl plan or Mission Planner's JSON, recognised by content; home is item 0.
 
-    `note` is told what was mended.
-
-    Raises MissionFileError, one sentence: what is wrong, where in the file `name`, and what to do.
+    `note` is called for each thing that was fixed. MissionFileError is one sentence: the problem, its place in the file
+    `name`, and the remedy.
     """
     try:
         text = data.decode("utf-8-sig")

@@ -8,9 +8,9 @@ from protocols.mission_item import degrees_to_e7
 
 
 def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int | None:
-    """Return degrees * 1e7, None for NaN (not given); MissionFileError if no such number of degrees can be.
+    """Return degrees * 1e7, None for NaN (not given); MissionFileError if out of range.
 
-    The rules take an infinite coordinate for a missing one. A ground station may send it; in a file it is damage.
+    The rules treat an infinite coordinate as missing, because a ground station may send it; in a file it is damage.
     """
     e7 = degrees_to_e7(degrees)
     if e7 is None and not math.isnan(degrees):

@@ -22,7 +22,7 @@ def shown(found: object) -> str:
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
 
 
-#: Called with one sentence for each thing that was fixed in a file on reading it.
+#: Called with one sentence for each thing that was fixed while reading a file.
 Note = Callable[[str], None]
 
 
@@ -31,7 +31,7 @@ def no_note(_text: str) -> None:
 
 
 def refuse_other_plans(commands: Iterable[int], name: str) -> None:
-    """Refuse a list that is not a mission: Mission Planner and QGroundControl keep fences and rally points like one."""
+    """Refuse a list of fence or rally points, which Mission Planner and QGroundControl store in the same formats."""
     kinds = {_OTHER_PLANS.get(command, "") for command in commands}
     if kinds and "" not in kinds:
         raise MissionFileError(

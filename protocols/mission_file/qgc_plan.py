@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QGroundControl's .plan and Mission Planner's .mission (JSON; docs.qgroundcontrol.com, "Plan File Format").
 
-Fence and rally points beside a mission are passed over.
-An item's frame and params are what QGroundControl would send; its AltitudeMode only says how it arrived at them.
-Surveys and corridor scans carry the plain items they are flown as, and become those. The planned home position becomes
+Fence and rally points next to a mission are ignored.
+An item's frame and params are as QGroundControl would send them; AltitudeMode only records their origin.
+Surveys and corridor scans contain the plain items they are flown as, which are used. The planned home position becomes
 item 0, as QGroundControl sends it to an ArduPilot vehicle.
 """
 
@@ -20,7 +20,7 @@ _PARAM_COUNT = 7
 _VERSIONS = (1,)
 #: Mission Planner leaves it at 0.
 _MISSION_VERSIONS = (2, 1, 0)
-#: MAV_AUTOPILOT_ARDUPILOTMEGA and MAV_TYPE_QUADROTOR, as which QGroundControl meets the bridge.
+#: MAV_AUTOPILOT_ARDUPILOTMEGA and MAV_TYPE_QUADROTOR, as which the bridge appears to QGroundControl.
 _ARDUPILOT, _QUADROTOR = 3, 2
 _SAVE_AGAIN = "save it again from QGroundControl"
 
@@ -58,7 +58,7 @@ def _refuse_unknown_version(version: Any, known: tuple[int, ...], what: str, nam
 
 
 def _other_part(plan: dict[str, Any]) -> str | None:
-    """The part of a plan that holds something, besides the mission."""
+    """The non-empty parts of a plan other than the mission."""
     parts = {"a fence": ("geoFence", "circles", "polygons", "polygon"), "rally points": ("rallyPoints", "points")}
     for what, (part, *lists) in parts.items():
         held = plan.get(part)
@@ -108,11 +108,11 @@ def _parse(text: str, name: str) -> Any:
         what = f"not valid JSON ({error.msg})"
         raise MissionFileError(name, f"line {error.lineno}", what, _SAVE_AGAIN) from None
     except (ValueError, RecursionError):  # a number of thousands of digits; thousands of brackets
-        raise MissionFileError(name, "", "no plan that QGroundControl could have written", _SAVE_AGAIN) from None
+        raise MissionFileError(name, "", "not a plan written by QGroundControl", _SAVE_AGAIN) from None
 
 
 def _home(position: Any, name: str) -> MissionItem:
-    """Make item 0. An unknown ground level (null) is 0; no position at all is for the rules to judge."""
+    """Make item 0. An unknown ground level (null) is 0; a missing position is left to the rules."""
     where = "plannedHomePosition"
     coordinates = position if position is not None else []
     if not isinstance(coordinates, list) or len(coordinates) not in (0, 2, 3):
@@ -154,7 +154,7 @@ def _item(entry: dict[str, Any], seq: int, name: str, where: str) -> MissionItem
     params = entry.get("params")
     coordinate = entry.get("coordinate")
     if isinstance(params, list) and isinstance(coordinate, list):
-        # Mission Planner's .mission has the place apart.
+        # Mission Planner's .mission stores the place separately.
         params = params[:4] + coordinate
     if not isinstance(params, list) or len(params) != _PARAM_COUNT:
         raise MissionFileError(name, where, f"it has no list of {_PARAM_COUNT} params", _SAVE_AGAIN)

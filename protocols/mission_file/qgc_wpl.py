@@ -2,9 +2,9 @@
 """QGC WPL 110, the text format of Mission Planner and most others (https://mavlink.io/en/file_formats/).
 
 A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and
-autocontinue. Tabs by custom; any white space is taken. Empty lines and lines that start with # are passed over.
-What Mission Planner's own reader takes besides is taken too, and noted: commas, items that are not numbered 0, 1, 2...,
-no home, home with command 0, no autocontinue.
+autocontinue. Usually separated by tabs; any white space is accepted. Empty lines and lines that start with # are
+ignored. As in Mission Planner's own reader these are fixed, with a note: commas, items not numbered 0, 1, 2..., no
+home, home with command 0, no autocontinue.
 """
 
 import math
@@ -21,7 +21,7 @@ _HEADER = ["QGC", "WPL", "110"]
 _INTEGER_FIELDS = {"seq": 65535, "current": 255, "frame": 255, "command": 65535}
 _NUMBER_FIELDS = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude", "autocontinue")
 _FIELD_COUNT = len(_INTEGER_FIELDS) + len(_NUMBER_FIELDS)
-# float() and int() also take underscores and the digits of every script: not what a ground station writes.
+# float() and int() also accept underscores and digits of any script, which no ground station writes.
 _INTEGER = re.compile(r"\d{1,9}", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 _SAVE_AGAIN = "save the file again from the ground station"
@@ -30,7 +30,7 @@ _SAVE_AGAIN = "save the file again from the ground station"
 def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
     """Return the items, home first; MissionFileError names the file and the line.
 
-    A file without items is an error: it is cut off more likely than meant to erase a mission.
+    A file without items is an error: it is more likely truncated than meant to erase a mission.
     """
     items: list[MissionItem] = []
     header_seen = False
@@ -42,7 +42,7 @@ def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem
         where = f"line {number}"
         if header_seen:
             if len(fields) == _FIELD_COUNT - 1 and number < len(lines):
-                # In the last line, without an end, it would be a line cut off.
+                # Missing in an unterminated last line, it would mean a truncated line.
                 note(f"{where}: autocontinue is missing")
                 fields.append("1")
             items.append(_item(fields, name, where))
@@ -95,7 +95,7 @@ def write_qgc_wpl(items: Sequence[MissionItem]) -> str:
 
 def _item(fields: list[str], name: str, where: str) -> MissionItem:
     if len(fields) != _FIELD_COUNT:
-        what = f"{len(fields)} fields where an item has {_FIELD_COUNT}, the line is cut off or damaged"
+        what = f"{len(fields)} fields where an item has {_FIELD_COUNT}, the line is truncated or damaged"
         raise MissionFileError(name, where, what, _SAVE_AGAIN)
     integers = []
     for (field, highest), token in zip(_INTEGER_FIELDS.items(), fields, strict=False):

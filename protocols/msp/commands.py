@@ -5,7 +5,7 @@ from enum import IntEnum
 
 
 class Msp(IntEnum):
-    """Questions. They change nothing on the flight controller, and their frames hold no hazard byte."""
+    """Read requests. They change nothing on the flight controller, and their frames contain no hazard byte."""
 
     API_VERSION = 1
     FC_VARIANT = 2
@@ -31,7 +31,7 @@ class Msp(IntEnum):
 
 
 class MspAction(IntEnum):
-    """Commands for the ground only: the firmware would carry them out in flight, too (serial.c)."""
+    """Commands for the ground only: the firmware would also execute them in flight (serial.c)."""
 
     ACC_CALIBRATION = 205
     MAG_CALIBRATION = 206

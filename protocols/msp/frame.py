@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MSP frames in both versions.
 
-v1, which all speak: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c). v2, for INAV's commands
+v1, spoken by all: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c). v2, for INAV's commands
 above 255: `$X` direction flag command size payload crc, command and size 16 bits little-endian, DVB-S2's CRC of 8 bits.
 """
 
@@ -18,7 +18,7 @@ _V1_OVERHEAD, _V2_OVERHEAD = 6, 9
 #: Bytes of a v1 frame without its payload.
 FRAME_OVERHEAD = _V1_OVERHEAD
 _HIGHEST_V1_COMMAND = 0xFF
-#: A v2 header that announces more than this is noise: no reply that is asked for is half as long.
+#: A v2 header with a larger size is noise: no requested reply is half as long.
 _MAX_PAYLOAD = 255
 
 
@@ -58,16 +58,16 @@ def request(command: int, payload: bytes = b"") -> bytes:
 
 
 def frame_size(command: int, payload_size: int) -> int:
-    """Bytes of a whole frame."""
+    """The size of a frame, bytes."""
     return payload_size + (_V2_OVERHEAD if command > _HIGHEST_V1_COMMAND else _V1_OVERHEAD)
 
 
 class MspParser:
-    """Finds frames in a byte stream. Never raises: bytes that belong to no frame are counted and skipped.
+    """Finds frames in a byte stream. Never raises: bytes outside frames are counted and skipped.
 
-    After a bad checksum the search goes on one byte later, so a frame hidden behind a false header is still found.
-    `takes_low_v2`: also v2 frames of v1's commands, as configurators send them; no flight controller does unasked.
-    A frame that stays incomplete keeps its bytes until more come: call `reset` when the line has been silent.
+    After a bad checksum the search resumes one byte later, so a frame hidden behind a false header is still found.
+    `takes_low_v2`: also v2 frames of v1's commands, as configurators send them; no flight controller sends them
+    unrequested. Call `reset` when the line has been silent: an incomplete frame keeps its bytes.
     """
 
     def __init__(self, *, takes_low_v2: bool = False) -> None:
@@ -77,7 +77,7 @@ class MspParser:
         self.skipped_bytes = 0
 
     def feed(self, data: bytes) -> list[MspFrame]:
-        """Take bytes as they come and return the frames that they complete."""
+        """Take received bytes; return the completed frames."""
         buffer = self._buffer
         buffer += data
         frames: list[MspFrame] = []
@@ -103,7 +103,7 @@ class MspParser:
         return frames
 
     def reset(self) -> list[MspFrame]:
-        """Give up on an incomplete frame; the frames that its bytes were hiding."""
+        """Drop an incomplete frame; return the frames found in its bytes."""
         frames: list[MspFrame] = []
         while self._buffer:
             self.skipped_bytes += 1
@@ -114,7 +114,7 @@ class MspParser:
 
 
 def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | None:
-    """Where the frame at `start` ends: None if its header is still incomplete, `start` if it cannot be a frame."""
+    """The end of the frame at `start`; None if its header is incomplete, `start` if it is not a frame."""
     size = len(buffer) - start
     if size >= 2 and buffer[start + 1] not in (_V1, _V2):
         return start
@@ -133,7 +133,7 @@ def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | No
 
 
 def _decode(frame: bytearray) -> MspFrame | None:
-    """Decode a whole frame; None if its checksum is wrong."""
+    """Decode a complete frame; None if its checksum is wrong."""
     direction, body = _DIRECTIONS[frame[2]], frame[3:-1]
     if frame[1] == _V1:
         return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(body[2:]))

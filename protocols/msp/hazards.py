@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes that make Harakiri act on its own, and how frames avoid them.
+"""The bytes that Harakiri acts on anywhere in the stream, and how frames avoid them.
 
 Three 0x0D in a row enter the CLI, in AUTOSENSE three '#' do so too and three 'R' reset the board (serial.c, serialCom).
-The firmware counts across frame borders and inside frames. See docs/msp-mission.md, "Masked bodies".
+The firmware counts inside frames and across their boundaries. See docs/msp-mission.md, "Masked bodies".
 """
 
 HAZARDS = frozenset((0x0D, 0x23, 0x52))
@@ -35,5 +35,5 @@ def find_mask(body: bytes, fixed_xor: int) -> int | None:
 
 
 def apply_mask(body: bytes, mask: int) -> bytes:
-    """XOR every byte of `body` with `mask`; the same call takes the mask off."""
+    """XOR every byte of `body` with `mask`; the same call removes the mask."""
     return bytes(byte ^ mask for byte in body)

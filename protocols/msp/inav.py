@@ -19,7 +19,7 @@ MIXER = 0x2010
 MIXER_SIZE = 9
 _ALL_SENSORS = sum(Sensor)
 
-#: The flags of MSP2_INAV_STATUS that keep it from arming (fc/runtime_config.h), as a pilot reads them.
+#: The flags of MSP2_INAV_STATUS that prevent arming (fc/runtime_config.h), with their texts for the pilot.
 ARMING_BLOCKERS = {
     6: "geozone",
     7: "failsafe",
@@ -50,7 +50,7 @@ ARMING_BLOCKERS = {
 
 @dataclass(frozen=True, slots=True)
 class InavStatus:
-    """MSP2_INAV_STATUS. load_percent: of the CPU. blockers: what keeps it from arming."""
+    """MSP2_INAV_STATUS. load_percent: of the CPU. blockers: the reasons that prevent arming."""
 
     cycle_time_us: int
     i2c_errors: int

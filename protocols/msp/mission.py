@@ -68,7 +68,7 @@ INFO_SIZE = _INFO.size
 
 @dataclass(frozen=True, slots=True)
 class Info:
-    """What the flight controller says of itself. Radius in cm, time-out in ms."""
+    """The flight controller's state and limits. Radius in cm, timeout in ms."""
 
     version: int
     flags: InfoFlag
@@ -103,7 +103,7 @@ class Info:
 
 @dataclass(frozen=True, slots=True)
 class Staged:
-    """Reply to BEGIN and CHUNK: the next record wanted, and the checksum of those staged before it."""
+    """Reply to BEGIN and CHUNK: the next expected record, and the checksum of those staged before it."""
 
     status: ReplyStatus
     next: int
@@ -116,7 +116,7 @@ class Staged:
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """Reply to COMMIT: the list that is in flash now."""
+    """Reply to COMMIT: the list now in flash."""
 
     status: ReplyStatus
     stored: ListIdentity
@@ -246,7 +246,7 @@ def _short_request(command: MissionCommand, body: bytes) -> bytes:
 
 
 def encode_begin(identity: ListIdentity) -> bytes:
-    """Encode BEGIN for a list; an empty one clears what is stored."""
+    """Encode BEGIN for a list; an empty one clears the stored list."""
     return _short_request(MissionCommand.BEGIN, _LIST.pack(identity.count, identity.checksum))
 
 
@@ -267,7 +267,7 @@ def encode_radius(wp_radius_cm: int) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """A CHUNK request that is ready to be sent, and which records it carries."""
+    """An encoded CHUNK request, and the records in it."""
 
     first: int
     count: int
@@ -289,7 +289,7 @@ ABORT_REQUEST = request(MissionCommand.ABORT)
 
 
 def unmask(payload: bytes) -> bytes | None:
-    """Take the mask off a request's payload (the flight controller's side); None if it is not masked form."""
+    """Unmask a request's payload (the flight controller's side); None if it is not masked."""
     if len(payload) % 2 == 0:
         return None
     return apply_mask(payload[1:], payload[0])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions over MSP_SET_WP: what INAV and MultiWii NAV keep, and how they are asked (docs/inav.md).
+"""Missions over MSP_SET_WP: the records and requests of INAV and MultiWii NAV (docs/inav.md).
 
-Records are numbered from 1. Numbers 0 and 255 are no part of a mission: writing them moves the home point and a craft
-that holds its position, so no frame with them can be made here.
+Records are numbered from 1. Numbers 0 and 255 are not part of a mission: writing them moves home, or a craft that
+holds its position, so no frame with them can be encoded here.
 """
 
 import struct
@@ -17,7 +17,7 @@ _INFO = struct.Struct("<BBBB")
 _STATUS = struct.Struct("<BBBBBH")
 WP_SIZE = _WP.size
 INFO_SIZE = _INFO.size
-#: MSP_NAV_CONFIG as MultiWii 2.4 has it; only its end is of interest.
+#: MSP_NAV_CONFIG in MultiWii 2.4; only its end is used.
 NAV_CONFIG_SIZE = 32
 _HIGHEST_NUMBER = 254
 
@@ -26,7 +26,7 @@ LAST, FLY_HOME = 0xA5, 0x48
 
 
 class Nav(IntEnum):
-    """Commands. SET_WP, LOAD and SAVE change the mission, the others nothing."""
+    """Commands. SET_WP, LOAD and SAVE change the mission, the others change nothing."""
 
     LOAD = 18
     SAVE = 19
@@ -37,7 +37,7 @@ class Nav(IntEnum):
 
 
 class NavAction(IntEnum):
-    """What a record does."""
+    """The action of a record."""
 
     WAYPOINT = 1
     POSHOLD_UNLIM = 2
@@ -49,7 +49,7 @@ class NavAction(IntEnum):
     LAND = 8
 
 
-#: Actions that fly somewhere.
+#: Actions that fly to a place.
 LEGS = frozenset((NavAction.WAYPOINT, NavAction.POSHOLD_UNLIM, NavAction.POSHOLD_TIME, NavAction.LAND))
 
 
@@ -62,7 +62,7 @@ class NavRecord:
     """One record; its number is its position in the list, counted from 1.
 
     lat_e7, lon_e7: degrees * 1e7. alt_cm: above home, or above mean sea level if bit 0 of p3 is set. `flag` is LAST for
-    the last record. `action` is a plain int because a flight controller may hold a number that we do not know.
+    the last record. `action` is a plain int because a flight controller may have an unknown number.
     """
 
     action: int
@@ -81,7 +81,7 @@ class NavRecord:
 
 @dataclass(frozen=True, slots=True)
 class NavInfo:
-    """MSP_WP_GETINFO: how many records fit, whether the current list may be flown, how many it has."""
+    """MSP_WP_GETINFO: the capacity, the validity of the current list, and its size."""
 
     capacity: int
     is_valid: bool
@@ -96,7 +96,7 @@ class NavMode(IntEnum):
 
 
 class NavState(IntEnum):
-    """The states in MSP_NAV_STATUS that mean "it is there"; the others are on the way."""
+    """The states in MSP_NAV_STATUS in which the craft has arrived; in the others it is on its way."""
 
     HOLD_TIMED = 4
     LAND_IN_PROGRESS = 9
@@ -110,9 +110,9 @@ FINISHED = 4
 
 @dataclass(frozen=True, slots=True)
 class NavStatus:
-    """MSP_NAV_STATUS: the record in work is `number`, counted from 1; heading in degrees.
+    """MSP_NAV_STATUS: `number` is the current record, counted from 1; heading in degrees.
 
-    `mode`, `state` and `error` are plain ints: newer firmware may send others than we know.
+    `mode`, `state` and `error` are plain ints: newer firmware may send unknown values.
     """
 
     mode: int
@@ -124,12 +124,12 @@ class NavStatus:
 
 
 def encode_set_wp(number: int, record: NavRecord) -> bytes:
-    """Return the request that stores record `number`; UnsafeRecord for what must not reach a flight controller.
+    """Return the request that stores record `number`; UnsafeRecord if it must not reach a flight controller.
 
     INAV crashes on a JUMP whose target is below 1, on the ground and in the air.
     """
     if not 1 <= number <= _HIGHEST_NUMBER:
-        raise UnsafeRecord(f"number {number} is no record of a mission")
+        raise UnsafeRecord(f"number {number} is not a mission record")
     if record.action == NavAction.JUMP and record.p1 <= 0:
         raise UnsafeRecord(f"record {number} jumps to {record.p1}")
     return request(Nav.SET_WP, bytes((number,)) + record.pack())
@@ -140,16 +140,16 @@ def encode_read_wp(number: int) -> bytes:
     return request(Nav.WP, bytes((number,)))
 
 
-#: Asks which of several missions in INAV's store is flown, counted from 1: a setting, read over MSP v2.
+#: Reads the number of the selected mission in INAV's store, from 1: a setting, over MSP v2.
 SETTING = 0x1003
 SELECTED_REQUEST = request(SETTING, b"nav_wp_multi_mission_index\0")
-#: SAVE and LOAD have one byte, which means nothing yet; with any other length INAV refuses them.
+#: SAVE and LOAD have one reserved byte; INAV refuses any other length.
 SAVE_REQUEST = request(Nav.SAVE, b"\0")
 LOAD_REQUEST = request(Nav.LOAD, b"\0")
 
 
 def decode_wp(payload: bytes) -> tuple[int, NavRecord] | None:
-    """Read MSP_WP: number and record. INAV counts down in p3 of a JUMP while it flies, so that is left out."""
+    """Read MSP_WP: number and record. INAV counts down in p3 of a JUMP during flight, so that is ignored."""
     if len(payload) < _WP.size:
         return None
     number, *fields = _WP.unpack_from(payload)
@@ -166,7 +166,7 @@ def decode_info(payload: bytes) -> NavInfo | None:
 
 
 def decode_nav_config(payload: bytes) -> int | None:
-    """Read how many records fit out of MultiWii's MSP_NAV_CONFIG: the last byte but one."""
+    """Read the capacity in records from MultiWii's MSP_NAV_CONFIG: the last byte but one."""
     return payload[-2] if len(payload) >= 2 else None
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replies that carry the vehicle's state. Harakiri's lengths are the least accepted; its relatives send longer ones.
+"""Replies with the vehicle's state. Harakiri's lengths are the minimum; related firmware sends longer ones.
 
 Layouts: Harakiri's serial.c; INAV's fc_msp.c. A payload that is too short gives None.
 """
@@ -43,12 +43,12 @@ class Ident(NamedTuple):
 
     @property
     def release(self) -> tuple[int, int, int]:
-        """The version as MultiWii and its heirs count: 241 is 2.4.1."""
+        """The version as MultiWii and its descendants count: 241 is 2.4.1."""
         return self.version // 100, self.version // 10 % 10, self.version % 10
 
 
 class StatusReport(NamedTuple):
-    """MSP_STATUS: `box_flags` has one bit a box, in the order of BOXNAMES."""
+    """MSP_STATUS: `box_flags` has one bit per box, in the order of BOXNAMES."""
 
     cycle_time_us: int
     i2c_errors: int
@@ -57,7 +57,7 @@ class StatusReport(NamedTuple):
 
 
 class RawImu(NamedTuple):
-    """MSP_RAW_IMU: x, y, z of accelerometer, gyro and compass; every firmware has units of its own."""
+    """MSP_RAW_IMU: x, y, z of accelerometer, gyro and compass; each firmware has its own units."""
 
     acc: tuple[int, int, int]
     gyro: tuple[int, int, int]
@@ -102,7 +102,7 @@ class AltitudeReply(NamedTuple):
 class Analog(NamedTuple):
     """MSP_ANALOG: battery in 0.1 V, receiver strength 0..1023; mAh drawn and 0.01 A where the current is sent.
 
-    A sensor that is not there reads 0.
+    A missing sensor reads 0.
     """
 
     battery_dv: int
@@ -112,7 +112,7 @@ class Analog(NamedTuple):
 
 
 class HomePoint(NamedTuple):
-    """MSP_WP number 0: where the flight controller took off, degrees * 1e7; 0, 0 if it does not know."""
+    """MSP_WP number 0: home, degrees * 1e7; 0, 0 if unknown."""
 
     lat_e7: int
     lon_e7: int
@@ -140,7 +140,7 @@ def decode_raw_imu(payload: bytes) -> RawImu | None:
 
 
 def decode_channels(payload: bytes) -> tuple[int, ...] | None:
-    """Read MSP_RC: roll, pitch, yaw, throttle, then what there is of aux, microseconds; at most 18."""
+    """Read MSP_RC: roll, pitch, yaw, throttle, then aux, microseconds; at most 18."""
     count = len(payload) // 2
     if count < _MIN_CHANNELS:
         return None
@@ -148,7 +148,7 @@ def decode_channels(payload: bytes) -> tuple[int, ...] | None:
 
 
 def decode_motors(payload: bytes) -> tuple[int, ...] | None:
-    """Read MSP_MOTOR: eight outputs in microseconds, 0 for a motor that is not there."""
+    """Read MSP_MOTOR: eight outputs in microseconds, 0 for a missing motor."""
     return _MOTORS.unpack_from(payload) if len(payload) >= _MOTORS.size else None
 
 
@@ -184,7 +184,7 @@ def decode_analog(payload: bytes) -> Analog | None:
 
 
 def decode_home(payload: bytes) -> HomePoint | None:
-    """Read MSP_WP number 0. In the 21 bytes of INAV and MultiWii NAV an action stands behind the number."""
+    """Read MSP_WP number 0. In the 21 bytes of INAV and MultiWii NAV an action follows the number."""
     if len(payload) < _WP.size or payload[0] != 0:
         return None
     has_action = len(payload) >= _NAV_WP_SIZE
@@ -197,7 +197,7 @@ def decode_box_names(payload: bytes) -> tuple[str, ...]:
 
 
 def decode_box_activation(payload: bytes, boxes: int) -> tuple[int, ...] | None:
-    """Read MSP_BOX: for each box a word with three bits an aux channel; 32 bits wide with more than four of them."""
+    """Read MSP_BOX: for each box a word with three bits per aux channel; 32 bits wide above four channels."""
     if not boxes or len(payload) not in (2 * boxes, 4 * boxes):
         return None
     return struct.unpack(f"<{boxes}{'H' if len(payload) == 2 * boxes else 'I'}", payload)
