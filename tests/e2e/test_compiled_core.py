@@ -127,7 +127,7 @@ def test_a_library_that_is_not_the_core(tmp_path: Path) -> None:
     for options, said in [
         (("--core", str(wrong)), "Cannot load the core"),
         (("--core", str(tmp_path / "none.so")), "does not exist"),
-        (("--core", str(library()), "--capacity", "20"), "holds 146 records: leave --capacity away"),
+        (("--core", str(library()), "--capacity", "20"), "holds 146 records: omit --capacity"),
     ]:
         result = run_naze_bridge("sim", "--link", str(tmp_path / "naze"), *options)
         assert result.returncode != 0

@@ -224,7 +224,7 @@ def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: St
     assert found["name"] == "Harakiri with the mission extension"
     listener = connect(daemon)
     until(lambda: listener.has_heard(messages.MAVLINK_MSG_ID_ATTITUDE, 3), "the recorded attitude")
-    until(lambda: "That was all" in player.printed, "the end")
+    until(lambda: "The capture has ended" in player.printed, "the end")
     # It goes on with what it answered last.
     daemon.wait()
     assert player.end() == 0
@@ -240,7 +240,7 @@ def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: St
             "{dir} is not a file: name a new file for --record-uart",
         ),
         (("run", "--fc", "sim:", "--record-uart", "{dir}/notes.txt"), 1, "notes.txt is not a UART capture"),
-        (("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt"), 1, "notes.txt holds no UART capture"),
+        (("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt"), 1, "notes.txt is not a UART capture"),
         (("sim", "--link", "{dir}/naze", "--play", "{dir}/nothing"), 2, "does not exist"),
         (
             ("sim", "--link", "{dir}/naze", "--play", "{dir}/notes.txt", "--armed"),

@@ -198,7 +198,7 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--link", "{}/none/naze"], "Error: {}/none/naze cannot be made: No such file or directory.\n"),
+        (["--link", "{}/none/naze"], "Error: {}/none/naze cannot be created: No such file or directory.\n"),
         (["--link", "{}/file"], "Error: {}/file is in the way: name another --link, or remove it.\n"),
         (["--link", "{}/link"], "Error: {}/link is in the way: name another --link, or remove it.\n"),
         (["--link", "{}/naze", "--control", "{}/none/socket"], "Error: Cannot make {}/none/socket: No such file or"),
@@ -243,7 +243,7 @@ def test_a_second_one_leaves_the_link_of_a_running_one_alone(start: Callable[...
             [sys.executable, "-c", program, "--link", str(first.link)], capture_output=True, text=True, timeout=PATIENCE
         )
         assert second.returncode == 1
-        assert f"{first.link} is a running simulator's" in second.stderr
+        assert f"{first.link} belongs to a running simulator" in second.stderr
         assert "Traceback" not in second.stderr
         # A look at the lock does not take it away.
         again = subprocess.run([sys.executable, "-c", program, "--link", str(first.link)], timeout=PATIENCE)

@@ -172,10 +172,10 @@ def test_the_truth_of_a_flight(start: Callable[..., Simulator]) -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--kind", "inav"), "either --link PATH or --tcp HOST:PORT"),
+        (("--kind", "inav"), "--link PATH or --tcp HOST:PORT"),
         (("--tcp", "5760"), "'5760' is not HOST:PORT"),
         (("--kind", "inav", "--tcp", "127.0.0.1:1", "--tele-prot", "1"), "--tele-prot has no effect with --kind inav"),
-        (("--kind", "inav", "--tcp", "192.0.2.1:5760"), "192.0.2.1:5760 cannot be listened on"),
+        (("--kind", "inav", "--tcp", "192.0.2.1:5760"), "192.0.2.1:5760 cannot be opened for listening"),
         (("--kind", "inav", "--tcp", "127.0.0.1:5760", "--state", "pyproject.toml"), "name another file"),
     ],
 )

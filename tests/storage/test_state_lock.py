@@ -81,7 +81,7 @@ def test_it_can_be_released_and_held_again(tmp_path: Path) -> None:
 
 def test_a_file_in_the_directorys_place(tmp_path: Path) -> None:
     (tmp_path / "state").touch()
-    with pytest.raises(StoreError, match=r"cannot use the state directory .*/state: .*name another with --state-dir"):
+    with pytest.raises(StoreError, match=r"cannot use the state directory .*/state: .*use another with --state-dir"):
         StateLock(tmp_path / "state").acquire()
 
 

@@ -112,7 +112,7 @@ def test_a_directory_that_may_not_be_written(with_store: bool) -> None:
 
 @pytest.mark.parametrize("path", ["/proc/naze-bridge/missions.db", "/dev/null/missions.db"])
 def test_a_directory_that_cannot_be_made(path: str) -> None:
-    with pytest.raises(StoreError, match=f"cannot open the mission store {path}: its directory cannot be made"):
+    with pytest.raises(StoreError, match=f"cannot open the mission store {path}: its directory cannot be created"):
         open_store(Path(path), now=0.0)
 
 
@@ -139,10 +139,10 @@ def test_another_program_holds_the_file(tmp_path: Path) -> None:
     with open_store(path, now=0.0).store as store:
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
-        with pytest.raises(StoreError, match=r"cannot store the mission in .*: another process keeps it locked"):
+        with pytest.raises(StoreError, match=r"cannot store the mission in .*: another process has locked it"):
             store.add(mission(1))
         assert store.list(9) == []  # reading goes on
-        with pytest.raises(StoreError, match="another process keeps it locked"):
+        with pytest.raises(StoreError, match="another process has locked it"):
             open_store(path, now=0.0)
         other.execute("ROLLBACK")
         other.close()
