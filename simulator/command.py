@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim`: a simulated flight controller behind a pseudo-terminal or a TCP socket."""
+"""`naze-bridge sim`: a simulated flight controller on a pseudo-terminal or a TCP socket."""
 
 import asyncio
 from collections.abc import Callable
@@ -32,7 +32,7 @@ _PATH = click.Path(path_type=Path)
 
 def _load_core(path: Path, capacity: int) -> BootMissions:
     if capacity != CORE_CAPACITY:
-        raise click.ClickException(f"The compiled core holds {CORE_CAPACITY} records: leave --capacity away.")
+        raise click.ClickException(f"The compiled core holds {CORE_CAPACITY} records: omit --capacity.")
     try:
         return load_core(path)
     except OSError as error:
@@ -56,7 +56,7 @@ def _refuse_options(mode: str, is_refused: Callable[[str], bool]) -> None:
     for parameter in context.command.params:
         name = parameter.name or ""
         if is_refused(name) and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"{parameter.opts[0]} has no effect with {mode}: leave it out.")
+            raise click.UsageError(f"{parameter.opts[0]} has no effect with {mode}: omit it.")
 
 
 def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[str, int] | None:
@@ -92,19 +92,19 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
     type=click.Choice([tree.name.lower() for tree in Tree]),
     default=SimOptions().tree.name.lower(),
     show_default=True,
-    help="Which of Harakiri's trees.",
+    help="Harakiri's source tree.",
 )
 @click.option("--capacity", type=click.IntRange(2, 1000), help="Records that fit: 146 on a Naze, 178 on a MultiWii.")
 @click.option(
     "--wp-radius-cm", type=click.IntRange(0, 2000), default=200, show_default=True, help="gps_wp_radius, if blank."
 )
-@click.option("--seed", type=int, default=0, help="Of the random faults.")
+@click.option("--seed", type=int, default=0, help="Seed of the random faults.")
 @click.option("--hang-after", type=_PERIOD, help="Stop answering after this many seconds.")
 @click.option("--power-cut-after", type=_PERIOD, help="Lose power after this many seconds.")
 @click.option(
     "--core",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Run the firmware's own mission core out of this shared library (make -C firmware sim).",
+    help="Run the firmware's own mission core from this shared library (make -C firmware sim).",
 )
 @click.option(
     "--image",
@@ -112,13 +112,13 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
     help="Emulate the chip and run this firmware (ELF). Needs naze-bridge[emulator].",
 )
 @click.option("--state", "--flash", "state", type=_PATH, help="File that keeps the flash's contents.")
-@click.option("--control", type=_PATH, help="Unix socket that takes lines from tests.")
+@click.option("--control", type=_PATH, help="Unix socket for control commands (docs/simulator.md).")
 @click.option(
     "--play",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Play this UART capture (run --record-uart) instead.",
 )
-@click.option("--speed", type=click.FloatRange(0.01, 100), default=1.0, help="How many times as fast to play it.")
+@click.option("--speed", type=click.FloatRange(0.01, 100), default=1.0, help="Playback speed: 10 is ten times as fast.")
 def sim(
     kind: str,
     inav_version: str,
@@ -148,7 +148,7 @@ def sim(
 ) -> None:
     """Simulate a Naze with Harakiri, or another flight controller, until Ctrl-C."""
     if (link is None) == (tcp is None):
-        raise click.UsageError("Say where: either --link PATH or --tcp HOST:PORT.")
+        raise click.UsageError("Specify the connection: --link PATH or --tcp HOST:PORT.")
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
     running = Running(link, tcp, control, hang_after, power_cut_after)
     if image is not None:
@@ -178,7 +178,7 @@ def sim(
         record_program_ms=program_stall,
     )
     blank = bytes((ERASED,)) * flash_size(options)
-    memory = open_memory(state, blank, "give the same --capacity as before, or another file") if state else None
+    memory = open_memory(state, blank, "use the same --capacity as before, or another file") if state else None
     missions = _load_core(core, options.capacity) if core else MissionCommands
     naze = SimulatedNaze(options, faults, memory, missions)
     asyncio.run(run_board(naze, "Naze", running, lambda: True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Matches replies with requests in a UART capture, and separates unsolicited data."""
+"""Matches replies with requests in a UART capture and separates unsolicited data."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -9,7 +9,7 @@ from itertools import accumulate
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.uart_capture import UartDeed, UartEvent
 
-#: The reply deadline: even a flight controller that writes its flash is faster.
+#: The reply deadline: even a flight controller that is writing its flash is faster.
 _LONGEST_WAIT_S = 5.0
 #: A request this shortly before the port was closed, or the recording ended, might have been answered.
 _CUT_SHORT_S = 0.5

@@ -5,7 +5,7 @@ from typing import Protocol
 
 
 class FarEnd(Protocol):
-    """Has no clock of its own: `now` is in seconds of any monotonic clock."""
+    """Times are passed in: `now` is in seconds of any monotonic clock."""
 
     @property
     def baud(self) -> int:

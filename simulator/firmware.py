@@ -46,7 +46,7 @@ class ResetError(Exception):
 
 
 class Protocol(Enum):
-    """The firmware's present protocol on the UART."""
+    """The firmware's current protocol on the UART."""
 
     AUTOSENSE = auto()
     MSP = auto()

@@ -57,7 +57,7 @@ class SimulatedNaze(SimulatedBoard):
 
     @property
     def protocol(self) -> Protocol | None:
-        """The firmware's present protocol."""
+        """The firmware's current protocol."""
         return self._firmware.protocol if self._firmware else None
 
     @property

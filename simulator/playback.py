@@ -8,7 +8,7 @@ recording, with the same delay, and none if it got none. Invented replies:
 - A request that was never recorded gets MSP's error frame, as from firmware that does not know it, if the flight
   controller answered anything at that time.
 - A request that was recorded only later (a mission is uploaded earlier now) gets its later replies, in order.
-- After the end the last replies are repeated for ever.
+- After the end the last replies are repeated.
 """
 
 import heapq

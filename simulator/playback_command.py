@@ -23,7 +23,7 @@ def _player(path: Path, tempo: float) -> CapturePlayer:
     except OSError as error:
         raise click.ClickException(f"Cannot read {path}: {error.strerror}.") from error
     if not events:
-        raise click.ClickException(f"{path} holds no UART capture; naze-bridge run --record-uart FILE makes one.")
+        raise click.ClickException(f"{path} is not a UART capture; make one with naze-bridge run --record-uart FILE.")
     return CapturePlayer(events, tempo)
 
 
@@ -40,7 +40,7 @@ async def _play(player: CapturePlayer, path: Path, link: Path) -> None:
         for closed, opened in player.outages:
             loop.call_at(began_at + closed, port.unplug)
             loop.call_at(began_at + opened, port.plug)
-        loop.call_at(began_at + player.duration_s, click.echo, "That was all; it goes on with its last answers.")
+        loop.call_at(began_at + player.duration_s, click.echo, "The capture has ended; its last replies are repeated.")
         click.echo(f"Playing {path} at {link} for {player.duration_s:.0f} s. Ctrl-C ends it.")
         await stop.wait()
     except PlugError as error:

@@ -46,7 +46,7 @@ class PtyLink:
         if self._pump:
             return
         if self._is_anothers():
-            raise PlugError(f"{self._path} is a running simulator's: stop that one, or name another --link")
+            raise PlugError(f"{self._path} belongs to a running simulator: stop it, or use another --link")
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
         self._set_speed(self._board.baud)
@@ -59,8 +59,8 @@ class PtyLink:
         except OSError as error:
             self._close()
             if isinstance(error, FileExistsError):
-                raise PlugError(f"{self._path} is in the way: name another --link, or remove it") from error
-            raise PlugError(f"{self._path} cannot be made: {error.strerror}") from error
+                raise PlugError(f"{self._path} already exists: use another --link, or remove it") from error
+            raise PlugError(f"{self._path} cannot be created: {error.strerror}") from error
         # Our own copy of the far end stays open, so the terminal keeps its settings between clients.
         self._pump = Pump(self._board, self._near, self._loop, far_baud=self._far_baud)
         self._pump.start()

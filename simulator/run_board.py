@@ -58,7 +58,7 @@ async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive
     except PlugError as error:
         raise click.ClickException(f"{error}.") from error
     except OSError as error:
-        raise click.ClickException(f"Cannot make {running.control}: {error.strerror}.") from error
+        raise click.ClickException(f"Cannot create {running.control}: {error.strerror}.") from error
     finally:
         plug.unplug()
         obedience.close()

@@ -52,7 +52,7 @@ class SimulatedBoard(ABC):
 
     @property
     def protocol(self) -> Enum | None:
-        """The firmware's present protocol; None if it has only one, or does not run."""
+        """The firmware's current protocol; None if it has only one, or does not run."""
         return None
 
     @property

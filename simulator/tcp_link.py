@@ -70,7 +70,7 @@ class SimTcpLink:
         try:
             self._listener = socket.create_server(self._address)
         except OSError as error:
-            raise PlugError(f"{host}:{port} cannot be listened on: {error.strerror}") from error
+            raise PlugError(f"{host}:{port} cannot be opened for listening: {error.strerror}") from error
         self._listener.setblocking(False)
         self._loop.add_reader(self._listener, self._on_connection, self._listener)
 

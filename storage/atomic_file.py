@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small file that is whole at every moment, even if the power is cut while it is written."""
+"""Writes small files atomically, even if the power is cut."""
 
 import os
 from pathlib import Path

@@ -40,7 +40,7 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StoreError(f"{failure}: its directory cannot be made ({error.strerror})") from error
+        raise StoreError(f"{failure}: its directory cannot be created ({error.strerror})") from error
     with explained(failure), ExitStack() as undo:
         connection = _connect(path)
         undo.callback(connection.close)
@@ -155,7 +155,7 @@ def _keep_aside(path: Path, now: float) -> Path:
         _forget_oldest(path, aside)
     except OSError as error:
         raise StoreError(
-            f"the mission store {path} is damaged and cannot be kept aside ({error.strerror}); move it away"
+            f"the mission store {path} is damaged and cannot be renamed ({error.strerror}); move it away"
         ) from error
     return aside
 
@@ -181,7 +181,7 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
     latest = len(_schema_steps())
     if version > latest:
         raise StoreError(
-            f"the mission store {path} is of a newer naze-bridge (schema {version}, this one knows "
+            f"the mission store {path} is from a newer naze-bridge (schema {version}, this one knows "
             f"{latest}); install that release, or move the file away"
         )
     _apply_schema(connection, version)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every received mission, accepted or not: as sent, as stored, and the craft's answer."""
+"""Every received mission, accepted or not: as sent, as stored, and the outcome."""
 
 import builtins
 import json
@@ -29,7 +29,7 @@ __all__ = [
     "store_in_memory",
 ]
 
-PENDING = "PENDING"  # the outcome until conclude(); for ever, if the daemon died in between
+PENDING = "PENDING"  # the outcome until conclude(); it stays if the daemon died in between
 VERIFIED = "VERIFIED"  # the outcome that latest_verified() looks for
 DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match its checksum
 

@@ -45,7 +45,7 @@ class StateLock:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
             raise StateUnusableError(
-                f"cannot use the state directory {self._directory}: {error.strerror}; name another with --state-dir"
+                f"cannot use the state directory {self._directory}: {error.strerror}; use another with --state-dir"
             ) from error
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -55,7 +55,7 @@ class StateLock:
             who = f"process {holder}" if holder else "another process"
             raise StoreError(
                 f"the state directory {self._directory} is in use by {who}; "
-                f"stop that one, or name another directory with --state-dir"
+                f"stop it, or use another directory with --state-dir"
             ) from error
         self._descriptor = descriptor
         with contextlib.suppress(OSError):  # the id is only for the message: a full disk must not stop us

@@ -13,13 +13,13 @@ class StoreError(Exception):
 # By primary result code (https://sqlite.org/rescode.html); extended codes add the system call.
 _REASONS = {
     sqlite3.SQLITE_FULL: "the disk is full; free some space",
-    sqlite3.SQLITE_IOERR: "the disk is full or failing; look at df and dmesg",
-    sqlite3.SQLITE_READONLY: "it may not be written; look at its owner, mode and mount, or move it away",
-    sqlite3.SQLITE_PERM: "it may not be opened; look at its owner and mode",
-    sqlite3.SQLITE_CANTOPEN: "it cannot be opened or made; look at the directory's owner, mode and mount",
-    sqlite3.SQLITE_BUSY: "another process keeps it locked; end that one",
-    sqlite3.SQLITE_CORRUPT: "it is damaged; a restart keeps it aside and makes a new one",
-    sqlite3.SQLITE_NOTADB: "it is not a database any more; a restart keeps it aside and makes a new one",
+    sqlite3.SQLITE_IOERR: "the disk is full or failing; check df and dmesg",
+    sqlite3.SQLITE_READONLY: "it cannot be written; check its owner, mode and mount, or move it away",
+    sqlite3.SQLITE_PERM: "it cannot be opened; check its owner and mode",
+    sqlite3.SQLITE_CANTOPEN: "it cannot be opened or created; check the directory's owner, mode and mount",
+    sqlite3.SQLITE_BUSY: "another process has locked it; stop that process",
+    sqlite3.SQLITE_CORRUPT: "it is damaged; a restart sets it aside and creates a new one",
+    sqlite3.SQLITE_NOTADB: "it is no longer a database; a restart sets it aside and creates a new one",
 }
 
 

@@ -10,7 +10,7 @@ from simulator.emulated_naze.dma import DmaChannel
 _SR, _CR2, _SQR1, _DR = 0x00, 0x08, 0x2C, 0x4C
 _ON, _CONTINUOUS, _CALIBRATE, _RESET_CALIBRATION, _DMA, _START = 1, 2, 4, 8, 1 << 8, 1 << 22
 _END_OF_CONVERSION = 2
-#: Far slower than the real converter, which would keep us busy: the firmware looks at the latest value only.
+#: Far slower than the real converter, to save CPU time: the firmware reads only the latest value.
 _SCAN_NS = 1_000_000
 
 
@@ -24,12 +24,12 @@ class Adc(Registers):
         self._scan_end = Alarm(clock, self._scan)
 
     def reset(self) -> None:
-        """Switched off."""
+        """Switch off."""
         super().reset()
         self._scan_end.cancel()
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         if offset == _CR2:
             if value & _ON and value & _START and not self._scan_end.is_set:
                 self._scan_end.set_in(_SCAN_NS)

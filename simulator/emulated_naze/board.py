@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The emulated board on a bench: power, wires and a pilot around the chip, without a clock of its own.
+"""The emulated board on a bench: power, wires and a pilot around the chip.
 
-Time is passed in (seconds of any monotonic clock), as to the simulated Naze.
+Time is passed in (seconds of any monotonic clock), as for the simulated Naze.
 """
 
 import logging
@@ -54,15 +54,15 @@ class EmulatedNaze(SimulatedBoard):
         self._chip.flash_controller.on_power_cut = self._on_power_cut
         self._memory = HarakiriMemory(image, self._chip.cpu, flash)
         self._longest_step_s = longest_step_s
-        # What the clock of the callers shows when that of the chip is at zero.
+        # The callers' time at which the chip's clock was zero.
         self._offset_s = 0.0
         self._lost_power = False
 
-    # -- what can be seen ------------------------------------------------------------------------------------
+    # -- its state -------------------------------------------------------------------------------------------
 
     @property
     def baud(self) -> int:
-        """The speed of the UART at this moment."""
+        """The current speed of the UART."""
         return self._chip.usart1.baud
 
     @property
@@ -72,7 +72,7 @@ class EmulatedNaze(SimulatedBoard):
 
     @property
     def protocol(self) -> SpokenProtocol | None:
-        """The firmware's present protocol."""
+        """The firmware's current protocol."""
         return self._memory.protocol if self.power is Power.RUNNING else None
 
     @property
@@ -82,7 +82,7 @@ class EmulatedNaze(SimulatedBoard):
 
     @property
     def flash_operations(self) -> int:
-        """Erases and programs so far."""
+        """The number of erases and programs so far."""
         return self.counters.flash_erases + self.counters.flash_programs
 
     def peek(self, address: int, size: int) -> bytes:
@@ -93,7 +93,7 @@ class EmulatedNaze(SimulatedBoard):
         """Overwrite bytes of the chip's RAM, as a debugger would."""
         self._chip.cpu.store(address, data)
 
-    # -- what can be done ------------------------------------------------------------------------------------
+    # -- controls --------------------------------------------------------------------------------------------
 
     def power_on_booted(self, now: float) -> None:
         """Switch the power on and let the board boot at once."""
@@ -113,7 +113,7 @@ class EmulatedNaze(SimulatedBoard):
         self._run_chip_until(now)
 
     def _run_chip_until(self, now: float) -> None:
-        """Run the core up to a moment, unless something stops it."""
+        """Run the core up to a time, unless something stops it."""
         chip, end_ns = self._chip, int((now - self._offset_s) * 1e9)
         self._move_sticks()
         while self.power is Power.RUNNING and not self.faults.hang and chip.clock.now_ns < end_ns:

@@ -17,31 +17,31 @@ class Peripheral(Protocol):
     """A register block. Offsets are multiples of four; a 16-bit access is one to the word's lower half."""
 
     def reset(self) -> None:
-        """Take the state after a reset of the chip."""
+        """Reset to the state after a chip reset."""
 
     def read(self, offset: int) -> int:
-        """The word at `offset`, with all that reading it brings about."""
+        """Read the word at `offset`, with the side effects of reading."""
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
 
 
 class Registers:
-    """A block whose registers only remember what was written; the base of those with behaviour."""
+    """A block whose registers only store written values; the base of those with behaviour."""
 
     def __init__(self) -> None:
         self.words: dict[int, int] = {}
 
     def reset(self) -> None:
-        """All registers are zero."""
+        """Set all registers to zero."""
         self.words.clear()
 
     def read(self, offset: int) -> int:
-        """What was written last."""
+        """Read the last written word."""
         return self.words.get(offset, 0)
 
     def write(self, offset: int, value: int) -> None:
-        """Remember it."""
+        """Store the word."""
         self.words[offset] = value
 
 
@@ -54,7 +54,7 @@ class Bus:
         self._reported: set[int] = set()
 
     def attach(self, address: int, peripheral: Peripheral) -> None:
-        """Let a block of 1 KB answer at `address`."""
+        """Map a block of 1 KB at `address`."""
         self._blocks[(address - BASE) >> _BLOCK_BITS] = peripheral
 
     def reset(self) -> None:
@@ -63,7 +63,7 @@ class Bus:
             peripheral.reset()
 
     def read(self, offset: int, size: int) -> int:
-        """Answer a load of `size` bytes."""
+        """Handle a load of `size` bytes."""
         self._pace.charge_access()
         block = self._blocks.get(offset >> _BLOCK_BITS)
         if block is None:
@@ -74,7 +74,7 @@ class Bus:
         return value
 
     def write(self, offset: int, _: int, value: int) -> None:
-        """Take a store. The bridge repeats a short one in the rest of the word, which none of the registers uses."""
+        """Handle a store. The bridge repeats a short one in the rest of the word, which no register uses."""
         self._pace.charge_access()
         self._pace.saw(~offset, value)
         block = self._blocks.get(offset >> _BLOCK_BITS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The STM32F103CB of a Naze32 with what is soldered to it: memory map and wiring, without a sense of real time."""
+"""The STM32F103CB of a Naze32 with the chips around it: memory map and wiring. Knows no real time."""
 
 import random
 import struct
@@ -25,9 +25,9 @@ from simulator.emulated_naze.timer import Timer
 from simulator.emulated_naze.usart import Usart
 
 _RAM, _RAM_SIZE = 0x2000_0000, 0x5000
-#: The system memory with ST's boot loader, of which the firmware needs only the entry.
+#: The system memory with ST's boot loader; the firmware needs only its entry.
 _BOOT_LOADER, _BOOT_LOADER_SIZE = 0x1FFF_F000, 0x1000
-#: Stack pointer and entry, and there an endless loop.
+#: Stack pointer and entry, which is an endless loop.
 _BOOT_LOADER_CODE = struct.pack("<II24xH", _RAM + 0x200, _BOOT_LOADER + 0x21, 0xE7FE)
 #: Unicorn maps memory in pages of this size.
 _MAP_PAGE = 4096
@@ -47,9 +47,9 @@ _REMEMBERED_ONLY = {
 
 
 class Chip:
-    """`flash` is the flash's contents, of which the first `program_size` bytes are the program.
+    """`flash` is the flash's contents; its first `program_size` bytes are the program.
 
-    What the firmware writes to must begin in a page (of `_MAP_PAGE`) of its own: the program's pages are read only.
+    Flash that the firmware writes must not share a page (of `_MAP_PAGE`) with the program: those pages are read-only.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Chip:
                 ms5611.ADDRESS: ms5611.Ms5611(self._random),
             },
         )
-        # The timers' clock is twice that of a bus that is divided.
+        # A timer's clock is twice that of its bus if the bus clock is divided.
         self.timer2 = Timer(self.clock, nvic, lambda: rcc.core_hz, Irq.TIM2)
         self.receiver = PpmReceiver(self.clock, self.timer2)
         self.wants_reset = False
@@ -128,7 +128,7 @@ class Chip:
     # -- life ------------------------------------------------------------------------------------------------
 
     def power_on(self) -> None:
-        """Begin with RAM that holds anything."""
+        """Begin with arbitrary RAM contents."""
         self.cpu.store(_RAM, self._random.randbytes(_RAM_SIZE))
         self.rcc.has_lost_power = True
         self.receiver.power_on()
@@ -143,7 +143,7 @@ class Chip:
         self.receiver.power_off()
 
     def reset(self) -> None:
-        """As after a reset by the firmware: RAM keeps its contents."""
+        """Reset as the firmware does: RAM keeps its contents."""
         self.wants_reset = False
         self._bus.reset()
         self.system.reset()
@@ -151,14 +151,14 @@ class Chip:
 
     @property
     def is_in_boot_loader(self) -> bool:
-        """Whether the firmware has handed over to the chip's own boot loader."""
+        """True if the firmware has started the chip's own boot loader."""
         return self.cpu.pc - _BOOT_LOADER in range(_BOOT_LOADER_SIZE)
 
     def _vectors(self) -> int:
         return self.system.vector_table or FLASH_BASE
 
     def _stall(self, duration_ns: int) -> None:
-        """Let time pass in which the core, whose code is in the flash, stands still."""
+        """Let time pass while the core, which runs from the flash, is stalled."""
         self._pace.spend(duration_ns)
         self.cpu.pause()
 

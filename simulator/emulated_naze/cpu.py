@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Cortex-M3 core on Unicorn: runs code between two events, enters exceptions and returns from them.
+"""The Cortex-M3 core on Unicorn: runs code between events, enters exceptions and returns from them.
 
-Unicorn counts instructions, not cycles, and reports the count only when it stops. So code runs in stretches that
-end when the next alarm is due; within one, each access to a register block is charged a fixed time.
+Unicorn counts instructions, not cycles, and reports the count only when it stops. So code runs in slices that end
+when the next alarm is due; within one, each access to a register block takes a fixed time.
 """
 
 import struct
@@ -14,9 +14,9 @@ from unicorn import arm_const
 from simulator.emulated_naze.clock import Clock
 from simulator.emulated_naze.nvic import Nvic
 
-#: Average over the firmware's code with the flash's two wait states.
+#: The average for the firmware's code, with the flash's two wait states.
 _CYCLES_PER_INSTRUCTION = 1.5
-#: The longest stretch: so late may an interrupt be that an access to a register has just brought about.
+#: The longest slice: the maximum delay of an interrupt caused by a register access.
 _LONGEST_STRETCH_NS = 100_000
 _NEVER_REACHED = 0xFFFF_FFF0
 _EXCEPTION_EXIT = 8
@@ -30,7 +30,7 @@ _XPSR, _PRIMASK = arm_const.UC_ARM_REG_XPSR, arm_const.UC_ARM_REG_PRIMASK
 
 
 class CpuFaultError(Exception):
-    """The code did what would end in a fault handler on the chip; one sentence."""
+    """The code caused a fault exception; one sentence."""
 
 
 class Cpu:
@@ -47,7 +47,7 @@ class Cpu:
         self._wants_pause = self._has_returned = False
         self._repeated: int | None = None
         self._fault = ""
-        # What each active exception has interrupted: its registers and where it goes on.
+        # The registers and return address of the code that each active exception interrupted.
         self._interrupted: list[tuple[unicorn.UcContext, int]] = []
         #: The next instruction.
         self.pc = 0
@@ -55,7 +55,7 @@ class Cpu:
     # -- memory ----------------------------------------------------------------------------------------------
 
     def map_memory(self, base: int, size: int, contents: bytes = b"", *, is_ram: bool = False) -> None:
-        """Put memory at an address: RAM, or what can only be read. Both can be executed."""
+        """Map memory at an address: RAM, or read-only memory. Both are executable."""
         self._unicorn.mem_map(
             base, size, unicorn.UC_PROT_ALL if is_ram else unicorn.UC_PROT_READ | unicorn.UC_PROT_EXEC
         )
@@ -72,10 +72,10 @@ class Cpu:
     def map_registers(
         self, base: int, size: int, read: Callable[[int, int], int], write: Callable[[int, int, int], None]
     ) -> None:
-        """Let `read` (offset, size) and `write` (offset, size, value) answer the accesses to a range of addresses.
+        """Let `read` (offset, size) and `write` (offset, size, value) handle accesses to a range of addresses.
 
-        Unicorn, when stopped in the middle of an access, forgets the instruction and executes it again. The second time
-        it gets what the first access gave, which has had its effect already.
+        When stopped in the middle of an access, Unicorn executes the instruction again. The second access gets the
+        first one's result and has no effect.
         """
 
         def on_read(_: unicorn.Uc, offset: int, size: int, __: object) -> int:
@@ -103,7 +103,7 @@ class Cpu:
     # -- running ---------------------------------------------------------------------------------------------
 
     def reset(self) -> None:
-        """Begin where the first two vectors say."""
+        """Begin at the first two vectors: stack pointer and entry."""
         stack, entry = struct.unpack("<II", self.load(self._vector_table(), 8))
         self._unicorn.reg_write(_XPSR, _THUMB_BIT)
         self._unicorn.reg_write(_PRIMASK, 0)
@@ -114,7 +114,7 @@ class Cpu:
         self._repeated = None
 
     def run_until(self, end_ns: int, goes_on: Callable[[], bool]) -> None:
-        """Execute until `end_ns`, or until `goes_on` says no. CpuFaultError."""
+        """Execute until `end_ns`, or until `goes_on` returns False. CpuFaultError."""
         clock = self._clock
         while clock.now_ns < end_ns and goes_on():
             if self._nvic.next_exception is not None:
@@ -124,11 +124,11 @@ class Cpu:
                 clock.advance(max(stretch_end_ns, clock.now_ns))
 
     def pause(self) -> None:
-        """End the stretch after the access to a register that is being carried out."""
+        """End the slice after the current register access."""
         self._wants_pause = True
 
     def _run_stretch(self, end_ns: int) -> bool:
-        """Execute what there is time for until then; return whether nothing ended it earlier."""
+        """Execute until then; False if the slice ended earlier."""
         cycles = (end_ns - self._clock.now_ns) * self._core_hz() // 1_000_000_000
         self._wants_pause = self._has_returned = False
         self._execute(max(int(cycles / _CYCLES_PER_INSTRUCTION), 1) + 1)
@@ -153,8 +153,8 @@ class Cpu:
     def _take_exception(self, exception: int) -> None:
         """Enter a handler (ARMv7-M manual, B1.5.6).
 
-        Reading and writing eight registers through Unicorn takes longer than most handlers. So the frame takes its room
-        on the stack, but the registers are kept here: a handler cannot look into its caller's.
+        Reading and writing eight registers through Unicorn takes longer than most handlers. So the frame's space on the
+        stack is reserved, but the registers are kept here: a handler cannot read its caller's.
         """
         if self._unicorn.reg_read(_PRIMASK):
             return

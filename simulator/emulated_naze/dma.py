@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The DMA controller's seven channels, as far as a peripheral asks for single transfers (section 13)."""
+"""The DMA controller's seven channels, for single transfers requested by a peripheral (section 13)."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -14,7 +14,7 @@ _CHANNELS = 7
 
 
 class Memory(Protocol):
-    """What the DMA reads and writes beside the core."""
+    """The memory that the DMA reads and writes."""
 
     def load(self, address: int, size: int) -> bytes:
         """Bytes of RAM or flash."""
@@ -30,7 +30,7 @@ class DmaChannel:
         self._number = number
         self._dma = dma
         self._memory = memory
-        #: Called when the channel is enabled: a peripheral that sends begins to.
+        #: Called when the channel is enabled, so that a transmitter starts.
         self.on_enable: Callable[[], None] = lambda: None
         self.reset()
 
@@ -40,28 +40,28 @@ class DmaChannel:
 
     @property
     def is_ready(self) -> bool:
-        """Whether it would carry out a transfer."""
+        """True if it would carry out a transfer."""
         return bool(self._config & _ENABLE and self._left)
 
     def put(self, value: int) -> None:
-        """A transfer from the peripheral to memory."""
+        """Transfer from the peripheral to memory."""
         if self.is_ready:
             width = self._width
             self._memory.store(self._next_address(), (value & (1 << 8 * width) - 1).to_bytes(width, "little"))
             self._count()
 
     def take(self) -> int:
-        """A transfer from memory to the peripheral; only while `is_ready`."""
+        """Transfer from memory to the peripheral; only while `is_ready`."""
         value = int.from_bytes(self._memory.load(self._next_address(), self._width), "little")
         self._count()
         return value
 
     def read(self, register: int) -> int:
-        """CCR, CNDTR, CPAR or CMAR, from 0."""
+        """Read CCR, CNDTR, CPAR or CMAR, numbered from 0."""
         return (self._config, self._left, self._peripheral, self._address)[register]
 
     def write(self, register: int, value: int) -> None:
-        """Take one of them. The number of transfers can be changed only while the channel is disabled."""
+        """Write one of them. The number of transfers can be changed only while the channel is disabled."""
         match register:
             case 0:
                 was_enabled, self._config = self._config & _ENABLE, value
@@ -77,7 +77,7 @@ class DmaChannel:
 
     @property
     def _width(self) -> int:
-        """Bytes a transfer in memory."""
+        """Bytes per transfer in memory."""
         return 1 << (self._config >> 10 & 0b11)
 
     def _next_address(self) -> int:
@@ -108,27 +108,27 @@ class Dma:
         return self._channels[number - 1]
 
     def reset(self) -> None:
-        """All channels disabled."""
+        """Disable all channels."""
         self._flags = self._interrupting = 0
         for channel in self._channels:
             channel.reset()
 
     def flag(self, number: int, event: int, interrupts: bool) -> None:
-        """Remember what a channel has come to."""
+        """Record a channel's progress."""
         self._flags |= (event | _GLOBAL) << 4 * (number - 1)
         if interrupts:
             self._interrupting |= event << 4 * (number - 1)
             self._nvic.set_line(Irq.dma1(number), True)
 
     def read(self, offset: int) -> int:
-        """A word."""
+        """Read a word."""
         if offset < _FIRST_CHANNEL:
             return self._flags if offset == _ISR else 0
         index, register = divmod(offset - _FIRST_CHANNEL, _CHANNEL_SIZE)
         return self._channels[index].read(register // 4) if index < _CHANNELS and register < 16 else 0
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         if offset == _IFCR:
             self._clear(value)
         elif offset >= _FIRST_CHANNEL:

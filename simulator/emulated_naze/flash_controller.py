@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flash and its controller: keys, the rules of NOR, and a core that stands still (PM0075, sections 2.3 and 3)."""
+"""The flash and its controller: keys, the rules of NOR, and a stalled core (PM0075, sections 2.3 and 3)."""
 
 import random
 from collections.abc import Callable
@@ -19,9 +19,9 @@ _ERASE_NS = 25_000_000
 
 
 class FlashController:
-    """`memory` is the chip's contents. `stall` lets time pass in which the core does nothing.
+    """`memory` is the chip's contents. `stall` lets time pass while the core is stalled.
 
-    An operation is a page erased or a half-word programmed. `tear` decides what a power cut leaves behind of one.
+    An operation is a page erased or a half-word programmed. `tear` decides its result after a power cut.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class FlashController:
         self._tear = tear
         self._faults = faults
         self._counters = counters
-        #: Called in the middle of the operation in which the power goes.
+        #: Called in the middle of the operation in which the power fails.
         self.on_power_cut: Callable[[], None] = lambda: None
         self.reset()
 
@@ -47,7 +47,7 @@ class FlashController:
         self._status = self._address = self._keys = 0
 
     def read(self, offset: int) -> int:
-        """A word."""
+        """Read a word."""
         match offset:
             case 0x0C:
                 return self._status
@@ -60,7 +60,7 @@ class FlashController:
         return 0
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         match offset:
             case 0x04:
                 self._take_key(value)
@@ -104,7 +104,7 @@ class FlashController:
             self._stall(_ERASE_NS)
 
     def program(self, at: int, size: int, value: int) -> None:
-        """A store of the core into the flash, at an offset."""
+        """Handle a store by the core into the flash, at an offset."""
         if not self._control & _PG or size != 2 or at % 2:
             self._status |= _PROGRAM_ERROR
             return
@@ -128,7 +128,7 @@ class FlashController:
         return not self._faults.power_cut_at_flash_operation
 
     def _tear_page(self, at: int) -> None:
-        """Leave what an erase that is cut short may leave: the old page, a blank one, or any mixture."""
+        """Leave a possible result of an interrupted erase: the old page, a blank one, or any mixture."""
         page = self._memory[at : at + PAGE_SIZE]
         match self._tear.randrange(4):
             case 1:

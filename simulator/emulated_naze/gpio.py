@@ -9,18 +9,18 @@ _PINS = 16
 
 
 class Gpio(Registers):
-    """`outside`: the levels that the board puts on pins which are inputs, one bit each."""
+    """`outside`: the levels that the board applies to input pins, one bit each."""
 
     def __init__(self, outside: int = 0xFFFF) -> None:
         super().__init__()
         self._outside = outside
 
     def reset(self) -> None:
-        """All pins are floating inputs."""
+        """Make all pins floating inputs."""
         self.words = {_CRL: _ALL_FLOATING, _CRH: _ALL_FLOATING}
 
     def read(self, offset: int) -> int:
-        """A word; an output reads as what it is driven to."""
+        """Read a word; an output reads as its driven level."""
         if offset != _IDR:
             return super().read(offset)
         modes = self.words[_CRH] << 32 | self.words[_CRL]
@@ -28,7 +28,7 @@ class Gpio(Registers):
         return self.words.get(_ODR, 0) & outputs | self._outside & ~outputs
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         output = self.words.get(_ODR, 0)
         match offset:
             case 0x10:

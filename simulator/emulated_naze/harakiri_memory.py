@@ -26,7 +26,7 @@ class SpokenProtocol(Enum):
 
 
 class HarakiriMemory:
-    """Looks into the memory of a board that runs Harakiri; of another image it knows nothing."""
+    """Reads the memory of a board that runs Harakiri; no other image."""
 
     def __init__(self, image: Image, ram: Memory, flash: memoryview) -> None:
         self._ram = ram
@@ -36,12 +36,12 @@ class HarakiriMemory:
 
     @property
     def armed(self) -> bool:
-        """Whether the firmware says that the craft is armed."""
+        """True if the firmware's armed flag is set."""
         return self._flags is not None and self._ram.load(self._flags + _ARMED, 1) == b"\1"
 
     @property
     def protocol(self) -> SpokenProtocol | None:
-        """What the firmware believes to be spoken."""
+        """The firmware's current protocol."""
         if self._protocol is None:
             return None
         (value,) = self._ram.load(self._protocol, 1)
@@ -49,7 +49,7 @@ class HarakiriMemory:
 
     @property
     def stored_records(self) -> list[bytes]:
-        """The list that the patched firmware would find at its next start."""
+        """The list that the patched firmware would load at its next start."""
         options = SimOptions()
         pages = self._flash[_SLOTS : _SLOTS + flash_size(options) - PAGE_SIZE]
         slots = MissionSlots(NorFlash(pages, Faults()), options)

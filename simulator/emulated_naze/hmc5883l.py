@@ -11,12 +11,12 @@ _MEASUREMENTS = 3
 _IDENTITY = 10
 #: X, Z and Y, in the order of the registers.
 _FIELD = (300, 50, -420)
-#: What the self test's coils add in the same order, about 1.1 gauss, by the bias bits.
+#: The self test's offset in the same order, about 1.1 gauss, by the bias bits.
 _BIAS = {0b01: (766, 713, 766), 0b10: (-766, -713, -766)}
 
 
 class Hmc5883l(RegisterChip):
-    """In a field that does not change; the last bit of its measurements is noise from `noise`."""
+    """Measures a constant field; the last bit is noise from `noise`."""
 
     def __init__(self, noise: random.Random) -> None:
         super().__init__()
@@ -26,7 +26,7 @@ class Hmc5883l(RegisterChip):
         self._measured = _FIELD
 
     def begin(self, is_read: bool) -> None:
-        """A read transfer gets measurements of one moment."""
+        """Begin a transfer; all measurements of a read transfer are simultaneous."""
         super().begin(is_read)
         if is_read:
             field = _BIAS.get(self._registers[_CONFIGURATION_A] & 0b11, _FIELD)
@@ -34,7 +34,7 @@ class Hmc5883l(RegisterChip):
             self._measured = (x, z, y)
 
     def get(self, number: int) -> int:
-        """A measurement or what was written."""
+        """Read a measurement or a written value."""
         index = number - _MEASUREMENTS
         if 0 <= index < 6:
             return word_byte(self._measured, index)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An I2C interface as bus master: the events EV5 to EV8 and the order in which they come (section 26.3.3)."""
+"""An I2C interface as bus master: the events EV5 to EV8 in their order (section 26.3.3)."""
 
 from collections.abc import Callable, Mapping
 from typing import Protocol
@@ -18,16 +18,16 @@ _BITS_PER_BYTE = 9
 
 
 class I2cDevice(Protocol):
-    """A chip on the bus that is always there to answer."""
+    """A chip on the bus that always acknowledges."""
 
     def begin(self, is_read: bool) -> None:
-        """It was addressed, to read from it or to write to it."""
+        """Handle being addressed, for reading or writing."""
 
     def read(self) -> int:
-        """Its next byte."""
+        """Return its next byte."""
 
     def write(self, byte: int) -> None:
-        """Take a byte."""
+        """Receive a byte."""
 
 
 class I2c:
@@ -53,11 +53,11 @@ class I2c:
         self.reset()
 
     def reset(self) -> None:
-        """Let go of the bus."""
+        """Release the bus."""
         self._cr1 = self._cr2 = self._sr1 = self._sr2 = self._ccr = 0
         self._rest: dict[int, int] = {}
         self._data = 0
-        # A byte behind the data register: one to be sent, or one received that does not fit.
+        # A byte behind the data register: one to send, or a received one that does not fit.
         self._shift: int | None = None
         self._address = 0
         self._device: I2cDevice | None = None
@@ -72,7 +72,7 @@ class I2c:
     # -- registers -------------------------------------------------------------------------------------------
 
     def read(self, offset: int) -> int:
-        """A word, with what reading it clears."""
+        """Read a word, and clear the flags that reading clears."""
         match offset:
             case 0x00:
                 return self._cr1
@@ -89,7 +89,7 @@ class I2c:
         return self._rest.get(offset, 0)
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         match offset:
             case 0x00:
                 self._write_cr1(value)
@@ -116,7 +116,7 @@ class I2c:
             return
         if value & _START and not before & _START:
             self._starting.set_in(self._bit_ns)
-        # A stop waits for the byte that is being received, whose end sees to it.
+        # A stop waits for the end of the byte being received, which handles it.
         if value & _STOP and not before & _STOP and not self._receiving.is_set:
             self._stopping.set_in(self._bit_ns)
 
@@ -211,7 +211,7 @@ class I2c:
         self._interrupt()
 
     def _receive_next(self) -> None:
-        # With POS, ACK is for the byte after the one that is being received.
+        # With POS, ACK is for the byte after the one being received.
         self._will_acknowledge = bool(self._cr1 & _ACK)
         self._receiving.set_in(self._byte_ns)
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A firmware image out of an ELF file: its bytes for the flash, and its symbols."""
+"""A firmware image from an ELF file: its bytes for the flash, and its symbols."""
 
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
-#: Where the flash of an STM32F103CB is, and how large.
+#: The address and size of an STM32F103CB's flash.
 FLASH_BASE = 0x0800_0000
 FLASH_SIZE = 0x2_0000
 _MAGIC = b"\x7fELF\x01\x01"
@@ -18,7 +18,7 @@ _SYMBOL = struct.Struct("<IIIBBH")
 
 
 class ImageError(Exception):
-    """The file holds no image for this board; one sentence."""
+    """The file has no image for this board; one sentence."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,14 +8,14 @@ from simulator.emulated_naze.register_chip import RegisterChip, word_byte
 ADDRESS = 0x68
 _MEASUREMENTS, _POWER, _IDENTITY = 0x3B, 0x6B, 0x75
 _RESET, _ASLEEP = 0x80, 0x40
-#: Level and still, 1 g at the range of 8 g; the gyroscope's zero is never quite zero.
+#: Level and still, 1 g at the range of 8 g; the gyroscope's zero has an offset.
 _STILL = (0, 0, 4096)
 _TEMPERATURE = -2000
 _DRIFT = (3, -2, 1)
 
 
 class Mpu6050(RegisterChip):
-    """Lies still and level; the last bits of its measurements are noise from `noise`."""
+    """Still and level; the last bits of its measurements are noise from `noise`."""
 
     def __init__(self, noise: random.Random) -> None:
         super().__init__()
@@ -30,13 +30,13 @@ class Mpu6050(RegisterChip):
         self._registers[_IDENTITY] = ADDRESS
 
     def begin(self, is_read: bool) -> None:
-        """A read transfer gets measurements of one moment."""
+        """Begin a transfer; all measurements of a read transfer are simultaneous."""
         super().begin(is_read)
         if is_read:
             self._measured = self._measure()
 
     def get(self, number: int) -> int:
-        """A measurement or what was written."""
+        """Read a measurement or a written value."""
         index = number - _MEASUREMENTS
         if 0 <= index < 2 * len(self._measured):
             return word_byte(self._measured, index)

@@ -13,7 +13,7 @@ _PRESSURE_NOISE = 100
 
 
 class Ms5611:
-    """In air that stands still; `noise` is that of its pressure."""
+    """In still air; `noise` is added to the pressure."""
 
     def __init__(self, noise: random.Random) -> None:
         self._noise = noise
@@ -24,13 +24,13 @@ class Ms5611:
         self._answer = b""
 
     def begin(self, is_read: bool) -> None:
-        """A write begins with a command, a read gets what the last command is about."""
+        """Begin a transfer: a write starts with a command, a read gets the last command's result."""
         self._awaits_command = not is_read
         if is_read:
             self._answer = self._read_command()
 
     def write(self, byte: int) -> None:
-        """Take a command; what follows it means nothing."""
+        """Receive a command; further bytes are ignored."""
         if not self._awaits_command:
             return
         self._awaits_command = False
@@ -42,7 +42,7 @@ class Ms5611:
                 self._converted = _TEMPERATURE
 
     def read(self) -> int:
-        """The next byte of the answer."""
+        """Return the next byte of the result."""
         byte, self._answer = self._answer[:1], self._answer[1:]
         return byte[0] if byte else 0
 

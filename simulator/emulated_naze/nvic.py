@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The interrupt controller: which exception the core takes next (ARMv7-M manual, B1.5 and B3.4)."""
+"""The interrupt controller, which selects the core's next exception (ARMv7-M manual, B1.5 and B3.4)."""
 
 from enum import IntEnum
 
@@ -35,22 +35,22 @@ class Nvic:
         self.reset()
 
     def reset(self) -> None:
-        """Nothing enabled, pending or active."""
+        """Reset: nothing enabled, pending or active."""
         self._enabled = 0
         self._pending = 0
         self._lines = 0
         self._system_pending: set[int] = set()
         self._priorities: dict[int, int] = {}
         self._active: list[int] = []
-        #: What the core takes next; None if nothing waits that would preempt what it does.
+        #: The exception that the core takes next; None if no pending one preempts the current one.
         self.next_exception: int | None = None
-        #: PRIGROUP of the AIRCR: so many bits of a priority, plus one, say nothing about preemption.
+        #: PRIGROUP of the AIRCR: this many low bits of a priority, plus one, do not affect preemption.
         self.priority_group = 0
 
     # -- from the peripherals --------------------------------------------------------------------------------
 
     def set_line(self, irq: int, is_high: bool) -> None:
-        """A peripheral's interrupt request; it pends as long as it is high."""
+        """Set a peripheral's interrupt request; it pends as long as it is high."""
         bit = 1 << irq
         if not is_high:
             self._lines &= ~bit
@@ -67,7 +67,7 @@ class Nvic:
     # -- for the core ----------------------------------------------------------------------------------------
 
     def enter(self, exception: int) -> None:
-        """The core has begun to handle it."""
+        """Note that the core has entered the handler."""
         self._active.append(exception)
         self._system_pending.discard(exception)
         if exception >= _FIRST_IRQ:
@@ -75,7 +75,7 @@ class Nvic:
         self._choose()
 
     def leave(self) -> None:
-        """The core has returned from the handler; a line that is still high pends again."""
+        """Note that the core has left the handler; a line that is still high pends again."""
         exception = self._active.pop()
         if exception >= _FIRST_IRQ:
             self._pending |= self._lines & 1 << exception - _FIRST_IRQ
@@ -97,20 +97,20 @@ class Nvic:
 
     @property
     def depth(self) -> int:
-        """How many exceptions are being handled, one inside the other."""
+        """The number of nested exceptions being handled."""
         return len(self._active)
 
     @property
     def active(self) -> int:
-        """The exception that is being handled; 0 in thread mode."""
+        """The exception being handled; 0 in thread mode."""
         return self._active[-1] if self._active else 0
 
     def priority(self, exception: int) -> int:
-        """The lower the number, the more urgent."""
+        """The priority of an exception; lower is more urgent."""
         return self._priorities.get(exception, 0)
 
     def set_priority(self, exception: int, priority: int) -> None:
-        """Take the priority of any exception."""
+        """Set the priority of any exception."""
         self._priorities[exception] = priority & _PRIORITY_MASK
 
     def _group(self, exception: int) -> int:
@@ -119,7 +119,7 @@ class Nvic:
     # -- its registers, at offsets in the system control space -----------------------------------------------
 
     def read(self, offset: int) -> int:
-        """A word; only the priorities are read back byte by byte."""
+        """Read a word; only the priorities can be read byte by byte."""
         if offset >= _PRIORITY:
             first = _FIRST_IRQ + offset - _PRIORITY
             return sum(self.priority(first + byte) << 8 * byte for byte in range(4))
@@ -127,7 +127,7 @@ class Nvic:
         return bits >> 8 * (offset & 0x7C) & 0xFFFF_FFFF
 
     def write(self, offset: int, size: int, value: int) -> None:
-        """Take a store of `size` bytes."""
+        """Handle a store of `size` bytes."""
         bits = value << 8 * (offset & 0x7F)
         if offset >= _PRIORITY:
             for byte in range(size):

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long things take: accesses to registers, and loops that wait, which are made short for us.
+"""The duration of register accesses, and shortened busy-wait loops.
 
-A waiting loop reads the time again and again, and whatever else it looks at stays the same. After some of that, each
-look at the time lets a little more of it pass than the one before, up to the next alarm.
+A busy-wait loop reads the time repeatedly while everything else it reads stays the same. After some repetitions each
+read lets more time pass than the one before, up to the next alarm.
 """
 
 from simulator.emulated_naze.clock import Clock
 
-#: What an access is charged while the number of instructions executed since the last pause is not known.
+#: The time of an access while the number of instructions since the last pause is unknown.
 _ACCESS_NS = 150
-#: So many accesses that brought nothing new are taken to be no waiting loop yet.
+#: The number of accesses without a change that do not yet count as a busy-wait loop.
 _PATIENCE = 24
 _SKIP_NS = 500
 _LONGEST_SKIP_NS = 50_000
@@ -24,7 +24,7 @@ class Pace:
         self._nothing_new = 0
 
     def spend(self, duration_ns: int) -> None:
-        """Let time pass while the core stands still."""
+        """Let time pass while the core is stalled."""
         self._clock.advance(self._clock.now_ns + duration_ns)
 
     def charge_access(self) -> None:
@@ -32,7 +32,7 @@ class Pace:
         self.spend(_ACCESS_NS)
 
     def saw(self, place: int, value: int) -> None:
-        """The firmware has read or written a value at a place, any number that stands for it."""
+        """Note that the firmware has read or written a value at a place (any number that identifies it)."""
         if self._seen.get(place) == value:
             self._nothing_new += 1
         else:
@@ -40,7 +40,7 @@ class Pace:
             self._nothing_new = 0
 
     def look_at_time(self) -> None:
-        """The firmware is about to read the time."""
+        """Note that the firmware is about to read the time."""
         self.charge_access()
         self._nothing_new += 1
         skip_ns = min((self._nothing_new - _PATIENCE) * _SKIP_NS, _LONGEST_SKIP_NS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The radio receiver: eight channels on one wire as the time between edges (PPM)."""
+"""The radio receiver: eight channels on one wire, as times between edges (PPM)."""
 
 from simulator.emulated_naze.clock import Alarm, Clock
 from simulator.emulated_naze.timer import Timer
@@ -13,7 +13,7 @@ _SHORTEST_GAP_US = 3_000
 
 
 class PpmReceiver:
-    """Is connected to channel 1 of a timer. `channels`: microseconds in the order of the wire."""
+    """Connected to channel 1 of a timer. `channels`: microseconds in the order of the wire."""
 
     def __init__(self, clock: Clock, timer: Timer) -> None:
         self.channels = list(CENTRED)
@@ -27,7 +27,7 @@ class PpmReceiver:
         self._edge.set_in(_FRAME_US * 1000)
 
     def power_off(self) -> None:
-        """Fall silent."""
+        """Stop sending."""
         self._edge.cancel()
 
     def _on_edge(self) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reset and clock control: how fast the core and the peripherals run (section 7)."""
+"""Reset and clock control: the clocks of the core and the peripherals (section 7)."""
 
 from simulator.emulated_naze.bus import Registers
 
@@ -14,7 +14,7 @@ _POWER_ON_RESET, _SOFTWARE_RESET, _CLEAR_FLAGS = 1 << 27, 1 << 28, 1 << 24
 
 
 class Rcc(Registers):
-    """Oscillators are ready at once. Which peripherals have a clock is not looked at."""
+    """Oscillators are ready at once. Peripheral clock gates are ignored."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -27,7 +27,7 @@ class Rcc(Registers):
         self._set_clocks()
 
     def read(self, offset: int) -> int:
-        """A word; each ready bit follows its enable bit."""
+        """Read a word; each ready bit follows its enable bit."""
         value = super().read(offset)
         if offset == _CR:
             value |= (value & (_HSI_ON | _HSE_ON | _PLL_ON)) << 1
@@ -36,7 +36,7 @@ class Rcc(Registers):
         return value
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         if offset == _CSR and value & _CLEAR_FLAGS:
             value = 0
         super().write(offset, value)

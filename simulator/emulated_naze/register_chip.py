@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An I2C chip made of byte registers: the first byte written is the register number, which then counts on."""
+"""An I2C chip of byte registers: the first written byte is the register number, which then increments."""
 
 from abc import abstractmethod
 
 
 class RegisterChip:
-    """The base of the sensors that work like this."""
+    """The base class of such sensors."""
 
     def __init__(self) -> None:
         self._number = 0
         self._awaits_number = False
 
     def begin(self, is_read: bool) -> None:
-        """It was addressed; a write begins with the register number."""
+        """Begin a transfer; a write begins with the register number."""
         self._awaits_number = not is_read
 
     def read(self) -> int:
-        """The byte in the current register."""
+        """Return the byte in the current register."""
         number = self._number
         self._number = (number + 1) & 0xFF
         return self.get(number)
 
     def write(self, byte: int) -> None:
-        """Take the register number, or a byte for the current register."""
+        """Receive the register number, or a byte for the current register."""
         if self._awaits_number:
             self._number = byte
             self._awaits_number = False
@@ -32,11 +32,11 @@ class RegisterChip:
 
     @abstractmethod
     def get(self, number: int) -> int:
-        """The byte in a register."""
+        """Read a register."""
 
     @abstractmethod
     def set(self, number: int, byte: int) -> None:
-        """Take a byte for a register."""
+        """Write a register."""
 
 
 def word_byte(values: tuple[int, ...], index: int) -> int:

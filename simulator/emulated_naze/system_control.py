@@ -27,7 +27,7 @@ class SystemControl:
         self.reset()
 
     def reset(self) -> None:
-        """Take the state after a reset of the chip."""
+        """Reset to the state after a chip reset."""
         self._nvic.reset()
         self._systick.reset()
         self._rest: dict[int, int] = {}
@@ -38,7 +38,7 @@ class SystemControl:
         return self._rest.get(_VTOR, 0)
 
     def read(self, offset: int, size: int) -> int:
-        """Answer a load."""
+        """Handle a load."""
         return self._word(offset & ~3) >> 8 * (offset & 3) & (1 << 8 * size) - 1
 
     def _word(self, offset: int) -> int:
@@ -59,7 +59,7 @@ class SystemControl:
         return self._rest.get(offset, 0)
 
     def write(self, offset: int, size: int, value: int) -> None:
-        """Take a store."""
+        """Handle a store."""
         if 0x10 <= offset < 0x20:
             self._systick.write(offset, value)
         elif 0x100 <= offset < 0x500:

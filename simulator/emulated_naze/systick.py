@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The core's 24-bit timer, with which the firmware tells the time (ARMv7-M Architecture Reference Manual, B3.3)."""
+"""The core's 24-bit timer, with which the firmware measures time (ARMv7-M Architecture Reference Manual, B3.3)."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ _MASK = 0xFF_FFFF
 
 
 class SysTick:
-    """`core_hz` returns the core's clock; `on_look` is called before the counter is read."""
+    """`core_hz` returns the core's clock; `on_look` is called before each read of the counter."""
 
     def __init__(self, clock: Clock, nvic: Nvic, core_hz: Callable[[], int], on_look: Callable[[], None]) -> None:
         self._clock = clock
@@ -23,13 +23,13 @@ class SysTick:
         self.reset()
 
     def reset(self) -> None:
-        """Stand still."""
+        """Stop."""
         self._control = self._reload = 0
         self._has_fired = False
         self._alarm.cancel()
 
     def read(self, offset: int) -> int:
-        """A word."""
+        """Read a word."""
         match offset:
             case 0x10:
                 control = self._control | (_HAS_FIRED if self._has_fired else 0)
@@ -46,7 +46,7 @@ class SysTick:
         return 0
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         match offset:
             case 0x10:
                 self._control = value & (_ENABLE | _INTERRUPT | _CORE_CLOCK)
@@ -71,7 +71,7 @@ class SysTick:
         self._alarm.set_in(self._period_ns())
 
     def _fire(self) -> None:
-        # It has fired at its own time, whenever the clock got there.
+        # It has fired at its own time, however late the clock was advanced.
         self._alarm.set_at(self._clock.now_ns + self._period_ns())
         self._has_fired = True
         if self._control & _INTERRUPT:

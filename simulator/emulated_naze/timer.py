@@ -24,23 +24,23 @@ class Timer(Registers):
         self._started_ns = 0
 
     def reset(self) -> None:
-        """Stand still."""
+        """Stop."""
         self.words = {_ARR: 0xFFFF}
         self._started_ns = self._clock.now_ns
         self._interrupt()
 
     def capture(self, channel: int) -> None:
-        """An edge on the input of a channel, from 1: remember the counter."""
+        """Capture the counter at an edge on the input of a channel, from 1."""
         self.words[_CCR1 + 4 * (channel - 1)] = self._count()
         self.words[_SR] = self.words.get(_SR, 0) | 1 << channel
         self._interrupt()
 
     def read(self, offset: int) -> int:
-        """A word."""
+        """Read a word."""
         return self._count() if offset == _CNT else super().read(offset)
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word. A flag of the status register is cleared by writing a zero."""
+        """Write a word. A flag of the status register is cleared by writing a zero."""
         match offset:
             case 0x10:
                 value &= self.words.get(_SR, 0)

@@ -14,12 +14,12 @@ _RECEIVER, _TRANSMITTER, _RECEIVED_INTERRUPT, _EMPTY_INTERRUPT, _ENABLE = 1 << 2
 _DMA_RECEIVES, _DMA_TRANSMITS = 1 << 6, 1 << 7
 _BITS_PER_BYTE = 10
 _STANDARD_BAUDS = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400)
-#: A divider seldom gives a speed exactly; a receiver copes with so much.
+#: The tolerance of a receiver; a divider rarely gives an exact speed.
 _TOLERANCE = 0.03
 
 
 class Usart:
-    """`bus_hz`: the clock of its bus. `receive_dma` and `transmit_dma`: its channels, if it has any that are used."""
+    """`bus_hz`: the clock of its bus. `receive_dma` and `transmit_dma`: its channels, if used."""
 
     def __init__(
         self,
@@ -35,9 +35,9 @@ class Usart:
         self._bus_hz = bus_hz
         self._receive_dma = receive_dma
         self._transmit_dma = transmit_dma
-        #: The speed of the wires: the nearest standard one if it is near enough.
+        #: The speed of the wires: the nearest standard speed within the tolerance.
         self.baud = 115200
-        #: The bytes that have left the TX pin and were not taken yet.
+        #: The bytes that have left the TX pin and were not collected yet.
         self.sent = bytearray()
         self._arriving: deque[int] = deque()
         if transmit_dma:
@@ -47,24 +47,24 @@ class Usart:
         self.reset()
 
     def reset(self) -> None:
-        """Disabled; bytes on the wire arrive all the same."""
+        """Disable it; bytes on the wire still arrive."""
         self._cr1 = self._cr3 = self._divider = 0
         self._status = _TRANSMITTED | _EMPTY
         self._data = 0
-        # What is being sent, and what waits behind it.
+        # The byte being sent, and the next one.
         self._shift: int | None = None
         self._holding: int | None = None
         self._departure.cancel()
 
     def power_off(self) -> None:
-        """Forget what is on the wires."""
+        """Drop the bytes on the wires."""
         self.reset()
         self._arriving.clear()
         self._arrival.cancel()
         self.sent.clear()
 
     def receive(self, data: bytes) -> None:
-        """Put bytes on the RX wire, behind those that are on it already."""
+        """Put bytes on the RX wire, behind those already there."""
         self._arriving += data
         if self._arriving and not self._arrival.is_set:
             self._arrival.set_in(self._byte_ns)
@@ -72,7 +72,7 @@ class Usart:
     # -- registers -------------------------------------------------------------------------------------------
 
     def read(self, offset: int) -> int:
-        """A word."""
+        """Read a word."""
         match offset:
             case 0x00:
                 return self._status
@@ -89,7 +89,7 @@ class Usart:
         return 0
 
     def write(self, offset: int, value: int) -> None:
-        """Take a word."""
+        """Write a word."""
         match offset:
             case 0x00:
                 self._status &= value | ~(_RECEIVED | _TRANSMITTED)

@@ -199,9 +199,9 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
     ("options", "complaint"),
     [
         (["--link", "{}/none/naze"], "Error: {}/none/naze cannot be created: No such file or directory.\n"),
-        (["--link", "{}/file"], "Error: {}/file is in the way: name another --link, or remove it.\n"),
-        (["--link", "{}/link"], "Error: {}/link is in the way: name another --link, or remove it.\n"),
-        (["--link", "{}/naze", "--control", "{}/none/socket"], "Error: Cannot make {}/none/socket: No such file or"),
+        (["--link", "{}/file"], "Error: {}/file already exists: use another --link, or remove it.\n"),
+        (["--link", "{}/link"], "Error: {}/link already exists: use another --link, or remove it.\n"),
+        (["--link", "{}/naze", "--control", "{}/none/socket"], "Error: Cannot create {}/none/socket: No such file or"),
         (["--link", "{}/naze", "--state", "{}/none/flash"], "Error: Cannot use the state file {}/none/flash: "),
         (["--link", "{}/naze", "--state", "{}/file"], "Error: The state file {}/file has 4 bytes, but this board's"),
     ],

@@ -52,7 +52,7 @@ def test_the_second_daemon_is_told_who_the_first_is(tmp_path: Path) -> None:
         with start(directory) as second:
             assert said_by(second) == (
                 f"the state directory {directory} is in use by process {first.pid}; "
-                f"stop that one, or name another directory with --state-dir"
+                f"stop it, or use another directory with --state-dir"
             )
         assert first.poll() is None
         first.kill()
