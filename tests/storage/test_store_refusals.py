@@ -106,7 +106,7 @@ def test_a_directory_that_may_not_be_written(with_store: bool) -> None:
         lock_said = run(AS_NOBODY, "lock", cwd=directory).stdout
         directory.chmod(0o755)
     assert said.startswith("cannot open the mission store missions.db: it ")
-    assert "look at" in said
+    assert "check" in said
     assert lock_said.startswith("cannot use the state directory .: Permission denied")
 
 
@@ -129,7 +129,7 @@ def test_a_store_of_a_newer_release_is_left_alone(tmp_path: Path) -> None:
     connection.execute("PRAGMA user_version = 4711")
     connection.close()
     before = path.read_bytes()
-    with pytest.raises(StoreError, match=r"of a newer naze-bridge \(schema 4711, this one knows \d+\); install"):
+    with pytest.raises(StoreError, match=r"from a newer naze-bridge \(schema 4711, this one knows \d+\); install"):
         open_store(path, now=0.0)
     assert path.read_bytes() == before
 
