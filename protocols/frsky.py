@@ -13,7 +13,7 @@ FRSKY_SPEED = 9600
 _MARK = 0x5E
 _ESCAPE = 0x5D
 _ESCAPED = {0x3E: 0x5E, 0x3D: 0x5D}
-#: The ids that the hub protocol has are below this.
+#: All ids of the hub protocol are below this.
 _LAST_ID = 0x3F
 _VALUE_SIZE = 3
 #: No group has more values than this.

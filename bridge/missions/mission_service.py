@@ -75,7 +75,7 @@ OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
 class MissionService:
-    """Holds the transfer lock, the dialect of the current flight controller, and its list."""
+    """Holds the transfer lock, the current flight controller's mission store, and its list."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._endings: list[tuple[ArrivedMission, DeliveryResult]] = []

@@ -34,7 +34,10 @@ def demo(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
     with ExitStack() as stack:
         program = Program(tmp_path / "printed", "demo", "--port", str(free_port()))
         stack.callback(program.end, signal.SIGKILL)
-        until(lambda: "The bridge keeps running" in program.printed or not program.is_alive, "the end of the demonstration")
+        until(
+            lambda: "keeps running" in program.printed or not program.is_alive,
+            "the end of the demonstration",
+        )
         yield program
 
 

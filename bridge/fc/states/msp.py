@@ -59,7 +59,7 @@ class MspLine(State):
         if not frames:
             self._echo.feed(data)
             if self._echo.is_echo():
-                return Found(Spoken.CLI, self.speed, "it echoes where it answered before")
+                return Found(Spoken.CLI, self.speed, "it echoes requests that it answered before")
         return self.finished()
 
     def tick(self, now: float) -> Event | None:
