@@ -203,7 +203,7 @@ class Firmware:
             self._msp.forget()
         while self._resets_at is None and (byte := self._uart.read(self._clock)) is not None:
             self._last_byte = self._clock
-            match self._traps.count(byte, self.protocol is Protocol.AUTOSENSE, self.armed):
+            match self._trap(byte):
                 case Trap.CLI:
                     self._enter_cli()
                     return
@@ -211,6 +211,13 @@ class Firmware:
                     raise ResetError
             if self._completes_packet(byte):
                 self._last_valid = self._clock
+
+    def _trap(self, byte: int) -> Trap | None:
+        """The effect of a byte outside of any protocol; with the extension, bytes of an MSP frame have none."""
+        if self._missions and self._msp.is_past_header and self.protocol is not Protocol.MAVLINK:
+            self._traps.clear()
+            return None
+        return self._traps.count(byte, self.protocol is Protocol.AUTOSENSE, self.armed)
 
     def _choose_protocol(self) -> None:
         if not self.armed:

@@ -104,6 +104,11 @@ class MspReceiver:
         return self._state != 0
 
     @property
+    def is_past_header(self) -> bool:
+        """True if `$M<` has been read, and not the frame's end."""
+        return self._state > 2
+
+    @property
     def leftover(self) -> bytes:
         """The buffer's content from earlier frames, which the firmware reads if a payload is missing."""
         return bytes(self._buffer)

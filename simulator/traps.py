@@ -19,10 +19,14 @@ class TrapCounters:
     """The firmware's three counters. Those for AUTOSENSE keep their value outside of it."""
 
     def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Start counting again."""
         self._returns = self._number_signs = self._letters_r = 0
 
     def count(self, byte: int, autosense: bool, armed: bool) -> Trap | None:
-        """Count an input byte, regardless of frames."""
+        """Count an input byte."""
         if autosense:
             self._number_signs = self._number_signs + 1 if byte == _NUMBER_SIGN else 0
             if self._number_signs >= RUN_LENGTH:

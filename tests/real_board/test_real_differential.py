@@ -63,7 +63,7 @@ def requests(dice: random.Random, records: list[WpRecord]) -> list[bytes]:
     return [
         request(dice.choice(_READS)),
         request(Msp.WP, bytes((dice.choice((0, 16, 3)),))),
-        request(dice.choice((1, 99, 189, 197, 209, 253))),
+        request(dice.choice((1, 99, 189, 197, 209, 253)), dice.choice((b"", b"\r\r\r###RRR"))),
         INFO_REQUEST,
         encode_begin(identity),
         encode_chunk(records, first, 15).frame if first < len(records) else INFO_REQUEST,

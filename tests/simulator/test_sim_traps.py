@@ -20,8 +20,13 @@ def speaks_msp(bench: Bench) -> bool:
     return bench.ask(IDENT) is not None
 
 
+def stock() -> Bench:
+    """A board without the patch, which counts the bytes of frames, too."""
+    return Bench(faults=Faults(extension=False))
+
+
 def test_three_returns_spread_over_frames_enter_the_cli() -> None:
-    bench = Bench()
+    bench = stock()
     assert ENDS_IN_CR[-1] == 0x0D
     assert bench.ask(ENDS_IN_CR) is not None
     bench.send(b"\r\r")
@@ -36,10 +41,20 @@ def test_three_returns_spread_over_frames_enter_the_cli() -> None:
 
 
 def test_three_returns_inside_of_a_frame_enter_the_cli() -> None:
-    bench = Bench()
+    bench = stock()
     assert speaks_msp(bench)
     assert bench.ask(request(250, b"\r\r\r"), timeout=0.1) is None
     assert bench.naze.counters.cli_entered
+
+
+@pytest.mark.parametrize("run", [b"\r\r\r", b"###", b"RRR"])
+def test_with_the_patch_a_run_inside_of_a_frame_is_only_counted(run: bytes) -> None:
+    bench = Bench()
+    assert bench.ask(request(109, run)) is not None
+    bench.send(run[:2])
+    bench.run(0.1)
+    assert speaks_msp(bench)
+    assert bench.naze.counters.hazard_runs == 1
 
 
 @pytest.mark.parametrize("data", [b"\r\rx\r\r", b"\r\r$\r"])
@@ -110,7 +125,7 @@ def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
 
 def test_the_counters_for_autosense_stand_still_outside_of_it() -> None:
     """Two '#' before MSP was found and one four seconds after it was lost are three for the firmware."""
-    bench = Bench()
+    bench = stock()
     bench.send(b"##")
     bench.run(0.01)
     assert speaks_msp(bench)
@@ -123,7 +138,7 @@ def test_the_counters_for_autosense_stand_still_outside_of_it() -> None:
     bench.run(0.1)
     assert not bench.naze.counters.cli_entered
 
-    bench = Bench()
+    bench = stock()
     bench.send(IDENT[:-1] + b"##")  # a broken frame: AUTOSENSE goes on, and counts
     bench.run(0.01)
     bench.send(b"#")
@@ -135,7 +150,7 @@ def test_a_run_that_begins_in_autosense_is_finished_four_seconds_later() -> None
     """The byte that completes the frame switches to MSP; a count begun by it waits there for AUTOSENSE."""
     ends_in_sign = request(108, bytes((0x23 ^ 1 ^ 108,)))
     assert ends_in_sign[-1] == 0x23
-    bench = Bench()
+    bench = stock()
     assert bench.ask(ends_in_sign) is not None
     bench.send(b"irrelevant")
     bench.run(4.5)
