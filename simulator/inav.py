@@ -7,11 +7,11 @@ Its frame sizes and special cases were compared with INAV's own simulator of eac
 import struct
 from enum import IntEnum
 
-from simulator.flight import Craft
+from simulator.flight import FlightState
 from simulator.inav_boxes import ANGLE, ARM, BOXES, NAMES, NAV_ALTHOLD, NAV_RTH, NAV_WP
 from simulator.inav_mission import CAPACITY, FAKE, InavMission
 from simulator.inav_navigation import InavNavigation
-from simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
 from simulator.msp_sensors import DRAWN_MAH, RSSI, MspCommand, SensorReplies
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import FIELD_ALTITUDE_M, WaypointCraft
@@ -50,11 +50,11 @@ class InavCommand(IntEnum):
     INAV_MIXER = 0x2010
 
 
-class InavFirmware:
-    """See MspFirmware. The bits of `faults.boxes` are in the order of MSP_BOXIDS."""
+class InavFirmware(MspFirmware):
+    """Boots with the saved missions in the EEPROM."""
 
     def __init__(self, boot: Boot) -> None:
-        self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
+        super().__init__(boot)
         self._version = tuple(int(part) for part in boot.options.version.split("."))
         self._boxes = BOXES[boot.options.version]
         channels = 34 if self._version >= (8, 0, 0) else 18
@@ -71,22 +71,14 @@ class InavFirmware:
         self._mission = InavMission(boot.eeprom)
         self._craft = WaypointCraft()
         self._navigation = InavNavigation(self._mission, self._craft)
-        self._clock = self._booted_at = boot.now
-        self._busy = 0.0
-        self.armed = False
+        self._booted_at = boot.now
         self._stick_loads = boot.faults.stick_loads
-        self._home: tuple[int, int] | None = None
 
     @property
     def stored(self) -> list[bytes]:
         """The waypoints in the EEPROM."""
         stored = self._mission.stored
         return [stored[at : at + WAYPOINT_SIZE] for at in range(0, len(stored), WAYPOINT_SIZE)]
-
-    def take_busy_seconds(self) -> float:
-        """The time for which the EEPROM has stalled the CPU since the last call."""
-        busy, self._busy = self._busy, 0.0
-        return busy
 
     # -- the craft -------------------------------------------------------------------------------------------
 
@@ -113,10 +105,8 @@ class InavFirmware:
             if not self.armed:
                 self._mission.load()
 
-    def craft_at(self, now: float) -> Craft:
-        """The sensor values."""
-        self._fly_until(now)
-        return Craft(self._craft.state(), self.armed, self._flags(), self._home)
+    def _state(self) -> FlightState:
+        return self._craft.state()
 
     def _fly_until(self, now: float) -> None:
         if not self.armed:
@@ -203,7 +193,7 @@ class InavFirmware:
         return waypoint.pack(number)
 
     def _read(self, command: int) -> bytes | None:
-        craft = Craft(self._craft.state(), self.armed, self._flags(), self._home)
+        craft = self.craft_at(self._clock)
         flight = craft.flight
         match command:
             case InavCommand.API_VERSION:

@@ -2,12 +2,12 @@
 """The interface between a simulated MSP board and its firmware: INAV, MultiWii, and those with telemetry only."""
 
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from protocols.msp.frame import Direction, MspFrame
-from simulator.flight import Craft
+from simulator.flight import Craft, FlightState
 from simulator.msp_options import MspOptions
 from simulator.msp_v2 import frame_v2
 from simulator.options import Counters, Faults
@@ -47,30 +47,56 @@ class Boot:
     now: float
 
 
-class MspFirmware(Protocol):
-    """The firmware from one boot to the next: a new object is a reset. Times are seconds and never go back."""
+class MspFirmware(ABC):
+    """The firmware from one boot to the next: a new object is a reset. Times are seconds and never go back.
+
+    The bits of `faults.boxes` are in the order of MSP_BOXIDS.
+    """
 
     habits: PortHabits
 
-    @property
-    def armed(self) -> bool:
-        """True if the craft is armed."""
+    def __init__(self, boot: Boot) -> None:
+        self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
+        self._clock = boot.now
+        self._busy = 0.0
+        #: True if the craft is armed.
+        self.armed = False
+        self._home: tuple[int, int] | None = None
 
     @property
     def stored(self) -> list[bytes]:
         """The waypoints that survive a reset, each in the firmware's own format."""
+        return []
 
+    @abstractmethod
     def follow_pilot(self, now: float) -> None:
         """Fly until `now` and follow the pilot's switches. CrashError."""
 
+    @abstractmethod
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """The reply frame, or None for silence."""
 
     def take_busy_seconds(self) -> float:
         """The time for which the firmware has been blocked since the last call."""
+        busy, self._busy = self._busy, 0.0
+        return busy
 
     def craft_at(self, now: float) -> Craft:
         """The sensor values."""
+        self._fly_until(now)
+        return Craft(self._state(), self.armed, self._flags(), self._home)
+
+    @abstractmethod
+    def _fly_until(self, now: float) -> None:
+        """Let the craft move."""
+
+    @abstractmethod
+    def _state(self) -> FlightState:
+        """The flight's present state."""
+
+    @abstractmethod
+    def _flags(self) -> int:
+        """The modes in MSP_STATUS."""
 
 
 BootFirmware = Callable[[Boot], MspFirmware]

@@ -4,8 +4,8 @@
 import struct
 from dataclasses import replace
 
-from simulator.flight import Craft
-from simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.flight import FlightState
+from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
 from simulator.msp_sensors import MspCommand, SensorReplies
 from simulator.multiwii_mission import MultiWiiMission
 from simulator.multiwii_navigation import MultiWiiNavigation
@@ -31,30 +31,21 @@ _ACKNOWLEDGED = frozenset((MspCommand.ACC_CALIBRATION, MspCommand.MAG_CALIBRATIO
 _SENSORS = SensorReplies(_BOX_NAMES, 2800, currents_ca=(0, 0))
 
 
-class MultiWiiFirmware:
-    """See MspFirmware. The bits of `faults.boxes` are in the order of MSP_BOXIDS."""
+class MultiWiiFirmware(MspFirmware):
+    """Its EEPROM is the mission: each waypoint is written as it arrives."""
 
     habits = PortHabits(buffer_size=64, writes_first=True)
 
     def __init__(self, boot: Boot) -> None:
-        self._options, self._faults, self._counters = boot.options, boot.faults, boot.counters
+        super().__init__(boot)
         self._mission = MultiWiiMission(boot.eeprom, boot.options.capacity)
         self._craft = WaypointCraft()
         self._navigation = MultiWiiNavigation(self._mission, self._craft)
-        self._clock = boot.now
-        self._busy = 0.0
-        self.armed = False
-        self._home: tuple[int, int] | None = None
 
     @property
     def stored(self) -> list[bytes]:
         """The waypoints in the EEPROM."""
         return self._mission.stored
-
-    def take_busy_seconds(self) -> float:
-        """The time for which the EEPROM has stalled the CPU since the last call."""
-        busy, self._busy = self._busy, 0.0
-        return busy
 
     def follow_pilot(self, now: float) -> None:
         """Fly until `now`, arm and disarm."""
@@ -68,10 +59,8 @@ class MultiWiiFirmware:
             self._navigation.end()
             self._craft.rest()
 
-    def craft_at(self, now: float) -> Craft:
-        """The sensor values."""
-        self._fly_until(now)
-        return Craft(self._craft.state(), self.armed, self._flags(), self._home)
+    def _state(self) -> FlightState:
+        return self._craft.state()
 
     def _fly_until(self, now: float) -> None:
         if not self.armed:
@@ -139,4 +128,4 @@ class MultiWiiFirmware:
                 speeds = (200, 500, 100, 400, 100)
                 limits = (40, 3000, 20, 100, 600)
                 return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
-        return _SENSORS.payload(command, Craft(self._craft.state(), self.armed, self._flags(), self._home))
+        return _SENSORS.payload(command, self.craft_at(self._clock))

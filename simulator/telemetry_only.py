@@ -8,8 +8,8 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from simulator.flight import Craft, FlightState, fly
-from simulator.msp_firmware import Boot, PortHabits, error, reply
+from simulator.flight import FlightState, fly
+from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
 from simulator.msp_sensors import MspCommand, SensorReplies
 
 _ARM = "ARM"
@@ -68,44 +68,35 @@ BASEFLIGHT = Dialect(
 )
 
 
-class TelemetryFirmware:
-    """See MspFirmware. The bits of `faults.boxes` are in the order of MSP_BOXIDS."""
+class TelemetryFirmware(MspFirmware):
+    """Stores no missions and writes nothing."""
 
     def __init__(self, dialect: Dialect, boot: Boot) -> None:
+        super().__init__(boot)
         self.habits = dialect.habits
         self._dialect = dialect
-        self._faults = boot.faults
         self._arm_bit = list(dialect.sensors.boxes.values()).index(_ARM)
-        self._booted_at = self._clock = boot.now
+        self._booted_at = boot.now
         self._flown = 0.0
-        self.armed = False
-        self._home: tuple[int, int] | None = None
-
-    @property
-    def stored(self) -> list[bytes]:
-        """None: it has no missions."""
-        return []
-
-    def take_busy_seconds(self) -> float:
-        """0: it writes nothing."""
-        return 0.0
 
     def follow_pilot(self, now: float) -> None:
         """Arm and disarm."""
-        flight = self._fly(now)
+        self._fly_until(now)
         if self.armed != self._faults.armed:
+            flight = self._state()
             self.armed = self._faults.armed
             self._home = (flight.lat_e7, flight.lon_e7)
 
-    def craft_at(self, now: float) -> Craft:
-        """The sensor values."""
-        boxes = self._faults.boxes & ~(1 << self._arm_bit) | self.armed << self._arm_bit
-        return Craft(self._fly(now), self.armed, boxes & (1 << len(self._dialect.sensors.boxes)) - 1, self._home)
-
-    def _fly(self, now: float) -> FlightState:
+    def _fly_until(self, now: float) -> None:
         self._flown += now - self._clock if self.armed else 0.0
         self._clock = now
-        return fly(now - self._booted_at, self._flown, self.armed)
+
+    def _state(self) -> FlightState:
+        return fly(self._clock - self._booted_at, self._flown, self.armed)
+
+    def _flags(self) -> int:
+        boxes = self._faults.boxes & ~(1 << self._arm_bit) | self.armed << self._arm_bit
+        return boxes & (1 << len(self._dialect.sensors.boxes)) - 1
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
         """The reply frame: an error frame for unknown commands."""
