@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strangers that want the disk or the control socket for themselves, and a disk that is not there."""
+"""Strangers that want the disk or the control socket for themselves, and a disk that is not there, or hangs."""
 
 import os
+import signal
 import socket
+import subprocess
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_up
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
-from tests.support.programs import comes, free_port, until
+from tests.support.programs import REPOSITORY, Daemon, comes, free_port, until
 from tests.support.web_bench import WebBench
 
 
@@ -105,6 +108,36 @@ def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path:
     refused = page.ask("/api/missions/1/restore", "POST", Authorization="Bearer none")
     assert refused.status == 403
     assert str(blocked) in refused.data["error"]
+
+
+class DaemonWithoutDisk(Daemon):
+    """Its disk never answers: as an SD card that hangs in the kernel."""
+
+    _HANGING = """
+import os, threading
+from storage.mission_store import MissionStore
+def hang(*arguments): threading.Event().wait()
+os.fsync = os.fdatasync = MissionStore.add = MissionStore.close = hang
+from service.cli.main import main
+main(prog_name="naze-bridge")
+"""
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-c", self._HANGING, *self._arguments]
+        with self._output.open("ab") as output:
+            return subprocess.Popen(command, cwd=REPOSITORY, stdout=output, stderr=output)
+
+
+def test_a_disk_that_hangs_keeps_no_daemon_from_flying_and_ending(start: Starter, stack: ExitStack) -> None:
+    board = start.board()
+    options = ("--record-uart", str(start.directory / "naze.uart"))
+    daemon = DaemonWithoutDisk(start.directory, str(board.link), options=options)
+    stack.callback(daemon.end, signal.SIGKILL)
+    daemon.wait()
+    with udp_station(daemon.address) as pilot:
+        assert_uploads(pilot, board, plain_plan(20))
+    assert daemon.end() == 0
+    assert "store.hangs" in daemon.printed
 
 
 def test_connections_that_ask_nothing(start: Starter) -> None:
