@@ -113,9 +113,9 @@ class Bridge:
 
     # The ground stations' side.
 
-    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        """Handle bytes from a ground station. A datagram holds whole frames only."""
-        self._incoming.received(peer, data, now, datagram=datagram)
+    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
+        """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
+        return self._incoming.received(peer, data, now, datagram=datagram)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed."""

@@ -52,9 +52,10 @@ class Budgets:
     def allows(self, cost: Cost, peer: Peer, now: float) -> bool:
         """Count one for a peer; False if that exceeds a limit."""
         buckets = self._buckets(cost, peer)
-        if not all(bucket.has(now) for bucket in buckets):
-            self.exceeded[cost] += 1
-            return False
+        for bucket in buckets:
+            if not bucket.has(now):
+                self.exceeded[cost] += 1
+                return False
         for bucket in buckets:
             bucket.spend()
         return True

@@ -5,7 +5,7 @@ Each limit is far above a ground station's needs and far below a load that would
 """
 
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import IntEnum, auto
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class Rate:
     burst: float
 
 
-class Cost(Enum):
+class Cost(IntEnum):  # its hash is an int's, in C: it is made for each datagram
     """The limited kinds of work.
 
     RECEIVED: a datagram or a read from a connection.
@@ -56,7 +56,7 @@ class Limit:
 
 LIMITS = {
     Cost.RECEIVED: Limit(Rate(1500, 3000), Rate(15000, 15000)),
-    Cost.ARRIVAL: Limit(Rate(20, 40), Rate(200, 400)),
+    Cost.ARRIVAL: Limit(Rate(5, 32), Rate(50, 200)),
     Cost.ANSWER: Limit(Rate(50, 200), Rate(500, 1000)),
     Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 2000)),
     Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),

@@ -44,17 +44,17 @@ class Incoming:
         self._decoder = MavlinkDecoder()
         self.routes: PassThrough | None = None
 
-    def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        """Handle bytes from a ground station. A datagram holds whole frames only."""
+    def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
+        """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
         if not self._ground.budgets.allows(Cost.RECEIVED, peer, now):
-            return
+            return False
         for frame in self._ground.received(peer, data, now, datagram=datagram):
             refused = self._guard.refusal(peer, frame)
             if refused is not None and refused.is_forged:
                 continue
             if not self._ground.admits(peer, now):
                 self._guard.forget(peer)
-                return
+                return False
             self._ground.heard(peer, frame, now)
             station = Station(peer, frame.sysid, frame.compid)
             if refused is not None:
@@ -67,6 +67,7 @@ class Incoming:
                     message = self._decoder.decode(frame)
                     if message is not None and self._is_for_us(message):
                         self._router.take(station, message, now)
+        return True
 
     def from_autopilot(self, frames: list[MavlinkFrame]) -> None:
         """Pass on frames from the line."""

@@ -224,11 +224,13 @@ class MissionUploads:
         """The time of the next `tick`."""
         if not (self._uploads or self._reminders):
             return inf
-        arriving, waiting = self._in(Asking, Receiving), self._in(Waiting)
+        # Asked after each datagram of a flood.
+        states = {type(upload.state) for upload in self._uploads}
+        arriving, waiting = states & {Asking, Receiving}, Waiting in states
         is_free = self._missions.occupied() is not OCCUPIED
-        if is_free and (self._in(Complete) or (waiting and not arriving)):
+        if is_free and (Complete in states or (waiting and not arriving)):
             return 0.0
-        times = [self._may_ask_at] if self._in(Asking) and not self._is_asking else []
+        times = [self._may_ask_at] if Asking in states and not self._is_asking else []
         times += [self._arriving_since + _ALONE_S] if is_free and waiting and arriving else []
         times += [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
         return min(times, default=inf)
@@ -432,7 +434,7 @@ class MissionUploads:
         return next((upload for upload in reversed(self._uploads) if upload.station == station), None)
 
     def _in(self, *states: type[UploadState]) -> list[_Upload]:
-        return [upload for upload in self._uploads if isinstance(upload.state, states)]
+        return [upload for upload in self._uploads if type(upload.state) in states]
 
     def _undelivered(self) -> list[_Upload]:
         return [upload for upload in self._uploads if not isinstance(upload.state, Delivering)]

@@ -277,7 +277,8 @@ class Daemon:
         traffic.pieces_received += 1
         traffic.bytes_received += len(data)
         try:
-            self.bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram)
+            if not self.bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram):
+                return
         except Exception:
             # A ground station must not be able to reset the flight controller's line: only its data is dropped.
             _log.exception("gcs.fault", peer=str(peer))

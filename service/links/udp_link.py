@@ -13,6 +13,8 @@ from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, family_of
 _DATAGRAM_SIZE = 2048
 #: Datagrams taken in one wake-up, so that a flood cannot starve the flight controller's port.
 _DATAGRAMS_AT_ONCE = 64
+#: Bytes of datagrams waiting to be read; the kernel may allow less. A flood drops the pilot's when it is full.
+_KERNEL_BUFFER = 1 << 20
 #: How often a host name is resolved again.
 _LOOK_UP_S = 10.0
 
@@ -32,6 +34,7 @@ class UdpLink:
         self._lookup: asyncio.Task[None] | None = None
         self._socket = socket.socket(self._family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _KERNEL_BUFFER)
         try:
             self._set_up()
         except OSError:
