@@ -107,11 +107,12 @@ class MissionDownloads:
         questions, self._questions = self._questions, {}
         for question in questions:
             if isinstance(held, Refusal):
+                # Mission Planner requests item 0 on arming, which may have just changed the protocol.
                 if question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
-                    # Mission Planner requests it on arming, which may have just changed the protocol.
                     self._send_item(question.station, self._present_home(), as_int=question.as_int)
-                else:
+                elif question.seq != 0 or self._vehicle.armed is not None:
                     self._refuse(question.station, held)
+                # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
                 continue
             self._snapshots.pop(question.station, None)
             self._snapshots[question.station] = _Snapshot(held.items, now + _READING_S)

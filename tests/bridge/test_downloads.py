@@ -331,6 +331,19 @@ def test_a_craft_that_is_armed_from_the_start_has_an_item_0(board: str | Telemet
     assert not any("disarm to change" in text for text in station.texts())
 
 
+@pytest.mark.parametrize("board", TelemetryProtocol)
+def test_item_0_is_not_denied_while_a_craft_that_may_be_armed_is_looked_for(board: TelemetryProtocol) -> None:
+    """Mission Planner repeats its request, and is refused only once the craft is known to be disarmed."""
+    world = armed_before(board)
+    station = GroundStation(world)
+    while not world.bridge.session.vehicle.armed:
+        for reply in ask(station, request_message(0), 0.2):
+            assert reply.get_type() != "MISSION_ACK"
+    (item,) = ask(station, request_message(0))
+    assert item.get_type() == "MISSION_ITEM_INT"
+    assert not station.texts()
+
+
 def test_reading_goes_on_beside_an_upload_by_another() -> None:
     world, reader = holding()
     writer = GroundStation(world, "writer", sysid=250, air=Air(delay_s=0.01))
