@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import DROPPED, Finding
+from bridge.model.finding import DROPPED, Finding, News
 from protocols.mavlink.command_name import command_name
 from protocols.mission_item import MissionItem
 from service.control.mission_data import Json, mission_items
@@ -24,9 +24,9 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     """One row per item sent, with "sent->stored" for each changed value or item number.
 
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
-    and are printed below the table with their reasons.
+    and are printed below the table with their reasons, except filled-in defaults.
     """
-    reasons = Text("".join(f"\n{finding.text()}" for finding in findings))
+    reasons = Text("".join(f"\n{finding.text()}" for finding in findings if finding.news != News.NONE))
     table = _empty_table(reasons)
     dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
     left = iter(stored)

@@ -210,3 +210,12 @@ def test_a_list_that_is_too_long_is_refused_before_its_rows_are_drawn(tmp_path: 
     output = run(path).stdout
     assert len(output.splitlines()) < 5
     assert "60000 items, but only 146 fit" in output
+
+
+def test_filled_in_defaults_are_in_the_table_alone(tmp_path: Path) -> None:
+    path = tmp_path / "no-radius.waypoints"
+    path.write_text(write_qgc_wpl([replace(HOME, p2=0.0), replace(POINT, p2=0.0, alt_m=10.5)]))
+    output = run(path).stdout
+    assert output.count("0->2") == 2
+    assert "Hit Rad" not in output
+    assert "WP 1: Alt changed from 10.5 to 10 m" in output

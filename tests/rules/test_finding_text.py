@@ -128,7 +128,7 @@ def test_a_list_without_a_home_says_what_became_of_its_first_item() -> None:
     """MAVSDK's `mission` plugin."""
     verdict = check_list([item(WAYPOINT, frame=6), item(WAYPOINT)], HarakiriRules())
     assert [each.text() for each in verdict.findings] == ["Home: first item became home, not flown to"]
-    assert summary(2, verdict) == "2 of 2 stored: look at home"
+    assert summary(2, verdict) == "2 of 2 stored: check home"
 
 
 def test_a_leg_below_home_is_not_counted_as_raised() -> None:
