@@ -85,7 +85,7 @@ def test_no_package_of_the_service_is_left_out() -> None:
     assert {f"service.{path.name}" for path in (REPOSITORY / "service").glob("[!_.]*")} == {*SERVICE}
 
 
-def test_a_class_name_stands_for_one_thing() -> None:
+def test_class_names_are_unique() -> None:
     """Among ourselves; a simulated firmware may use a name of its own for what it simulates."""
     files = (file for package in PACKAGES.keys() - {"simulator"} for file in (REPOSITORY / package).rglob("*.py"))
     nodes = (node for file in files for node in ast.walk(ast.parse(file.read_text())))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/cli.md is what the commands say themselves."""
+"""docs/cli.md is up to date with the commands' help."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worked exchange on docs/msp-mission.md is what the encoders and the simulated Naze really say."""
+"""The worked exchange in docs/msp-mission.md matches the encoders and the simulated Naze."""
 
 import re
 from pathlib import Path

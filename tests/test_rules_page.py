@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/mission-rules.md has the table that the rules make."""
+"""The table in docs/mission-rules.md is up to date with the rules."""
 
 from pathlib import Path
 

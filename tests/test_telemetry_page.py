@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/telemetry.md says what the table in the code says: every message, its poll, its rate and its fields."""
+"""docs/telemetry.md agrees with the code's table: every message, its poll, rate and fields."""
 
 import re
 from math import inf

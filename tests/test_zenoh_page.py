@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/zenoh.md says what the code says: every key and its delivery, and every field of every payload."""
+"""docs/zenoh.md agrees with the code: every key and its delivery, and every field of every payload."""
 
 import json
 import re
@@ -37,7 +37,7 @@ def test_each_field_is_on_the_page(key: ZenohKey) -> None:
             assert f"`{inner}`" in PAGE or f"`{inner.rstrip('1234')}1` to" in PAGE, inner
 
 
-def test_what_stands_in_the_groups_tables_is_there() -> None:
+def test_the_groups_tables_list_existing_fields() -> None:
     for path in FOLDER.glob("*.json"):
         schema = json.loads(path.read_text())
         told = set(re.findall(r"^\| `([a-z0-9_]+)` \| ", SECTIONS.get(path.stem, ""), re.MULTILINE))

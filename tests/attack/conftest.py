@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the attacks start with."""
+"""Fixtures for the attack tests."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack

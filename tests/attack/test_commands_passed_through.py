@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An autopilot that speaks MAVLink for itself, an open link, and a stranger that wants to fly it."""
+"""A stranger on an open link tries to command an autopilot that speaks MAVLink itself."""
 
 import socket
 import threading
@@ -33,7 +33,7 @@ COMMANDS = {
 
 
 class Autopilot(threading.Thread):
-    """An ArduPilot behind TCP: its heartbeats, and what reaches it."""
+    """An ArduPilot on TCP: sends heartbeats and records received frames."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
@@ -58,7 +58,7 @@ class Autopilot(threading.Thread):
                     return
 
     def kinds(self) -> list[str]:
-        """What came as MAVLink; before that the bridge looks for an MSP board."""
+        """The received MAVLink; before that the bridge searches for an MSP board."""
         return [message.get_type() for message in self.received if message.get_type() != "BAD_DATA"]
 
     def was_asked_for(self, parameter: str) -> bool:
@@ -95,7 +95,7 @@ def test_no_command_passes_an_open_link(start: Starter, autopilot: Autopilot) ->
             stranger.send(HELLO)
             stranger.wait_for("HEARTBEAT")
             stranger.send(command)
-            # The question behind it shows that it was dealt with.
+            # The reply to the next request shows that it was handled.
             question = f"LAST{number}"
             stranger.send(m.MAVLink_param_request_read_message(1, 1, question.encode(), -1))
             until(partial(autopilot.was_asked_for, question), "the question behind it")

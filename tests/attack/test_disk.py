@@ -41,7 +41,7 @@ def test_the_log_of_a_flight_outlives_a_flood(start: Starter, stack: ExitStack) 
     with Watch(bench.daemon), Attack(lambda: stranger.send(*[text] * 50), per_s=40) as attack:
         assert comes(lambda: attack.count > 300)
     assert flight in logs(state)
-    # 1.2 MB were sent; what floods is left out.
+    # 1.2 MB were sent; the flood is not recorded.
     assert sum(path.stat().st_size for path in logs(state)) < 600_000
 
 

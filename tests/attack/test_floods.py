@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strangers that shout: each asks for so much that the pilot, the board or its flash would suffer."""
+"""Floods: each requests so much that the pilot, the board or its flash would suffer."""
 
 import json
 from contextlib import ExitStack
@@ -19,13 +19,13 @@ _WRITES = (b"$M<\x00\xfa", b"$M<\x04\xc4")
 
 
 class Line:
-    """What the daemon has written to the board, as it records it."""
+    """The bytes that the daemon wrote to the board, from its recording."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def most_requests(self, seconds: float) -> int:
-        """The requests of the busiest time of that length."""
+        """The number of requests in the busiest period of that length."""
         times = [at for at, data in self._lines() for _ in range(data.count(b"$M<"))]
         return max(len([at for at in times if began <= at < began + seconds]) for began in times)
 
@@ -53,7 +53,7 @@ def command(number: int, p1: float = 0.0, p2: float = 0.0) -> Message:
 
 
 def test_texts(bench: Bench, stack: ExitStack) -> None:
-    """What a stranger causes to be said is said to the stranger."""
+    """Texts caused by a stranger go only to the stranger."""
     stranger = Stranger(bench.daemon.address)
     stack.callback(stranger.close)
     loud = (command(42428), command(400, 1.0), m.MAVLink_set_mode_message(1, 1, 3), command(22, 1.0))

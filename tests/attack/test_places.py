@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strangers that take every place on a link, and speak in the pilot's name."""
+"""Strangers that fill every place on a link, or impersonate the pilot."""
 
 import itertools
 import socket
@@ -78,9 +78,7 @@ def test_a_crowd_does_not_take_the_place_of_a_pilot_that_was_there(start: Starte
             assert_uploads(pilot, bench.board, plain_plan(20))
 
 
-def test_strangers_on_a_keyed_link_take_nothing_from_who_has_the_key(
-    start: Starter, stack: ExitStack, key_file: Path
-) -> None:
+def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, stack: ExitStack, key_file: Path) -> None:
     bench = guarded(start, key_file)
     with crowd(bench, stack) as attack:
         assert comes(lambda: attack.count > 2 * CROWD)
@@ -94,7 +92,7 @@ def test_strangers_on_a_keyed_link_take_nothing_from_who_has_the_key(
             assert listener.upload(plain_plan(3)) is MissionResult.DENIED
             listener.send(m.MAVLink_command_long_message(1, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             assert listener.wait_for("COMMAND_ACK").result == m.MAV_RESULT_DENIED
-    # What the pilot is told is not for strangers, also if there is room for them.
+    # The pilot's texts do not go to strangers, even if there is room for them.
     with udp_station(bench.daemon.address) as pilot, udp_station(bench.daemon.address) as listener:
         assert hears_heartbeats(listener, 2)
         sign(pilot._codec, PASSPHRASE)
@@ -103,7 +101,7 @@ def test_strangers_on_a_keyed_link_take_nothing_from_who_has_the_key(
         assert "STATUSTEXT" not in {message.get_type() for message in listener.heard}
 
 
-def test_nobody_sets_the_rates_of_who_has_the_key(start: Starter, stack: ExitStack, key_file: Path) -> None:
+def test_an_unsigned_frame_does_not_change_the_pilots_rates(start: Starter, stack: ExitStack, key_file: Path) -> None:
     """Unsigned, from the pilot's own address: as a forged UDP packet is."""
     bench = guarded(start, key_file)
     with udp_station(bench.daemon.address) as pilot:

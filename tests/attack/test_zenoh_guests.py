@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A guest and another vehicle of a fleet that try to speak for a vehicle, past the example routers as they stand."""
+"""A guest and another vehicle try to publish for a vehicle, through routers with the example configurations."""
 
 import time
 from contextlib import ExitStack
@@ -24,7 +24,7 @@ def fleet(request: pytest.FixtureRequest, tmp_path: Path, stack: ExitStack) -> F
     return found
 
 
-def test_nobody_speaks_for_a_vehicle(start: Starter, fleet: Fleet) -> None:
+def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet) -> None:
     bench = zenoh_bench(start, f'config_file = "{fleet.config("vehicle", "naze-1")}"\ncommands = true')
     with (
         fleet.open("pilot", "pilot") as pilot,
@@ -39,7 +39,7 @@ def test_nobody_speaks_for_a_vehicle(start: Starter, fleet: Fleet) -> None:
         pilot.liveliness().declare_subscriber("fleet/**", lambda sample: tokens.append(str(sample.key_expr)))
         for liar in (guest, other):
             _lie(liar)
-        time.sleep(2.0)  # for the lies to arrive, if they do
+        time.sleep(2.0)  # for the forged samples to arrive, if they do
         heard.wait("telemetry/attitude")
         assert [sample for sample in heard.samples if sample.payload.to_bytes() == b"forged"] == []
         assert zenoh.SampleKind.DELETE not in [sample.kind for sample in heard.samples]

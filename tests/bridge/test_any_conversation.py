@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever two ground stations, the command line, the pilot and the plugs do: no wrong list, and never a dead end."""
+"""Random actions of two ground stations, the command line, the pilot and the plugs: never a wrong list, never stuck."""
 
 from collections.abc import Sequence
 
@@ -35,7 +35,7 @@ results = st.sampled_from(list(MissionResult))
 
 
 def places(records: Sequence[WpRecord]) -> list[tuple[int, int, int]]:
-    """What tells one list from another; the radius follows the flight controller's own."""
+    """The fields that distinguish lists; the radius depends on the flight controller's setting."""
     return [(record.lat_e7, record.lon_e7, record.height_m) for record in records]
 
 

@@ -30,7 +30,7 @@ BOXES = b"ANGLE;HORIZON;BARO;MAG;CAMSTAB;ARM;GPS HOME;GPS HOLD;"
 
 
 def verdict(world: World) -> bool:
-    """It is known what is spoken, and at which speed."""
+    """True if protocol and speed are known."""
     return not isinstance(world.bridge.session.state, Closed | Searching)
 
 
@@ -106,7 +106,7 @@ def test_back_within_3_s_of_the_ports_return(baud: int) -> None:
     for _ in range(8):
         world = World(SimOptions(baud=baud))
         world.wait_until(verdict, 10)
-        # Perhaps in the middle of being asked who it is: then it has no name yet, but its speed is known.
+        # Perhaps during identification: then it has no name yet, but its speed is known.
         world.run(draw.random() * draw.choice((0.2, 4)))
         world.unplug()
         assert isinstance(world.bridge.session.state, Closed)
@@ -216,7 +216,7 @@ def test_armed_from_the_start(protocol: TelemetryProtocol) -> None:
 
 
 def test_frsky_telemetry_of_an_armed_craft_is_taken_for_nothing() -> None:
-    """It answers MSP all the same, at FrSky's speed and between FrSky's frames."""
+    """It answers MSP anyway, at FrSky's speed and between FrSky's frames."""
     world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     world.wait_ready()
     world.faults.armed = True
@@ -306,7 +306,7 @@ def test_a_lone_heartbeat_a_second_is_mavlink(version: int) -> None:
     assert world.events("fc.lost") == []
 
 
-def test_a_heartbeat_without_content_is_no_heartbeat() -> None:
+def test_a_heartbeat_without_content_is_not_a_heartbeat() -> None:
     """MAVLink 2 leaves zeros out: an empty heartbeat is one byte long."""
     world = World(peer=MavlinkOnly())
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
@@ -319,7 +319,7 @@ def test_a_heartbeat_without_content_is_no_heartbeat() -> None:
 
 
 @pytest.mark.parametrize("peer", [QuietLine, Loopback])
-def test_nobody_is_found_where_nobody_is(peer: Callable[[], QuietLine]) -> None:
+def test_an_empty_line_yields_no_flight_controller(peer: Callable[[], QuietLine]) -> None:
     world = World(peer=peer())
     world.run(60)
     assert isinstance(world.bridge.session.state, Searching)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Noise is never taken for a flight controller, also where it is made of the very bytes that frames begin with.
+"""Noise is never mistaken for a flight controller, even if it consists of the bytes that frames begin with.
 
-What is left to chance, by calculation: an MSP verdict on uniform noise needs two equal answers to IDENT, the shortest
-of which is six given bytes: 2^-48 at each byte, and that again within half a second. A MAVLink verdict needs a
-heartbeat whose magic, length, number, CRC, version, type, autopilot and state fit (2^-59 at each byte), or two frames
-of known messages from one sender with sequence numbers that follow (2^-48 for each pair of places).
+The calculated probabilities of a false verdict: an MSP verdict on uniform noise needs two equal answers to IDENT, the
+shortest of which is six given bytes: 2^-48 at each byte, and that again within half a second. A MAVLink verdict needs
+a heartbeat whose magic, length, number, CRC, version, type, autopilot and state fit (2^-59 at each byte), or two
+frames of known messages from one sender with sequence numbers that follow (2^-48 for each pair of places).
 """
 
 import random

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What one ground station may cause, in simulated time: its requests come for longer than a test could wait."""
+"""The limits on a ground station's requests over a long time, in simulated time."""
 
 from protocols.mavlink.dialect import messages as m
 from tests.support.world import GroundStation, World

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was once recorded at a flight controller's port (tests/captures), played to the bridge in simulated time.
+"""Recordings of flight controllers' ports (tests/captures), replayed to the bridge in simulated time.
 
-A user's capture is put there as it is. The first test holds for all of them; a test of its own says what was wrong.
+Users' captures are added unchanged. The first test runs on all of them; each problem has its own test.
 """
 
 from itertools import pairwise

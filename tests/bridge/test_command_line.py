@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A board in its command line: recognised by its echo, reported, never typed at, and found again when it is back."""
+"""A board in its command line: recognised by its echo, reported, never typed at, and found again afterwards."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -56,7 +56,7 @@ def type_exit(world: World) -> bytes:
 
 
 def left_in_cli(board: Any) -> World:
-    """The port is opened some time after somebody has left the board in its command line."""
+    """The port is opened some time after the board was left in its command line."""
     world = World(peer=board, plugged=False)
     if world.naze.protocol is None:
         world.run(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What else a ground station asks: every command acknowledged once, nothing that acts on the aircraft done."""
+"""Commands and parameters: each command is acknowledged once, and none acts on the aircraft."""
 
 import math
 from collections.abc import Callable
@@ -14,9 +14,9 @@ from tests.support.world import GroundStation, World
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
-#: The same refusal is said again after so long.
+#: The same refusal is repeated after this time.
 _SILENCE_S = 10.1
-#: What comes by itself.
+#: Unsolicited messages.
 TELEMETRY_TYPES = {"HEARTBEAT", "MISSION_CURRENT", "CURRENT_MODE"} | {
     m.mavlink_map[row.msgid].msgname for row in TELEMETRY if row.interval_s < math.inf
 }
@@ -29,7 +29,7 @@ def flying() -> tuple[World, GroundStation]:
     world.wait_ready()
     world.run(7)
     station = GroundStation(world)
-    # Who is new hears of home within a second: that is not an answer.
+    # A new station gets HOME_POSITION within a second: that is not a reply.
     station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
     world.run(1.2)
     return world, station
@@ -119,7 +119,7 @@ def test_all_command_numbers_are_acknowledged(flying: tuple[World, GroundStation
         (224, "waypoint cannot be set"),
     ],
 )
-def test_what_would_act_on_the_aircraft_is_denied_with_a_reason(
+def test_commands_that_act_on_the_aircraft_are_denied_with_a_reason(
     flying: tuple[World, GroundStation], command: int, words: str
 ) -> None:
     world, _ = flying
@@ -155,7 +155,7 @@ def test_a_mode_is_refused_with_a_text(flying: tuple[World, GroundStation]) -> N
     ],
     ids=lambda message: message.get_type(),
 )
-def test_a_refusal_is_told_to_who_asked_and_to_nobody_else(refused: Message) -> None:
+def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     asking, other = GroundStation(world, "asking"), GroundStation(world, "other", sysid=254)
@@ -183,7 +183,7 @@ def test_a_command_for_another_is_not_answered(flying: tuple[World, GroundStatio
         assert len(acks(answers(flying, long(512, 148, system=system, component=component)))) == 1
 
 
-def test_the_version_says_what_is_there_and_no_ftp(flying: tuple[World, GroundStation]) -> None:
+def test_autopilot_version_has_no_ftp_capability(flying: tuple[World, GroundStation]) -> None:
     (version,) = answers(flying, m.MAVLink_autopilot_version_request_message(1, 1))
     assert version.get_type() == "AUTOPILOT_VERSION"
     assert version.flight_sw_version == 0x020101FF  # 2.1.1, official
@@ -212,9 +212,9 @@ def test_a_file_request_is_refused_at_once(flying: tuple[World, GroundStation]) 
     (answer,) = answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload)))
     assert (answer.target_system, answer.target_component) == (255, 190)
     assert list(answer.payload[:6]) == [8, 0, 3, 129, 2, 4]
-    # FailErrno: Mission Planner ignores "unknown command" and goes on asking for 70 s.
+    # FailErrno: Mission Planner ignores "unknown command" and continues asking for 70 s.
     assert list(answer.payload[12:14]) == [2, 95]
-    # A refusal is not a request: nobody answers it.
+    # A refusal is not a request: no one answers it.
     assert answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(answer.payload))) == []
 
 
@@ -224,7 +224,7 @@ def test_a_ping_is_answered_and_an_answer_is_not(flying: tuple[World, GroundStat
     assert answers(flying, m.MAVLink_ping_message(123456789, 42, 1, 1)) == []
 
 
-def test_time_is_told_who_asks(flying: tuple[World, GroundStation]) -> None:
+def test_timesync_is_answered(flying: tuple[World, GroundStation]) -> None:
     world, _ = flying
     (answer,) = answers(flying, m.MAVLink_timesync_message(0, 777))
     assert answer.ts1 == 777
@@ -327,7 +327,7 @@ def test_every_radius_in_range_is_set(value: float) -> None:
     world.assert_line_was_clean()
 
 
-def test_what_cannot_be_set_answers_with_what_it_is() -> None:
+def test_a_parameter_that_cannot_be_set_is_answered_with_its_value() -> None:
     world, station = radius_world()
     assert values(answers((world, station), param_set(b"SYSID_THISMAV", 7.0))) == [("SYSID_THISMAV", 1.0, 0, 2)]
     assert answers((world, station), param_set(b"NO_SUCH_NAME", 7.0)) == []

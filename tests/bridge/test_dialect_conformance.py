@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every way of storing missions must keep to, whatever the flight controller: one contract, all dialects.
+"""The contract of all mission stores, whatever the flight controller.
 
-Each runs through the whole bridge against the simulated flight controller that it is for. What is asked of it is what
-ground stations and the store rely on; how it is done is each dialect's own tests' business.
+Each store is tested through the whole bridge, on its simulated flight controller, for what ground stations and the Pi's
+store rely on. Its procedure has its own tests.
 """
 
 import itertools
@@ -60,7 +60,7 @@ class Craft:
         return held[0]
 
     def holds(self, items: Sequence[MissionItem]) -> bool:
-        """Whether it reads as that list; home may be its own, and a place 0.4 m off."""
+        """True if it reads as that list; home may be its own, and a place 0.4 m off."""
         read = self.download()
         return len(read) == len(items) and all(map(is_alike, read[1:], items[1:]))
 
@@ -107,7 +107,7 @@ def test_every_dialect_is_here() -> None:
 def assert_is_true(
     craft: Craft, delivery: DeliveryResult, old: Sequence[MissionItem], new: Sequence[MissionItem]
 ) -> None:
-    """What was said of a push that was cut off is what the flight controller holds. UNCERTAIN promises nothing."""
+    """The reported outcome of an interrupted push is true. UNCERTAIN promises nothing."""
     if delivery.ack is ACCEPTED:
         assert craft.holds(new)
     elif delivery.text not in {failure.value for failure in LIST_IS_GONE}:
@@ -126,7 +126,7 @@ def craft(request: pytest.FixtureRequest) -> Craft:
     return made
 
 
-def test_what_is_accepted_is_there_and_is_read_by_everybody(craft: Craft) -> None:
+def test_an_accepted_list_is_stored_and_read_by_all(craft: Craft) -> None:
     sent = craft.plan(25)
     assert craft.upload(sent) is ACCEPTED
     assert craft.world.store.outcomes() == [Outcome.VERIFIED]
@@ -139,7 +139,7 @@ def test_what_is_accepted_is_there_and_is_read_by_everybody(craft: Craft) -> Non
     assert Download(another).run(PATIENCE_S) == craft.download()
 
 
-def test_what_is_read_can_be_written_again_and_changes_nothing(craft: Craft) -> None:
+def test_writing_a_read_list_again_changes_nothing(craft: Craft) -> None:
     assert craft.upload(craft.plan(12)) is ACCEPTED
     before = craft.pull()
     assert craft.upload(craft.download()) is ACCEPTED
@@ -148,7 +148,7 @@ def test_what_is_read_can_be_written_again_and_changes_nothing(craft: Craft) -> 
     assert (after.records, after.items[1:]) == (before.records, before.items[1:])
 
 
-def test_the_next_list_takes_the_place_of_the_one_before(craft: Craft) -> None:
+def test_a_new_list_replaces_the_old_one(craft: Craft) -> None:
     for count, seed in ((20, 1), (5, 2), (9, 3)):
         assert craft.upload(craft.plan(count, seed)) is ACCEPTED
         assert craft.holds(craft.plan(count, seed))
@@ -183,7 +183,7 @@ def test_rejected_lists_change_nothing_and_say_why(craft: Craft) -> None:
     assert craft.holds(craft.plan(6))
 
 
-def test_the_rules_judge_item_by_item_as_they_judge_the_whole(craft: Craft) -> None:
+def test_item_by_item_and_whole_list_checks_agree(craft: Craft) -> None:
     found: list[Any] = []
     craft.world.bridge.runner.start(
         craft.world.bridge.missions.rules(), lambda rules, _: found.append(rules), craft.world.now

@@ -41,7 +41,7 @@ def holding(options: SimOptions | None = None, flash: bytes = OLD_FLASH) -> tupl
 
 
 def ask(station: GroundStation, message: Message, seconds: float = 0.2) -> list[Message]:
-    """Send a message, and return what comes back that has to do with missions and is addressed."""
+    """Send a message; return the addressed mission messages in reply."""
     station.take()
     station.send(message)
     station.world.run(seconds)
@@ -80,7 +80,7 @@ def test_it_is_read_from_the_flight_controller_after_the_bridge_starts() -> None
     assert Download(station).run() != []
     assert reads(world) == before
     other = waypoints(9, seed=3)
-    # The same board with another list: its flash is changed behind the bridge's back, and it boots anew.
+    # The same board with another list: its flash is changed without the bridge, and it boots again.
     world.power_off()
     world.naze._flash._memory[:] = flash_holding(records_of(other))
     world.power_on()
@@ -106,7 +106,7 @@ def test_a_region_of_interest_reads_back_as_it_was_sent(remembered: bool) -> Non
         items[seq] = replace(items[seq], command=command, p2=0.0, alt_m=0.0)
     assert Upload(station, items).run() is A.ACCEPTED
     world.store.missions = world.store.missions if remembered else []
-    # Another time: what the bridge had in mind is gone.
+    # Later: the bridge's copy is gone.
     world.unplug()
     world.plug()
     world.wait_ready()
@@ -114,7 +114,7 @@ def test_a_region_of_interest_reads_back_as_it_was_sent(remembered: bool) -> Non
     assert commands == ([16, 201, 195, 80, 16, 16] if remembered else [16, 80, 80, 80, 16, 16])
 
 
-def test_a_record_that_we_do_not_know_is_shown_as_nothing_that_flies() -> None:
+def test_an_unknown_record_is_not_shown_as_a_flight_command() -> None:
     strange = flash_holding([*OLD_RECORDS[:3], replace(OLD_RECORDS[3], command=99), *OLD_RECORDS[4:]])
     _, station = holding(flash=strange)
     item = Download(station).run()[3]
@@ -122,7 +122,7 @@ def test_a_record_that_we_do_not_know_is_shown_as_nothing_that_flies() -> None:
 
 
 def test_an_empty_list_is_a_count_of_none_until_home_is_known() -> None:
-    """Then it is home alone: DroneKit takes home from a download, and waits for ever without one."""
+    """Then it is home alone: DroneKit takes home from a download, and waits forever without one."""
     world = World(speeds=(115200,))
     world.wait_until(lambda w: w.is_found, 5)
     station = GroundStation(world)
@@ -262,7 +262,7 @@ def test_a_station_that_hammers_fills_nothing_and_others_are_served() -> None:
 
 
 def test_a_long_queue_without_a_link_ends() -> None:
-    """What waits for its turn is told so when the port goes."""
+    """Waiting requests are refused when the port is lost."""
     world, _ = holding()
     bridge = world.bridge
     answers: list[HeldMission | Refusal] = []
@@ -273,7 +273,7 @@ def test_a_long_queue_without_a_link_ends() -> None:
     assert {answer.text for answer in answers if isinstance(answer, Refusal)} == {"No link to the flight controller"}
 
 
-def test_without_a_link_and_without_a_store_the_reason_is_told() -> None:
+def test_without_a_link_and_without_a_store_the_reason_is_reported() -> None:
     world, station = holding()
     world.unplug()
     (ack,) = ask(station, list_message())

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A client with the habits of DroneKit 2.9: MAVLink 1, float items, and every wait of its `wait_ready`.
 
-What it does not do matters as much: it repeats no MISSION_COUNT, reads no MISSION_ACK, and knows home only from a
-download. Given an empty list it would ask for item 0 and wait for ever.
+It repeats no MISSION_COUNT, reads no MISSION_ACK, and knows home only from a
+download. Given an empty list it would ask for item 0 and wait forever.
 """
 
 from collections.abc import Callable

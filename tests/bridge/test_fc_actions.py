@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calibration and storage: done on the ground, once, acknowledged with what came of it, and never in the air."""
+"""Calibration and storage: executed once, on the ground only, and acknowledged with the result."""
 
 import math
 from collections.abc import Callable
@@ -50,7 +50,7 @@ def results(station: GroundStation) -> list[int]:
 
 
 def done(world: World) -> list[int]:
-    """What was done to the flight controller."""
+    """The actions executed by the flight controller."""
     frames = [frame for _, _, data in world.written for frame in MspParser().feed(data)]
     return [frame.command for frame in frames if frame.command in ACTIONS]
 
@@ -167,7 +167,7 @@ def test_an_impatient_pilot_hears_that_it_is_being_done() -> None:
     assert done(world) == [250]
 
 
-def test_never_beside_a_mission() -> None:
+def test_never_alongside_a_mission() -> None:
     world, station = a_world()
     outcome = world.push(waypoints(100))
     station.send(long(*SAVE[:2]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An armed Harakiri that sends FrSky telemetry and does not hear the bridge: only what is certain is shown."""
+"""An armed Harakiri that sends FrSky telemetry and does not hear the bridge: only certain values are shown."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who may write over which link: with a key, with a list of addresses, and in both ways of working."""
+"""Write access per link: with a key, with a list of addresses, and in pass-through."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -26,7 +26,7 @@ NOON = 1_795_262_400.0
 LINK_ID = 3
 COMMAND_ARM = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
 
-#: What changes something, from every family of messages, and the answer that the protocol has for a refusal.
+#: Messages that change something, from every family, and the protocol's reply to a refusal.
 WRITES: Sequence[tuple[Message, str | None]] = (
     (count_message(3), "MISSION_ACK"),
     (item_message(0, waypoints(2)[0]), "MISSION_ACK"),
@@ -82,7 +82,7 @@ def signing(clock: Callable[[], float] | None = None, at_least: int = 0) -> Sign
 
 
 def keyed(given: Signing | None = None) -> World:
-    """A world whose one link asks for a key."""
+    """A world whose only link requires a key."""
     world = World(speeds=(115200,), links={"udp": LinkAccess(given or signing(), LINK_ID)})
     world.wait_ready()
     return world
@@ -180,7 +180,7 @@ def test_a_mission_with_the_key_arrives_and_all_that_is_said_is_signed() -> None
         assert message.get_link_id() == LINK_ID
 
 
-def test_who_speaks_mavlink_1_or_was_not_heard_yet_is_spoken_to_with_signatures_only() -> None:
+def test_mavlink_1_and_unheard_peers_get_only_signed_frames() -> None:
     world = keyed()
     unheard = GroundStation(world, "unheard")
     world.bridge.ground.add_default_peer(unheard.peer, until_answered=False)
@@ -231,7 +231,7 @@ def test_a_recorded_frame_is_worth_nothing() -> None:
         world.spoken_by(speaker, frame)
     world.run(2)
     assert refusals(world) == {Check.REPLAYED.value: 2}
-    # He is refused; the pilot, who sent it, hears nothing of it: the network may have doubled his frame.
+    # The copy is refused; the pilot is not told, because the network may have duplicated the frame.
     assert [ack.type for ack in thief.said("MISSION_ACK")] == [MissionResult.DENIED]
     assert len(station.said("MISSION_ACK")) == 1
 
@@ -246,8 +246,8 @@ def test_reading_makes_older_recordings_worthless_too() -> None:
     assert refusals(world) == {Check.REPLAYED.value: 1}
 
 
-def test_nobody_can_end_the_upload_of_who_has_the_key() -> None:
-    """Who can send in another's name, but cannot sign."""
+def test_an_unsigned_frame_cannot_end_the_pilots_upload() -> None:
+    """The attacker can forge the address and ids, but not the signature."""
     world = keyed()
     station = signing_station(world)
     forger = GroundStation(world, "gcs")
@@ -301,7 +301,7 @@ def test_a_clock_that_is_set_back_changes_nothing() -> None:
     assert refusals(world) == {}
 
 
-def test_a_pi_without_a_clock_goes_on_after_a_reboot() -> None:
+def test_a_pi_without_a_clock_continues_after_a_reboot() -> None:
     before = signing()
     world = keyed(before)
     station = signing_station(world)
@@ -324,7 +324,7 @@ def test_a_pi_without_a_clock_goes_on_after_a_reboot() -> None:
 # With a list of addresses.
 
 
-def test_who_is_not_on_the_list_may_only_read() -> None:
+def test_an_unlisted_address_may_only_read() -> None:
     world = World(speeds=(115200,), links={"udp": LinkAccess(may_write=lambda peer: peer.key == "pilot")})
     world.wait_ready()
     pilot, guest = GroundStation(world, "pilot"), GroundStation(world, "guest", sysid=250)
@@ -345,7 +345,7 @@ def test_a_key_and_a_list_ask_for_both() -> None:
     assert Upload(signing_station(world, "pilot"), waypoints(3)).run() is MissionResult.ACCEPTED
 
 
-def test_a_link_that_nothing_is_said_about_is_open() -> None:
+def test_a_link_without_access_rules_is_open() -> None:
     world = World(speeds=(115200,), links={"another": LinkAccess(may_write=lambda _: False)})
     world.wait_ready()
     assert Upload(GroundStation(world), waypoints(3)).run() is MissionResult.ACCEPTED
@@ -398,7 +398,7 @@ def test_signed_frames_reach_the_autopilot_as_they_were_sent() -> None:
 
 
 @pytest.mark.parametrize("access", [LinkAccess(), LinkAccess(signing(), LINK_ID)])
-def test_setup_signing_goes_nowhere_whoever_sends_it(access: LinkAccess) -> None:
+def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     logged: list[bytes] = []
     world, autopilot = passing({"udp": access})
     world.bridge.ground.on_frames = lambda frames: logged.extend(tlog_record(frame, 0) for frame in frames)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions for a Harakiri that answers nothing but MAVLink, by its own mission messages."""
+"""Missions for a Harakiri that answers only MAVLink, by its own mission messages."""
 
 import re
 import struct

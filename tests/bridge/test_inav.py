@@ -56,7 +56,7 @@ def test_it_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Pro
     assert world.bridge.session.vehicle.armed is False
 
 
-def test_what_is_written_is_saved_and_reads_as_it_was_sent() -> None:
+def test_a_written_list_is_saved_and_reads_as_sent() -> None:
     inav = FakeInav()
     world, station = found(inav)
     sent = plan(121)
@@ -98,7 +98,7 @@ def test_multiwii_holds_a_way_home_until_the_whole_list_is_there() -> None:
     assert seen <= {19, 1}
 
 
-def test_what_cannot_be_stored_is_noticed_and_the_old_list_put_back() -> None:
+def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> None:
     inav = FakeInav()
     world, station = found(inav)
     old = plan(12)
@@ -180,7 +180,7 @@ def test_armed_in_the_middle_the_last_record_is_never_sent() -> None:
     assert world.bridge.missions.held is None
 
 
-def test_a_save_that_fails_is_told() -> None:
+def test_a_save_that_fails_is_reported() -> None:
     inav = FakeInav()
     world, station = found(inav)
     inav.save = lambda: None  # type: ignore[method-assign]
@@ -204,7 +204,7 @@ def test_cleared_is_a_single_way_home_and_reads_as_nothing() -> None:
         assert Download(other_station).run()[1:] == []
 
 
-def test_a_link_lost_in_the_middle_is_told_and_the_next_upload_works() -> None:
+def test_a_link_lost_in_the_middle_is_reported_and_the_next_upload_works() -> None:
     inav = FakeInav()
     world, station = found(inav)
     upload = Upload(station, plan(60))
@@ -228,7 +228,7 @@ def test_foreign_records_are_shown_and_damage_nothing() -> None:
     assert (shown[0].lat_e7, shown[0].lon_e7) == (453838000, 84733000)
 
 
-def test_the_item_that_is_flown_to_and_those_reached_are_told() -> None:
+def test_the_item_that_is_flown_to_and_those_reached_are_reported() -> None:
     inav = FakeInav()
     world, station = found(inav)
     speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
@@ -276,7 +276,7 @@ def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -
         assert all(any(at < later < at + 0.1 for later in moments) for at in risky)
 
 
-def test_only_a_question_tells_that_a_telemetry_reply_is_no_record() -> None:
+def test_only_a_question_tells_that_a_telemetry_reply_is_not_a_record() -> None:
     """Home is asked for with the same command: its answer is not taken for the record that was written."""
     inav = FakeInav()
     world, station = found(inav)
@@ -319,7 +319,7 @@ def test_the_boxes_of_a_betaflight_whose_names_outgrow_a_frame() -> None:
     assert beat.custom_mode == 6
 
 
-def test_what_would_crash_is_not_even_written_back() -> None:
+def test_a_crashing_record_is_not_written_back() -> None:
     """Somebody else left a JUMP to 0 there; the push after it fails, and the old list cannot be restored."""
     inav = FakeInav()
     waypoint, *_ = packed(plan(3))
@@ -333,7 +333,7 @@ def test_what_would_crash_is_not_even_written_back() -> None:
     assert Upload(station, plan(10)).run() is ACCEPTED
 
 
-def test_what_somebody_else_replaced_is_not_put_back() -> None:
+def test_a_list_replaced_by_another_program_is_not_restored() -> None:
     inav = FakeInav()
     world, station = found(inav)
     assert Upload(station, plan(12)).run() is ACCEPTED

@@ -183,7 +183,7 @@ def test_polls_wait_for_their_turn_on_such_a_board() -> None:
     assert len(station.said("ATTITUDE")) > 5 * 18
 
 
-def test_a_mission_that_is_flown_is_told_item_by_item() -> None:
+def test_a_mission_that_is_flown_is_reported_item_by_item() -> None:
     board, world, station = board_with()
     home = world.bridge.session.vehicle.home
     assert home is not None
@@ -243,7 +243,7 @@ def test_a_stop_in_the_middle_loads_the_old_list_again() -> None:
 
 @pytest.mark.parametrize("size", [21, 100, 192])
 def test_a_frame_that_somebody_left_unfinished_does_not_hide_the_board(size: int) -> None:
-    """Its parser has no time-out: it waits for the rest, and takes our questions for it."""
+    """Its parser has no timeout: it waits for the rest, and takes our questions for it."""
     board = make_board("inav", MspOptions())
     world = World(speeds=(115200,), peer=board, plugged=False)
     world.run(0.5)

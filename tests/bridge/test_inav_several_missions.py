@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An INAV that keeps several missions, and a list that changes on the board without the bridge."""
+"""INAV with several missions in its store, and lists changed on the board without the bridge."""
 
 from dataclasses import replace
 
@@ -58,7 +58,7 @@ class Bench:
         return [mission for mission in missions if mission and mission != [NOTHING_MORE]]
 
     def flown(self) -> list[bytes]:
-        """What the board flies when it is armed now."""
+        """The list that the board would fly if armed now."""
         self.faults.armed = True
         self.world.run(3)
         assert self.board.armed
@@ -108,7 +108,7 @@ def test_write_replaces_the_loaded_one_and_keeps_the_others(selected: int) -> No
     assert others_of(bench) == kept
 
 
-def test_what_does_not_fit_is_told_before_and_copied_to_the_pi() -> None:
+def test_what_does_not_fit_is_reported_before_and_copied_to_the_pi() -> None:
     bench = Bench(4, 30, 60)
     assert Upload(bench.station, plan(81, 7)).run() is ACCEPTED
     assert bench.stored() == [packed(plan(81, 7)), sets(4, 30)[1]]
@@ -192,7 +192,7 @@ def test_a_saved_mission_that_is_not_ours_is_called_that() -> None:
     assert bench.flown() == sets(4)[0]
 
 
-def test_armed_it_is_not_loaded_and_that_is_told_until_it_is_disarmed() -> None:
+def test_armed_it_is_not_loaded_and_that_is_reported_until_it_is_disarmed() -> None:
     bench = Bench(4, faults=Faults(boxes=0, armed=True))
     assert bench.told().count("No mission is loaded: disarm to load the saved one") == 1
     assert Download(bench.station).run() in ([], None)
@@ -288,7 +288,7 @@ def test_one_other_record_in_the_longest_list_is_noticed_by_the_upload_itself() 
     assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
 
 
-def test_a_list_that_another_client_is_writing_is_told_once_it_is_complete() -> None:
+def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete() -> None:
     bench = Bench(9)
     before = len(bench.station.texts())
     mission = bench.board._firmware._mission  # type: ignore[union-attr]
@@ -300,7 +300,7 @@ def test_a_list_that_another_client_is_writing_is_told_once_it_is_complete() -> 
     assert told == "Mission on the flight controller changed: 30 records"
 
 
-def test_a_list_that_another_client_left_unfinished_is_told() -> None:
+def test_a_list_that_another_client_left_unfinished_is_reported() -> None:
     bench = Bench(9)
     bench.board._firmware._mission.write(1, waypoint(1))  # type: ignore[union-attr]
     bench.world.run(2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What only INAV tells: version, platform, load, battery, airspeed, failsafe, and what keeps it from arming."""
+"""Data that only INAV reports: version, platform, load, battery, airspeed, failsafe, arming blockers."""
 
 import math
 from typing import Any
@@ -110,7 +110,7 @@ def test_its_time_is_known_once_it_has_it_from_its_gps(unix_s: float) -> None:
         assert heard.unix_s - unix_s == pytest.approx(heard.heard_at, abs=0.1)
 
 
-def test_what_keeps_it_from_arming_is_told_when_it_changes() -> None:
+def test_arming_blockers_are_reported_when_they_change() -> None:
     board, world, station = introduced(faults=Faults(boxes=0, arming_blockers=RC_LINK | NOT_LEVEL))
     assert station.said("SYS_STATUS")[-1].onboard_control_sensors_health & PREARM == 0
     assert [text for text in station.texts() if "arm" in text] == ["Not ready to arm: not level, no RC link"]
@@ -136,7 +136,7 @@ def test_a_mission_that_is_loaded_while_it_is_identified_does_not_hide_it() -> N
     world.wait_until(lambda w: w.kind is not None and w.kind.name == "INAV", 15)
 
 
-def test_the_present_item_is_told_together_with_nav_status() -> None:
+def test_the_present_item_is_reported_together_with_nav_status() -> None:
     board, world, station = introduced()
     home = (453838000, 84733000)
     legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home[0] + 500 * n, home[1], 4.0) for n in (1, 2, 3)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the flight controller's rings must bear: never more reply bytes outstanding than it can hold, stalled or not."""
+"""The limit on pending replies: never more bytes than the flight controller's send ring holds, stalled or not."""
 
 import random
 from itertools import pairwise
@@ -33,7 +33,7 @@ def sent(link: MspLink) -> list[int]:
 
 @pytest.mark.parametrize("stall_ms", [150.0, 300.0])
 def test_a_read_that_meets_the_writing_of_the_configuration(stall_ms: float) -> None:
-    """Mission Planner sets the radius after a Write; a second later the board stalls, and a Read may be under way."""
+    """Mission Planner sets the radius after a Write; a second later the board stalls, and a Read may be in progress."""
     for seed in range(8):
         draw = random.Random(seed)
         options = SimOptions(config_write_ms=stall_ms, config_write_delay_ms=draw.random() * 300)
@@ -69,7 +69,7 @@ def test_all_at_once_at_every_speed(baud: int) -> None:
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("rate", [1e-3, 1e-2])
 def test_lost_bytes_make_no_ring_overflow(rate: float, extension: bool) -> None:
-    """Cut frames, repeats, and the filling up of a parser that has no time-out."""
+    """Cut frames, repeats, and the filling up of a parser that has no timeout."""
     for seed in range(4):
         world = World(SimOptions(seed=seed), Faults(lost_byte_rate=rate, extension=extension), speeds=(115200,))
         world.run(20)
@@ -84,7 +84,7 @@ def test_lost_bytes_make_no_ring_overflow(rate: float, extension: bool) -> None:
 def test_a_board_that_stands_still_answers_no_more_than_its_ring_holds(
     hang_s: float, baud: int, extension: bool
 ) -> None:
-    """It answers all at once when it goes on: what was asked before, the repeats, and the search that has begun."""
+    """When it resumes it answers at once: earlier requests, repeats, and the probes of the search that has begun."""
     for seed in range(2):
         draw = random.Random(seed)
         world = World(SimOptions(baud=baud, seed=seed), Faults(extension=extension))
@@ -130,7 +130,7 @@ def test_no_more_goes_out_than_may_come_back() -> None:
     assert sent(link) == [195]
 
 
-def test_what_timed_out_counts_until_its_answer_cannot_come_any_more() -> None:
+def test_what_timed_out_counts_until_its_answer_cannot_come_any_longer() -> None:
     link = MspLink(115200, 0.0)
     link.receiver_timeout_s = 0.05
     link.send(question(195, 99), 0.0)
@@ -187,7 +187,7 @@ def test_an_answer_tells_that_what_was_asked_before_is_over() -> None:
     assert link.requests_lost == 2
 
 
-def test_nothing_is_sent_beside_an_exclusive_request() -> None:
+def test_nothing_is_sent_alongside_an_exclusive_request() -> None:
     link = MspLink(115200, 0.0)
     link.send(question(191, 7, exclusive=True), 0.0)
     link.send(question(101, 11), 0.0)

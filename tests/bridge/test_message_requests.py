@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each ground station gets what it asked for, as often as it asked, and nobody else is the worse for it."""
+"""Each ground station gets the messages and rates it requested, without effect on the others."""
 
 import math
 
@@ -89,7 +89,7 @@ def test_mission_planner_gets_just_what_it_asks_for(world: World) -> None:
     assert of_other["ATTITUDE"] == pytest.approx(25, rel=0.05)
     assert of_other["GPS_RAW_INT"] == pytest.approx(5, rel=0.05)
     assert "RAW_IMU" not in of_other
-    # Somebody else's wish brings nobody more than a quarter of an interval too early.
+    # Another station's request makes messages at most a quarter of an interval early.
     assert of_planner["ATTITUDE"] <= 4.1
 
 
@@ -108,7 +108,7 @@ def test_all_streams_at_once_as_mavproxy_asks(world: World) -> None:
     assert set(rates_hz(station)) - {"HEARTBEAT", "HOME_POSITION"} == {"ATTITUDE"}
 
 
-def test_alone_it_sets_the_pace_of_the_polls_and_going_it_takes_its_wishes_along(world: World) -> None:
+def test_a_stations_requests_set_the_poll_rates_until_it_leaves(world: World) -> None:
     station = station_of(world, "gcs")
     assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(25, rel=0.05)
     assert ask(station, 511, ATTITUDE, 200_000) == ACCEPTED
@@ -116,7 +116,7 @@ def test_alone_it_sets_the_pace_of_the_polls_and_going_it_takes_its_wishes_along
     assert ask(station, 511, ATTITUDE, 20_000) == ACCEPTED
     assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(50, rel=0.05)
     world.run(EXPIRY_S + 2)
-    # Nobody is there: the bridge itself needs to know it once a second.
+    # No one is there: the bridge itself needs to know it once a second.
     assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(1, rel=0.15)
     back = station_of(world, "gcs")
     assert rates_hz(back)["ATTITUDE"] == pytest.approx(25, rel=0.05)
@@ -130,7 +130,7 @@ def test_one_message_at_an_interval(world: World) -> None:
         assert rates_hz(station).get("ATTITUDE", 0) == pytest.approx(expected_hz, rel=0.05)
 
 
-def test_what_is_not_there_cannot_be_had(world: World) -> None:
+def test_unknown_messages_cannot_be_requested(world: World) -> None:
     station = station_of(world, "gcs")
     for msgid in (271, 0, 30_000, -1, math.nan, math.inf):
         assert ask(station, 511, msgid, 100_000) == UNSUPPORTED
@@ -148,7 +148,7 @@ def interval_us(station: GroundStation, msgid: int) -> int:
     return found
 
 
-def test_the_interval_that_is_told_is_the_one_that_is_kept(world: World) -> None:
+def test_the_interval_that_is_reported_is_the_one_that_is_kept(world: World) -> None:
     station = station_of(world, "gcs")
     assert interval_us(station, ATTITUDE) == 40_000
     assert interval_us(station, m.MAVLINK_MSG_ID_HEARTBEAT) == 1_000_000
@@ -162,7 +162,7 @@ def test_the_interval_that_is_told_is_the_one_that_is_kept(world: World) -> None
     assert interval_us(station, ATTITUDE) == 2**31 - 1
 
 
-def test_no_wish_takes_more_than_the_line_has(world: World) -> None:
+def test_no_request_takes_more_than_the_line_has(world: World) -> None:
     stations = [station_of(world, f"gcs{number}") for number in range(3)]
     for station in stations:
         for row in TELEMETRY:
@@ -183,7 +183,7 @@ def test_each_message_can_be_asked_for_once(world: World, row: Row) -> None:
     station = station_of(world, "gcs")
     world.run(4)
     if msgid == RAW_IMU:
-        # Nobody wanted to hear of it, so it is not polled.
+        # No one wanted to hear of it, so it is not polled.
         assert ask(station, 512, msgid) == TEMPORARILY_REJECTED
         ask(station, 511, msgid, 100_000)
         world.run(0.5)
@@ -202,7 +202,7 @@ def test_before_a_flight_controller_is_there_nothing_is_known() -> None:
     assert set(rates_hz(station, 5)) == {"HEARTBEAT", "MISSION_CURRENT"}
 
 
-def test_wishes_that_are_made_before_it_is_there_count_then() -> None:
+def test_requests_that_are_made_before_it_is_there_count_then() -> None:
     world = World(speeds=(115200,), powered=False)
     station = station_of(world, "gcs")
     assert ask(station, 511, ATTITUDE, 100_000) == ACCEPTED
@@ -211,7 +211,7 @@ def test_wishes_that_are_made_before_it_is_there_count_then() -> None:
     assert rates_hz(station)["ATTITUDE"] == pytest.approx(10, rel=0.05)
 
 
-def test_the_modes_are_listed_and_the_present_one_is_told(world: World) -> None:
+def test_the_modes_are_listed_and_the_present_one_is_reported(world: World) -> None:
     station, old = station_of(world, "gcs"), GroundStation(world, "old", version=1)
     beat(old)
     world.run(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flight controllers that answer anything at all: every conversation ends, nothing raises, nothing is believed."""
+"""Flight controllers with arbitrary replies: every conversation ends, nothing raises, nothing false is accepted."""
 
 import random
 
@@ -68,7 +68,7 @@ class Odd(QuietLine):
 
 
 class Stubborn(Odd):
-    """Answers every CHUNK, COMMIT or READ in the same way, for ever."""
+    """Answers every CHUNK, COMMIT or READ in the same way, forever."""
 
     def __init__(self, answers: dict[int, bytes], info: Info = INFO) -> None:
         super().__init__(info=info)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An autopilot that speaks MAVLink for itself: frames pass both ways as they came, each to whom it is for."""
+"""Pass-through of an autopilot that speaks MAVLink itself: frames go to their targets unchanged, both ways."""
 
 import random
 from collections.abc import Iterable
@@ -93,7 +93,7 @@ def test_everyone_gets_everything_as_it_was_sent(version: int, signed: bool) -> 
         assert station.frames_heard == autopilot.sent
 
 
-def test_nothing_of_our_own_is_said_where_the_autopilot_speaks() -> None:
+def test_the_bridge_sends_no_messages_of_its_own() -> None:
     world, autopilot, (station, _) = passing()
     world.run(20)
     assert station.frames_heard == autopilot.sent
@@ -116,12 +116,12 @@ def test_what_ground_stations_send_arrives_as_it_was_sent() -> None:
         sent += frame
     world.run(0.1)
     assert bytes(autopilot.received) == sent
-    # The others hear what is for everyone, and nobody hears himself.
+    # The others get broadcasts, and no sender its own frame.
     assert [message.get_type() for message in other.said()] == ["PARAM_REQUEST_LIST", "HEARTBEAT"]
     assert one.said() == []
 
 
-def test_what_is_for_one_ground_station_goes_only_there() -> None:
+def test_an_addressed_frame_goes_only_to_its_target() -> None:
     world, autopilot, (one, other) = passing()
     autopilot.say(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
     autopilot.say(mavlink.MAVLink_mission_ack_message(254, 0, 0, 0))
@@ -140,7 +140,7 @@ def test_ground_stations_reach_each_other() -> None:
     assert bytes(autopilot.received) == b""
 
 
-def test_who_fell_silent_gets_nothing_any_more() -> None:
+def test_a_silent_station_gets_no_more_frames() -> None:
     world, _autopilot, (one, other) = passing()
 
     def speak() -> None:
@@ -193,8 +193,8 @@ def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
     assert len(intact) - len(passed) <= 2
 
 
-def test_an_autopilot_that_is_gone_is_not_played() -> None:
-    """Its silence is the truth: a heartbeat of ours would be a vehicle that is not there."""
+def test_the_bridge_does_not_stand_in_for_a_lost_autopilot() -> None:
+    """A heartbeat of ours would show a vehicle that is gone."""
     world, _autopilot, (station, _) = passing()
     is_passing = world.bridge.is_passing_through
     assert is_passing
@@ -242,7 +242,7 @@ def test_a_companion_of_the_autopilots_own_system_is_heard_and_echoes_are_not() 
     assert bytes(autopilot.received) == b""
 
 
-def test_who_speaks_as_everybody_takes_no_frames_from_those_who_are() -> None:
+def test_a_sender_with_all_ids_takes_no_frames_from_others() -> None:
     """Sixty thousand made-up numbers from one address: it is sent no more than its share, and others are heard."""
     world, autopilot, (one, _) = passing()
     liar = GroundStation(world, "liar", sysid=99)

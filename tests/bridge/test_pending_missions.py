@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission of which it is not known whether it arrived: the board is asked when it is back, and the pilot hears it."""
+"""A mission with an unknown outcome: the board is asked when it is back, and the pilot is told."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The schedule alone: questions that are refused, never answered or lost, and what the line leaves of any wishes."""
+"""The poll schedule: refused, unanswered and lost requests, and the line's limits on requested rates."""
 
 import random
 from collections import Counter
@@ -139,7 +139,7 @@ def test_over_a_slow_line_a_question_waits_for_its_answer(delay_s: float) -> Non
     turn_s=st.sampled_from([0.0, 0.01]),
 )
 @settings(max_examples=60, deadline=None)
-def test_any_wishes_fit_the_line_and_the_board(
+def test_any_requests_fit_the_line_and_the_board(
     wishes: Mapping[Msp, float], baud: int | None, beside_missions: bool, turn_s: float
 ) -> None:
     line = Line(baud, turn_s=turn_s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a port shows of itself before anything is sent there: GPS receivers and radios are told from the rest."""
+"""Recognising GPS receivers and radios on a port before anything is sent there."""
 
 import pytest
 from hypothesis import given
@@ -38,7 +38,7 @@ def ubx(payload: bytes) -> bytes:
     ],
 )
 @pytest.mark.parametrize("size", [1, 7, 1000])
-def test_what_is_no_flight_controller_is_named(sent: bytes, named: str, size: int) -> None:
+def test_other_devices_are_named(sent: bytes, named: str, size: int) -> None:
     watch = OtherDeviceWatch()
     data = b"\x00\xff" + sent + sent
     for start in range(0, len(data), size):

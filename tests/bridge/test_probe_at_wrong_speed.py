@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a flight controller at another speed makes of our probes: none of the runs on which Harakiri acts.
+"""Probes received at another speed never contain one of the runs on which Harakiri acts.
 
 `garble` samples the waveform of 8N1 bytes as the receiver does. The receiver's clock may be off by 2 %; a probe may
-follow another at once or after a pause, from one speed or another, for ever. Harakiri counts across frames, so what
+follow another at once or after a pause, from one speed or another, forever. Harakiri counts across frames, so what
 matters is each byte sequence by itself and what any sequence can begin and end with.
 """
 
@@ -53,7 +53,7 @@ def test_no_run_within_a_probe(read: int) -> None:
 def test_no_run_at_the_border_of_any_two_or_more_probes(read: int) -> None:
     """A run over a border needs a probe that ends in a hazard byte and one that begins with it, or is nothing else.
 
-    There are none, so probes may follow each other in any order for ever.
+    There are none, so probes may follow each other in any order forever.
     """
     for clock in CLOCKS:
         words = {heard(frame, sent, read, clock) for sent in SENT for frame in (PROBE, RESYNC)} - {b""}

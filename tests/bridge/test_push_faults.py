@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A push under every fault: the flight controller has the new list and said so, or it has the old one, whole.
+"""A push under every fault: the flight controller has the new list, and confirmed it, or the whole old one.
 
-Only a push whose COMMIT was under way may end with "read the mission back". Afterwards the line always works.
+Only a push whose COMMIT was in progress may end with "read the mission back". Afterwards the line always works.
 """
 
 import random
@@ -44,7 +44,7 @@ def commands_sent(world: World) -> list[int]:
 
 
 def push_under(inject: Injection, seed: int, options: SimOptions | None = None) -> tuple[str, World]:
-    """Push the new list while faults come; return what it came to. The promise is checked here."""
+    """Push the new list during faults; return the result, after checking that it is true."""
     world = holding_the_old_list(seed, options)
     world.written.clear()
     inject(world, random.Random(seed))
@@ -124,7 +124,7 @@ def test_many_bit_errors_are_recovered() -> None:
     assert outcomes(setting(bit_error_rate=5e-4), 15) == {"ACCEPTED": 15}
 
 
-def test_a_list_that_is_written_again_goes_on_where_it_ended() -> None:
+def test_a_list_that_is_written_again_continues_where_it_ended() -> None:
     for seed in range(10):
         world = holding_the_old_list(seed)
         world.faults.bit_error_rate = 1e-3
@@ -311,7 +311,7 @@ def test_a_cleared_list_is_cleared_once() -> None:
     assert world.naze.counters.flash_writes == 2
 
 
-def test_telemetry_goes_on_beside_a_push_and_the_bounds_hold() -> None:
+def test_telemetry_continues_alongside_a_push_and_the_bounds_hold() -> None:
     """Arming must be noticed while a list is on its way; the polls and the chunks share the board's ring."""
     world = holding_the_old_list(0)
     outcome = world.push(NEW)

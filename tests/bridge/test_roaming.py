@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station whose address changes under way (Wi-Fi roaming): the same ids from elsewhere, and silence there."""
+"""A ground station whose address changes (Wi-Fi roaming): the same ids at a new address, silence at the old one."""
 
 import random
 
@@ -52,7 +52,7 @@ class Roamer:
         return self.present[0]
 
     def move(self, upload: Upload | None = None, *, speaks: bool = True) -> GroundStation:
-        """Be elsewhere; an upload goes on there."""
+        """Be elsewhere; an upload continues there."""
         left = self.present[:]
         self._number += 1
         station = GroundStation(self.world, f"roams {self._number}", air=WIFI)
@@ -116,7 +116,7 @@ def test_two_with_the_same_ids_are_two() -> None:
     assert world.events("gcs.silent") == []
 
 
-def test_one_that_falls_silent_beside_others_is_kept_for_a_minute() -> None:
+def test_one_that_falls_silent_alongside_others_is_kept_for_a_minute() -> None:
     world = start()
     station, other = GroundStation(world), GroundStation(world, "other", sysid=250)
     station.send(heartbeat())
@@ -142,7 +142,7 @@ def test_behind_a_router_all_must_have_moved() -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_an_upload_goes_on_from_elsewhere(seed: int) -> None:
+def test_an_upload_continues_from_elsewhere(seed: int) -> None:
     """Moved at any moment, once or twice; while the list is written, and behind the last item, too."""
     chance = random.Random(seed)
     world = start()
@@ -166,7 +166,7 @@ def test_one_that_answers_and_never_repeats_is_asked_where_it_is() -> None:
     assert world.stored == records_of(PLAN)
 
 
-def test_a_list_begun_anew_from_elsewhere_is_the_one_that_counts() -> None:
+def test_a_list_started_again_from_elsewhere_is_the_one_that_counts() -> None:
     for count in (40, 30):
         world = start()
         roamer = Roamer(world)
@@ -180,7 +180,7 @@ def test_a_list_begun_anew_from_elsewhere_is_the_one_that_counts() -> None:
         assert world.stored == records_of(plan)
 
 
-def test_the_end_of_an_upload_is_told_where_it_is_now() -> None:
+def test_the_end_of_an_upload_is_reported_where_it_is_now() -> None:
     world = start()
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN)
@@ -213,7 +213,7 @@ def test_a_second_one_with_the_same_ids_gets_into_no_upload() -> None:
 
 
 def test_one_that_was_refused_is_not_taken_for_one_that_moved() -> None:
-    """Mission Planner takes a refusal of its COUNT for "go on", and sends its items; the first is silent by then."""
+    """Mission Planner takes a refusal of its COUNT for "continue", and sends its items; the first is silent by then."""
     world = start()
     first = GroundStation(world, "first", air=WIFI)
     upload = Upload(first, PLAN, repeat_s=100)
@@ -232,7 +232,7 @@ def test_one_that_was_refused_is_not_taken_for_one_that_moved() -> None:
     assert world.stored == ()
 
 
-def test_a_download_goes_on_from_elsewhere() -> None:
+def test_a_download_continues_from_elsewhere() -> None:
     world = start()
     roamer = Roamer(world)
     assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole flight in each protocol: every value on a ground station's screen is the craft's, and none is old."""
+"""A whole flight in each protocol: every value on a ground station's screen is true and current."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground stations that come and go: who is spoken to, in which MAVLink version, and for how long."""
+"""Ground stations that come and go: which get messages, in which MAVLink version, and for how long."""
 
 import random
 
@@ -50,11 +50,11 @@ def test_each_is_answered_in_its_own_version(version: int) -> None:
     world.run(2.5)
     assert versions(station, heartbeats=False) == {version}
     assert versions(other, heartbeats=False) == {3 - version}
-    # Who speaks MAVLink 1 sees the vehicle in MAVLink 2 as well: Mission Planner changes over when it does.
+    # A MAVLink 1 station also gets heartbeats in MAVLink 2, so that Mission Planner switches.
     assert versions(station) == ({1, 2} if version == 1 else {2})
 
 
-def test_who_changes_over_to_mavlink_2_is_answered_in_it() -> None:
+def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
     world = start()
     station = GroundStation(world, version=1)
     station.send(gcs_heartbeat())
@@ -71,7 +71,7 @@ def test_who_changes_over_to_mavlink_2_is_answered_in_it() -> None:
 
 
 def test_a_newcomer_gets_heartbeats_faster_for_three_seconds() -> None:
-    """Mission Planner needs two of them before it goes on connecting."""
+    """Mission Planner needs two of them before it continues connecting."""
     world = start()
     old, new = GroundStation(world, "old"), GroundStation(world, "new", sysid=254)
     old.send(gcs_heartbeat())
@@ -117,7 +117,7 @@ def test_the_heartbeat_tells_whether_a_flight_controller_is_there_and_armed() ->
     assert station.texts() == ["Found Harakiri with the mission extension"]
 
 
-def test_who_is_silent_for_a_minute_is_not_spoken_to_any_more() -> None:
+def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:
     world = start()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
@@ -133,7 +133,7 @@ def test_who_is_silent_for_a_minute_is_not_spoken_to_any_more() -> None:
     assert station.said("HEARTBEAT")
 
 
-def test_who_keeps_speaking_stays() -> None:
+def test_an_active_station_is_kept() -> None:
     world = start()
     station = GroundStation(world)
     for second in range(0, 200, 20):
@@ -143,7 +143,7 @@ def test_who_keeps_speaking_stays() -> None:
     assert world.events("gcs.silent") == []
 
 
-def test_a_default_peer_is_spoken_to_unasked_and_for_ever_in_both_versions() -> None:
+def test_a_default_peer_is_spoken_to_unasked_and_forever_in_both_versions() -> None:
     world = start()
     station = GroundStation(world, "fixed")
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
@@ -161,7 +161,7 @@ def test_a_default_peer_is_spoken_to_unasked_and_for_ever_in_both_versions() -> 
     assert station.heard == []
 
 
-def test_a_broadcast_address_is_spoken_to_until_somebody_answers() -> None:
+def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
     world = start()
     everyone = GroundStation(world, "broadcast")
     world.bridge.ground.add_default_peer(everyone.peer, until_answered=True)
@@ -221,7 +221,7 @@ def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
     assert len(station.said("COMMAND_ACK")) == 1
     world.spoken_by(station, data[:9], datagram=False)
     world.bridge.gcs_gone(station.peer, world.now)
-    # A new connection from the same address begins anew.
+    # A new connection from the same address starts again.
     world.spoken_by(station, data, datagram=False)
     world.run(0.01)
     assert len(station.said("COMMAND_ACK")) == 2
@@ -240,7 +240,7 @@ def test_a_datagram_with_a_cut_frame_does_not_spoil_the_next() -> None:
     assert len(station.said("COMMAND_ACK")) == 3
 
 
-def test_our_own_frames_that_come_back_are_nobody() -> None:
+def test_our_own_frames_are_not_a_station() -> None:
     world = start()
     station = GroundStation(world)
     station.send(gcs_heartbeat())

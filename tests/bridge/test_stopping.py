@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge is stopped while a mission is on its way: it arrives, or the old list stays; who sent it hears which."""
+"""A stop during a mission transfer: the mission arrives or the old list stays, and its sender is told which."""
 
 import random
 
@@ -107,7 +107,7 @@ def test_an_upload_whose_items_are_still_coming_is_cancelled_and_kept(world: Wor
     assert world.stored == records_of(OLD)
 
 
-def test_no_transfer_is_begun_any_more(world: World) -> None:
+def test_no_transfer_is_started_any_longer(world: World) -> None:
     station = GroundStation(world)
     stop(world)
     station.send(count_message(5))

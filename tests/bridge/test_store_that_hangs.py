@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A dying SD card answers after minutes or never: the craft is still shown, and still takes its mission."""
+"""With an SD card that answers after minutes or never, telemetry and mission uploads still work."""
 
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionResult
@@ -25,7 +25,7 @@ def test_a_mission_gets_there_while_mission_planner_still_waits() -> None:
     assert "The mission could not be stored on the Pi" in station.texts()
 
 
-def test_what_hangs_after_the_push_keeps_no_answer_back() -> None:
+def test_a_disk_that_hangs_after_the_push_does_not_delay_the_ack() -> None:
     world, station = holding()
     upload = Upload(station, waypoints(20))
     world.wait_until(lambda w: bool(w.store.missions), 10)
@@ -35,7 +35,7 @@ def test_what_hangs_after_the_push_keeps_no_answer_back() -> None:
     assert world.store.outcomes() == [None]
 
 
-def test_the_flight_controller_is_found_and_read_all_the_same() -> None:
+def test_the_flight_controller_is_found_and_read_anyway() -> None:
     world = World(speeds=(115200,), flash=flash_holding(records_of(waypoints(5))))
     world.store.delay_s = NEVER
     world.wait_ready(8)
@@ -45,8 +45,8 @@ def test_the_flight_controller_is_found_and_read_all_the_same() -> None:
     assert len(Download(GroundStation(world)).run(10)) == 5
 
 
-def test_a_late_answer_is_nobody_elses() -> None:
-    """The card goes on after 10 s: what it says of one mission is not taken for another's."""
+def test_a_late_answer_of_the_store_is_dropped() -> None:
+    """The card continues after 10 s: what it says of one mission is not taken for another's."""
     world, station = holding()
     world.store.delay_s = 10.0
     assert Upload(station, waypoints(6, 1)).run(8) is MissionResult.ACCEPTED

@@ -81,7 +81,7 @@ def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> Non
         assert station.said("HEARTBEAT")[-1].base_mode & 128
         warnings = [text for text in station.texts() if "FrSky" in text]
         assert len(warnings) == (board is DeafWhileArmed)
-        # Of what is no longer heard nothing stays on the screen as if it were new.
+        # No value that is no longer received is shown as current.
         status = station.said("SYS_STATUS")[-1]
         gps_health = status.onboard_control_sensors_health & messages.MAV_SYS_STATUS_SENSOR_GPS
         assert (gps_health == 0) == (board is DeafWhileArmed)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MSP polls become a living MAVLink vehicle: what is sent is what the craft does, and the line bears it."""
+"""Telemetry from MSP polls: the messages match the craft's state, and the line's limits are kept."""
 
 import math
 import random
@@ -139,7 +139,7 @@ def test_the_sticks_are_in_arducopters_order() -> None:
     assert (raw.port, raw.chan3_raw, raw.chan4_raw, raw.rssi) == (0, 1450, 1500, channels.rssi)
 
 
-def test_what_has_no_place_has_a_name() -> None:
+def test_values_without_a_mavlink_field_are_named_values() -> None:
     _, station = flown(20)
     named = {message.name: message.value for message in station.said("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
     assert (named["cycle_us"], named["i2c_err"]) == (3000, 0)
@@ -184,7 +184,7 @@ def test_the_switches_make_the_mode(boxes: int, custom_mode: int, stabilized: bo
 
 
 @pytest.mark.parametrize(("switch", "position"), [("armed", False), ("boxes", 5)])
-def test_arming_and_modes_are_told_at_once(switch: str, position: int) -> None:
+def test_arming_and_modes_are_reported_at_once(switch: str, position: int) -> None:
     world, station = flown(5.2)
     station.take()
     setattr(world.faults, switch, position)
@@ -233,7 +233,7 @@ def test_telemetry_takes_its_share_of_the_line_and_no_more(baud: int) -> None:
     (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
     (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 0.9, 0.25, 0.7),
 ])  # fmt: skip
-def test_the_rates_without_a_wish(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
+def test_the_rates_without_a_request(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
     world, station = flown(5, baud=baud)
     station.take()
     world.written.clear()
@@ -298,7 +298,7 @@ def test_a_slow_round_trip_slows_what_is_fast() -> None:
 
 
 @pytest.mark.parametrize("baud", [19200, 9600])
-def test_telemetry_goes_on_beside_a_mission(baud: int) -> None:
+def test_telemetry_continues_alongside_a_mission(baud: int) -> None:
     """A STATUS that is due waits for the next one's time, and then for a long CHUNK."""
     world = World(SimOptions(baud=baud), speeds=(baud,))
     world.wait_ready(30)
@@ -349,7 +349,7 @@ def test_on_a_slow_line_messages_of_several_readings_come_as_often_as_their_poll
     assert fixes >= 40 / 5 - 2
     for name in ("GLOBAL_POSITION_INT", "VFR_HUD"):
         assert fixes - 2 <= len(station.said(name)) <= fixes + 2, name
-    # What it no longer hears is unknown all the same, as soon as the loss is noticed.
+    # What it no longer hears is unknown anyway, as soon as the loss is noticed.
     world.faults.hang = True
     beat(station)
     world.run(12)

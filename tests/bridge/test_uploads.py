@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing a mission, row by row of docs/mission-rules.md: "Before the first item" and "While items come in"."""
+"""Writing a mission, row by row of docs/mission-rules.md: "Before the first item" and "While items arrive"."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -67,7 +67,7 @@ def partial_list_message() -> Message:
 
 
 def assert_refusal_stands(world: World, station: GroundStation, result: MissionResult) -> None:
-    """Mission Planner goes on after any ack to its count: what it sends then is answered by the same refusal."""
+    """Mission Planner continues after any ack to its count: what it sends then is answered by the same refusal."""
     for seq in (0, 1, 0, 999):
         station.take()
         station.send(item_message(seq, OLD[1]))
@@ -523,7 +523,7 @@ def test_items_of_an_upload_that_a_killed_daemon_knew_of_are_answered_at_once() 
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
-def test_write_fast_that_lost_items_is_told_as_an_error_and_more_than_once() -> None:
+def test_write_fast_that_lost_items_is_reported_as_an_error_and_more_than_once() -> None:
     """It closes with success: its own MISSION_ACK says that it has ended."""
     world, station = holding()
     other = GroundStation(world, "other", sysid=254)
@@ -670,7 +670,7 @@ def test_a_copy_that_the_network_made_is_not_answered_with_a_copy() -> None:
     assert len(requested(station)) <= 1.4 * len(items)
 
 
-def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_goes_on() -> None:
+def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continues() -> None:
     world, station = holding()
     items = waypoints(8)
     receiving(world, station, items, 3)
@@ -698,7 +698,7 @@ def test_silence_repeats_the_request_and_ends_the_transfer_after_five_seconds(se
     assert set(requested(station)) == {sent}
     assert times[0] == pytest.approx(0.25, abs=0.05)
     assert 4 <= len(times) <= 8
-    # Rarer and rarer.
+    # With growing intervals.
     gaps = [later - earlier for earlier, later in pairwise(times)]
     assert gaps == sorted(gaps)
     assert world.stored == OLD_RECORDS
@@ -721,7 +721,7 @@ def test_the_waiting_adapts_to_the_round_trip(round_trip_s: float, copies: int) 
 
 
 @pytest.mark.parametrize("round_trip_s", [0.3, 0.6, 1.0])
-def test_a_request_that_was_repeated_in_vain_teaches_patience(round_trip_s: float) -> None:
+def test_needless_repeats_lengthen_the_timeout(round_trip_s: float) -> None:
     """A ground station that answers each request once: only the first one is asked for too early."""
     world, station = holding()
     station.air = Air(delay_s=round_trip_s / 2)

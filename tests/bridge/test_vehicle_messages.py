@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is not known is MAVLink's "unknown", and never 0; and what other firmware than Harakiri sends is understood."""
+"""Unknown values are sent as MAVLink's "unknown", never as 0; other firmware's replies are understood."""
 
 import math
 import struct
@@ -31,7 +31,7 @@ U16, U8 = 65535, 255
 
 
 def at(vehicle: Vehicle, boot_ms: int = 0) -> make.Moment:
-    """The moment at which everything was heard."""
+    """The time at which everything was received."""
     return make.Moment(vehicle, 0.0, boot_ms)
 
 
@@ -64,13 +64,13 @@ def fields(message: Any) -> dict[str, Any]:
     return {name: getattr(message, name) for name in message.fieldnames}
 
 
-def test_of_nothing_nothing_is_made() -> None:
+def test_without_readings_no_message_is_made() -> None:
     for row in TELEMETRY:
         for maker in row.makers:
             assert maker(at(Vehicle())) is None
 
 
-def test_an_error_or_a_short_reply_teaches_nothing() -> None:
+def test_errors_and_short_replies_change_nothing() -> None:
     state = Vehicle()
     for poll in Msp:
         hear_msp(state, MspFrame(Direction.ERROR, poll, bytes(40)), HARAKIRI, 0.0)
@@ -130,7 +130,7 @@ def test_without_a_barometer_there_is_no_height() -> None:
     assert make.global_position_int(at(state)) is None
     told(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
     assert math.isnan(made(make.vfr_hud(at(state))).climb)
-    # A board that makes one of its GPS has a height all the same.
+    # A board that makes one of its GPS has a height anyway.
     told(state, BETAFLIGHT, ALTITUDE=struct.pack("<ih", 20, 0))
     assert made(make.global_position_int(at(state))).relative_alt == 200
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of the vehicle, in groups: the same whichever protocol the flight controller speaks."""
+"""The vehicle's published groups: the same for every protocol of the flight controller."""
 
 import json
 import math
@@ -35,7 +35,7 @@ def heard(station: GroundStation, kind: str) -> Any:
     return station.said(kind)[-1]
 
 
-def test_groups_say_what_ground_stations_are_told() -> None:
+def test_groups_say_what_ground_stations_are_reported() -> None:
     world = World()
     station = GroundStation(world)
     station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
@@ -129,7 +129,7 @@ def test_an_autopilot_of_its_own_is_read_too() -> None:
     assert report.group(Group.LINK).state == "MAVLink"
 
 
-def test_an_armed_harakiri_goes_on_in_mavlink() -> None:
+def test_an_armed_harakiri_continues_in_mavlink() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.wait_ready()
     world.run(2.0)
@@ -165,7 +165,7 @@ def test_no_content_of_a_frame_is_too_odd(data: st.DataObject) -> None:
         assert json.dumps(asdict(found), allow_nan=False)
 
 
-def test_autopilots_are_told_apart_by_version_2_and_1() -> None:
+def test_autopilots_are_reported_apart_by_version_2_and_1() -> None:
     world, autopilot, _ = passing(Autopilot(version=1))
     autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.say(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))

@@ -117,7 +117,7 @@ def test_wrong_use_is_refused(option: list[str]) -> None:
     assert run(*option).exit_code == 2
 
 
-def test_a_person_sees_sent_beside_stored_and_why() -> None:
+def test_a_person_sees_sent_alongside_stored_and_why() -> None:
     output = run(FIELD).stdout
     for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
         assert words in output

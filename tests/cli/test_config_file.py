@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The configuration file: what is taken, and what is said of what cannot be."""
+"""The configuration file: accepted settings, and messages about errors."""
 
 from pathlib import Path
 
@@ -48,7 +48,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_told_with_the_file(tmp_path: Path, name: str) -> None:
+def test_what_is_wrong_is_reported_with_the_file(tmp_path: Path, name: str) -> None:
     text, words = WRONG[name]
     config = tmp_path / "naze.toml"
     config.write_bytes(text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge demo`: the first thing that anybody sees of it."""
+"""`naze-bridge demo`."""
 
 import os
 import shutil

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands that talk to a flight controller themselves, with `--fc`; and what goes wrong outside of naze-bridge."""
+"""Commands that talk to a flight controller directly (`--fc`), and faults outside naze-bridge."""
 
 import json
 import os
@@ -113,7 +113,7 @@ def test_a_full_disk_behind_the_log_stops_nothing(tmp_path: Path) -> None:
     assert (ended.returncode, ended.stdout) == (0, "goes on\n")
 
 
-def test_a_reader_who_has_seen_enough() -> None:
+def test_a_closed_pipe() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     ended = run_naze_bridge("check", EXAMPLES / "long-146.waypoints", stdout=writing)

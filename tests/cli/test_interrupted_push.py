@@ -97,7 +97,7 @@ def interrupted_push(start: Starter) -> tuple[Board, Terminal]:
     return board, terminal
 
 
-def test_a_daemon_goes_on_and_its_result_follows(start: Starter) -> None:
+def test_a_daemon_continues_and_its_result_follows(start: Starter) -> None:
     board, terminal = interrupted_push(start)
     terminal.wait_for("naze-bridge: the daemon continues with the mission")
     assert terminal.end() == 0

@@ -84,7 +84,7 @@ def test_a_mission_there_and_back(daemon: Daemon, tmp_path: Path) -> None:
     assert ask(daemon, "clear").stdout == "ACCEPTED: The flight controller already held no mission\n"
 
 
-def test_a_refusal_is_told_and_ends_with_1(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_refusal_is_reported_and_ends_with_1(daemon: Daemon, tmp_path: Path) -> None:
     refused = ask(daemon, "push", write_plan(tmp_path / "plan", [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]))
     assert refused.returncode == 1
     assert refused.stdout.splitlines()[-1] == "INVALID: Rejected, WP 1: LAND must be last"
@@ -290,8 +290,8 @@ def test_the_list_of_commands_imports_none_of_them() -> None:
     assert not {"asyncio", "rich", "pymavlink", "structlog"} & set(printed.split())
 
 
-def test_a_daemon_that_belongs_to_somebody_else(daemon: Daemon) -> None:
-    """Nobody may look into root's directory; who is not root is kept out of a directory of his own."""
+def test_another_users_daemon(daemon: Daemon) -> None:
+    """No one may look into root's directory; who is not root is kept out of a directory of his own."""
     as_nobody = (
         "import os; from service.cli.main import main; import service.cli.status, service.settings;"
         "os.geteuid() or os.setuid(65534); main(prog_name='naze-bridge')"

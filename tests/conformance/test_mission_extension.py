@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/msp-mission.md, held against the firmware's C core and against the simulator's model of it.
+"""docs/msp-mission.md, tested on the firmware's C core and on the simulator's model of it.
 
-The tests in the first half say what the page says, to each of the two. In the second half both get the same long random
-conversations and must answer the same bytes.
+The first half tests each against the page. In the second half both get the same long random conversations and must
+reply with the same bytes.
 """
 
 import struct
@@ -404,7 +404,7 @@ def test_a_power_cut_leaves_the_old_list(fc: Companion, act: Callable[[Companion
 
 LISTS = [mission(count, seed) for count in (0, 1, 3, 15, 16, CAPACITY) for seed in (3, 5)]
 lists = st.sampled_from(LISTS)
-#: Binary fractions of a second, so that the model's float clock meets the time-outs exactly.
+#: Binary fractions of a second, so that the model's float clock meets the timeouts exactly.
 times = st.sampled_from([125, 1000, 2500, 5000, 5125])
 
 
@@ -464,7 +464,7 @@ class SameAnswers(RuleBasedStateMachine):
         self._follow(self.send(chunk_frame(self.next, records)))
 
     def _send_chunk(self, first: int, count: int) -> None:
-        # Past the list's end go records that nobody announced.
+        # Past the list's end go records that no one announced.
         records = (self.records + LISTS[-1])[first : first + count]
         if records:
             self._follow(self.send(chunk_frame(first, pack_records(records))))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faults made on purpose: each is found and named, with what to do about it."""
+"""Doctor finds and names each injected fault, with its remedy."""
 
 import os
 import sqlite3
@@ -74,7 +74,7 @@ def nobody() -> dict[str, object]:
 def test_a_healthy_pi(pi: FaultyMachine, tmp_path: Path) -> None:
     settings = Settings(PORT, GCS, tmp_path / "state")
     found = list(examine(pi, settings, nobody, lambda: STATUS))
-    # Who is not root has no dialout group to give a file to.
+    # Only root can give a file to the group dialout.
     assert {each.check for each in found if each.grade is not Grade.OK} <= {"permission", "flight controller"}
     told = " ".join(each.found for each in found)
     assert "/dev/serial0 is /dev/ttyAMA0" in told

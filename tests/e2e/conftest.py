@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the end-to-end tests start with."""
+"""Fixtures for the end-to-end tests."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -21,7 +21,7 @@ def start(tmp_path: Path) -> Iterator[Starter]:
 
 @pytest.fixture
 def bench(start: Starter) -> Iterator[Bench]:
-    """A bench of one test's own, for tests that break things."""
+    """A bench for one test, for tests that break things."""
     bench = start.bench()
     yield bench
     bench.board.assert_was_treated_well()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Noise, nonsense and strangers on the network and on the UART: nothing comes of them."""
+"""Noise, malformed data and strangers on the network and the UART have no effect."""
 
 import os
 import random
@@ -21,7 +21,7 @@ from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import comes, free_port, until
 
 MEGABYTE = 1 << 20
-#: All that may be sent to somebody unknown: questions, and only whole ones.
+#: The only bytes that may be sent to an unknown device: complete read requests.
 PROBES = b"(%b)+" % b"|".join(re.escape(request(command)) for command in Msp)
 
 
@@ -186,7 +186,7 @@ def test_a_vehicle_with_our_own_numbers_is_not_obeyed(shared: Bench, kept: list[
 
 
 def test_other_vehicles_on_the_net_disturb_nobody(shared: Bench) -> None:
-    """A second vehicle talks to the same port; its own mission traffic is none of ours."""
+    """A second vehicle talks to the same port; its own mission traffic is not ours."""
     planner = shared.mission_planner()
     with udp_station(shared.daemon.address, sysid=7) as vehicle:
         m = messages

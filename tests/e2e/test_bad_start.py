@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a person gets wrong when starting the daemon, and what the machine has wrong: one clear sentence each."""
+"""Wrong options and machine problems at the daemon's start: one clear sentence each."""
 
 import json
 import os
@@ -111,7 +111,7 @@ def test_the_plain_simulator_takes_a_mission(start: Starter) -> None:
 
 
 def complaint(start: Starter, path: Path) -> str:
-    """What a daemon says of its port; it stays up."""
+    """The daemon's message about its port; it keeps running."""
     daemon = start.daemon(str(path))
     event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
     assert daemon.is_alive
@@ -135,7 +135,7 @@ def test_a_port_that_is_missing_is_taken_when_it_appears(start: Starter) -> None
     event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
     assert "is missing: plug the flight controller in" in event["why"]
     with udp_station(daemon.address) as station:
-        # The vehicle is there for a ground station all the same, and says why it takes no mission.
+        # The vehicle is there for a ground station anyway, and says why it takes no mission.
         station.say_hello()
         assert station.upload(plain_plan(12)) == 14
     board = start.board()
@@ -148,7 +148,7 @@ def test_a_port_that_is_missing_is_taken_when_it_appears(start: Starter) -> None
 
 
 @pytest.mark.parametrize("path", ["/dev/null", __file__])
-def test_a_port_that_is_no_port(start: Starter, path: str) -> None:
+def test_a_port_that_is_not_a_port(start: Starter, path: str) -> None:
     assert "is not a serial port" in complaint(start, Path(path))
 
 

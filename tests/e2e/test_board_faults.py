@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller loses power, hangs, garbles, is unplugged, or is another one than hoped; the daemon is killed.
+"""The flight controller loses power, hangs, garbles, is unplugged or is another one; the daemon is killed.
 
-The pilot is told in time, the list that was there is whole, and a second try works.
+The pilot is told in time, the old list is whole, and a second try works.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ OLD, NEW = plain_plan(40), plain_plan(146, start=40)
 
 @pytest.fixture
 def planner(bench: Bench) -> MissionPlanner:
-    """With its own timers: a refusal that comes too late for them is a time-out, which is another error."""
+    """With its own timers: a refusal that comes too late for them is a timeout, which is another error."""
     planner = bench.mission_planner(pace=1.0)
     planner.write(OLD)
     return planner

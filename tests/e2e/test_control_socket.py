@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's control socket: what is wrong with a request is said, and nothing ends the daemon but a signal."""
+"""The daemon's control socket: bad requests get an error, and only a signal ends the daemon."""
 
 import json
 import signal
@@ -85,7 +85,7 @@ def test_a_client_that_hangs_up_before_its_answer_does_no_harm(start: Starter) -
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stop_is_told_to_who_waits(start: Starter, number: signal.Signals) -> None:
+def test_waiting_clients_are_told_of_a_stop(start: Starter, number: signal.Signals) -> None:
     """One client has said nothing yet, another waits for a push to a flight controller that hangs."""
     bench = start.bench()
     daemon = bench.daemon

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the daemon's log tells of its life."""
+"""The daemon's log."""
 
 import asyncio
 import os
@@ -90,7 +90,7 @@ async def test_a_search_that_finds_nobody_says_so_again_and_again(monkeypatch: p
 
 
 async def test_a_fault_in_the_bridge_is_logged_and_the_line_set_up_again(tmp_path: Path) -> None:
-    """An exception on the loop goes to the log, not past it, and telemetry goes on."""
+    """An exception on the loop goes to the log, not past it, and telemetry continues."""
     with capture_logs() as events:
         daemon = Daemon(Settings(SimulatedFc(), state_dir=tmp_path))
         running = asyncio.create_task(daemon.run())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Links that come, go, move and stall under a running daemon: real terminals and real sockets."""
+"""Links that appear, disappear, move and stall while the daemon runs, on real terminals and sockets."""
 
 import os
 import socket
@@ -28,7 +28,7 @@ def has_lost_port(daemon: Daemon, times: int) -> bool:
 
 
 def take_terminals(name: Path) -> list[int]:
-    """Open terminals until the one of that name is among them, or surely somebody else's."""
+    """Open terminals until the one of that name is among them, or surely another program's."""
     taken: list[int] = []
     while len(taken) < 40 and not (taken and os.ttyname(taken[-1]) == str(name)):
         taken += os.openpty()
@@ -75,7 +75,7 @@ def test_it_comes_back_under_another_name_behind_the_same_link(start: Starter, t
     board.assert_was_treated_well()
 
 
-def test_a_reset_is_nothing_that_a_ground_station_loses_its_vehicle_by(bench: Bench) -> None:
+def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> None:
     planner = bench.mission_planner()
     planner.meet()
     planner.write(PLAN)
@@ -94,7 +94,7 @@ def test_a_reset_is_nothing_that_a_ground_station_loses_its_vehicle_by(bench: Be
 # -- ground stations that move -------------------------------------------------------------------------------
 
 
-def test_an_upload_goes_on_from_another_address(bench: Bench) -> None:
+def test_an_upload_continues_from_another_address(bench: Bench) -> None:
     """The same ids from elsewhere: Wi-Fi has given the laptop another address."""
     with udp_station(bench.daemon.address) as there:
         there.announce(len(PLAN))

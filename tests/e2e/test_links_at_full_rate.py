@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An autopilot that speaks MAVLink at 3000 frames/s: all of it arrives, and who does not read costs nobody anything."""
+"""An autopilot that sends 3000 frames/s: all arrive, and a stalled client affects no other."""
 
 import os
 import socket
@@ -138,7 +138,7 @@ def test_nothing_is_lost_at_any_rate_and_a_stalled_client_finds_what_matters(
             reader.assert_frames_are_whole()
         by_tcp, by_datagrams = readers
         assert by_tcp.numbers == list(range(total))
-        # What a busy machine lets nobody read in time is lost at the reader's own socket.
+        # What a busy machine lets no one read in time is lost at the reader's own socket.
         assert by_datagrams.numbers == sorted(set(by_datagrams.numbers))
         assert len(by_datagrams.numbers) > total / 2
         late = Reader(stalled_socket, total - 1)

@@ -360,7 +360,7 @@ def test_a_user_who_goes_away_blocks_nobody(shared: Bench, kept: list[str]) -> N
 
 
 @pytest.mark.parametrize("count", [12, 30])
-def test_a_write_that_is_begun_again_starts_anew(shared: Bench, count: int) -> None:
+def test_a_write_that_is_started_again_starts_again(shared: Bench, count: int) -> None:
     planner = shared.mission_planner()
     planner.write_begun(plain_plan(30, start=100), 9)
     plan = plain_plan(count, start=120)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a running daemon records: telemetry logs, and the flight controller's port, which is then played again."""
+"""A running daemon's recordings: telemetry logs, and the flight controller's port, which is then replayed."""
 
 import os
 import signal
@@ -153,7 +153,7 @@ def test_a_second_start_begins_a_second_log(start: Starter, connect: Connect) ->
         daemon.kill_and_restart()
 
 
-def test_logs_that_cannot_be_written_are_told_once_and_hold_nothing_up(start: Starter, connect: Connect) -> None:
+def test_logs_that_cannot_be_written_are_reported_once_and_hold_nothing_up(start: Starter, connect: Connect) -> None:
     (start.directory / "state").mkdir()
     (start.directory / "state" / "logs").write_text("in the way")
     daemon = start.daemon("sim:")
@@ -225,7 +225,7 @@ def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: St
     listener = connect(daemon)
     until(lambda: listener.has_heard(messages.MAVLINK_MSG_ID_ATTITUDE, 3), "the recorded attitude")
     until(lambda: "The capture has ended" in player.printed, "the end")
-    # It goes on with what it answered last.
+    # It continues with what it answered last.
     daemon.wait()
     assert player.end() == 0
     assert not link.is_symlink()

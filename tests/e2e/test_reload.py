@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""SIGHUP: what is taken over in flight, what needs a restart, and a file that cannot be used."""
+"""SIGHUP: live settings, settings that need a restart, and an invalid file."""
 
 import os
 import signal
@@ -52,7 +52,7 @@ def daemon(start: Starter) -> ConfiguredDaemon:
     return ConfiguredDaemon(start)
 
 
-def test_links_come_and_go_while_the_others_go_on(daemon: ConfiguredDaemon) -> None:
+def test_links_come_and_go_while_the_others_continue(daemon: ConfiguredDaemon) -> None:
     with udp_station(("127.0.0.1", daemon.port)) as first:
         first.say_hello()
         first.wait_for("HEARTBEAT")
@@ -90,7 +90,7 @@ def test_what_needs_a_restart_is_named(daemon: ConfiguredDaemon) -> None:
         assert station.wait_for("HEARTBEAT").get_srcSystem() == 1
 
 
-def test_who_may_write_is_not_changed_in_flight(daemon: ConfiguredDaemon) -> None:
+def test_write_access_is_not_changed_by_a_reload(daemon: ConfiguredDaemon) -> None:
     daemon.write(f'{{address = {daemon.first_link}, writers = []}}, "udpin:127.0.0.1:{daemon.second}"')
     daemon.reload("config.needs_restart")
     assert '"settings": ["gcs"]' in daemon.log

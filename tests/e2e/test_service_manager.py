@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What systemd hears of a daemon, and how soon a daemon ends in the middle of a mission."""
+"""Notifications to systemd, and the time to stop in the middle of a mission."""
 
 import asyncio
 import json
@@ -88,7 +88,7 @@ async def more_food(systemd: Systemd, before: int) -> int:
 
 
 async def test_the_watchdog_is_fed_by_the_loop_that_owns_the_links(systemd: Systemd, tmp_path: Path) -> None:
-    """A loop that hangs feeds it no more, whatever other threads do."""
+    """A hanging loop stops feeding it, whatever other threads do."""
     daemon = Daemon(Settings(parse_fc("sim:"), [parse_gcs(f"udpin:127.0.0.1:{free_port()}")], tmp_path / "state"))
     running = asyncio.create_task(run_until_signal(daemon, Notifier(), lambda: daemon.settings))
     fed = await more_food(systemd, 2)
@@ -180,7 +180,7 @@ def test_a_push_that_would_take_long_is_given_up(start: Starter, trouble: str) -
     connection = push_begun(bench.daemon)
     if trouble == "deaf":
         bench.board.set("hang 10")
-    # Neither is done before 2 s are over: what comes of it shows that nobody waited for that.
+    # Neither is done before 2 s are over: what comes of it shows that no one waited for that.
     assert bench.daemon.end() == 0
     answer = last_answer(connection)["result"]
     assert answer["ack"] == "MAV_MISSION_DENIED"

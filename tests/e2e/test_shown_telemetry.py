@@ -2,7 +2,7 @@
 """What the real MAVSDK, MAVProxy and DroneKit show of a flown circle, beside what the simulated craft really did.
 
 Between a moment on board and the truth that is asked for lie the poll, the ground station's own rate and this process:
-half a second at the most. The craft flies at 2.5 m/s on a circle of 25 m (6 degrees a second), and climbs at 2.5 m/s
+half a second at most. The craft flies at 2.5 m/s on a circle of 25 m (6 degrees a second), and climbs at 2.5 m/s
 at first. Tolerances are what it does meanwhile, and what MSP rounds.
 """
 

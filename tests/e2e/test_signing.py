@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon whose link asks for a key or for an address, and pymavlink as a ground station that signs."""
+"""A daemon whose link requires a key or an address, and pymavlink as a ground station that signs."""
 
 import socket
 import time
@@ -81,7 +81,7 @@ def assert_nowhere_is_the_key(field: Field) -> None:
             assert secret not in content
 
 
-def test_only_who_has_the_key_writes(keyed: Field) -> None:
+def test_only_the_key_allows_writing(keyed: Field) -> None:
     thief, pilot, other = keyed.station(), keyed.station(KEY), keyed.station(key_from_passphrase("guessed"), sysid=251)
     plan = plain_plan(9)
     assert thief.upload(plan) is MissionResult.DENIED
@@ -128,12 +128,12 @@ def test_a_recording_is_worth_nothing_even_after_a_restart(keyed: Field) -> None
         keyed.daemon.process = keyed.daemon._start()
         keyed.daemon.wait()
     assert keyed.board.records() == stored
-    # The pilot goes on where he was, and takes what the new daemon signs.
+    # The pilot continues where he was, and takes what the new daemon signs.
     assert pilot.upload(plain_plan(4)) is MissionResult.ACCEPTED
     assert_nowhere_is_the_key(keyed)
 
 
-def test_only_who_is_on_the_list_writes(start: Starter, stack: ExitStack) -> None:
+def test_only_listed_addresses_may_write(start: Starter, stack: ExitStack) -> None:
     field = Field(start, stack, 'writers = ["127.0.0.2/32"]')
     guest, pilot = field.station(host="127.0.0.1"), field.station(host="127.0.0.2")
     assert guest.upload(plain_plan(3)) is MissionResult.DENIED
@@ -142,7 +142,7 @@ def test_only_who_is_on_the_list_writes(start: Starter, stack: ExitStack) -> Non
     assert field.daemon.has_logged("gcs.open") is None
 
 
-def test_an_open_link_is_told_of_once(start: Starter) -> None:
+def test_an_open_link_is_reported_of_once(start: Starter) -> None:
     board = start.board()
     daemon = start.daemon(str(board.link))
     daemon.wait()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon at full rate through everything that may happen to it, for half a minute; `make soak` does it for longer."""
+"""A daemon at full rate under all kinds of events and attacks, for half a minute; `make soak` runs longer."""
 
 import os
 import random

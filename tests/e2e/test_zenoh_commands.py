@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands over zenoh: the rules, the lock and the reasons are everybody's, and what is wrong is said to who asked."""
+"""Commands over zenoh: the same rules, lock and reasons as elsewhere; errors go to the caller."""
 
 import json
 from collections.abc import Iterator
@@ -57,7 +57,7 @@ def test_an_upload_tells_its_progress_and_its_result(commanded: tuple[Bench, zen
     assert bench.daemon.missions()[0]["source"] == "zenoh upload"
 
 
-def test_who_asks_as_usual_gets_the_result_alone(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_by_default_a_caller_gets_only_the_result(commanded: tuple[Bench, zenoh.Session]) -> None:
     _, opened = commanded
     (answer,) = ask(opened, UPLOAD, mission_file(40, start=50))
     assert answer["result"]["text"] == "Mission verified: 40 records"
@@ -87,7 +87,7 @@ def test_clear_and_restore(commanded: tuple[Bench, zenoh.Session]) -> None:
     assert (current["count"], len(current["items"])) == (9, 9)
 
 
-def test_the_state_and_the_list_of_missions_are_told(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_the_state_and_the_list_of_missions_are_reported(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     ask(opened, UPLOAD, mission_file(9))
     (state,) = ask(opened, "state")
@@ -112,7 +112,7 @@ BAD_PAYLOADS = {
 
 
 @pytest.mark.parametrize("name", BAD_PAYLOADS)
-def test_what_is_no_mission_is_refused_with_a_reason(commanded: tuple[Bench, zenoh.Session], name: str) -> None:
+def test_what_is_not_a_mission_is_refused_with_a_reason(commanded: tuple[Bench, zenoh.Session], name: str) -> None:
     bench, opened = commanded
     before = bench.board.records()
     payload, reason = BAD_PAYLOADS[name]

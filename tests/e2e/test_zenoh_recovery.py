@@ -109,7 +109,7 @@ def _answers_of_a_new_run(opened: zenoh.Session, wanted: str) -> list[Any]:
     ]
 
 
-def test_a_recorder_of_everything_is_no_ground_station(start: Starter) -> None:
+def test_a_recorder_of_everything_is_not_a_ground_station(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]')
     with session(connect=where) as opened:

@@ -51,7 +51,7 @@ def test_the_files_are_up_to_date() -> None:
 
 
 @pytest.mark.parametrize("encoding", ["json", "cbor"])
-def test_all_that_is_said_is_as_published(start: Starter, encoding: str) -> None:
+def test_all_payloads_match_the_published_schemas(start: Starter, encoding: str) -> None:
     """A pilot's day: telemetry, missions that are taken and refused, arming, the other protocol, a cut cable."""
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\nencoding = "{encoding}"\n{I_KNOW}')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon in a fleet where everybody proves who it is, by the examples as they stand: what strangers may do."""
+"""The daemon in a fleet where everyone proves who it is, by the examples unchanged: what strangers may do."""
 
 import datetime
 import json
@@ -70,7 +70,7 @@ def test_the_pilot_commands_and_a_guest_looks(start: Starter, fleet: Fleet) -> N
     bench.board.assert_was_treated_well()
 
 
-def test_a_vehicle_that_may_not_publish_goes_on_flying(start: Starter, fleet: Fleet) -> None:
+def test_a_vehicle_that_may_not_publish_continues_flying(start: Starter, fleet: Fleet) -> None:
     """The router denies it every key: it has another vehicle's name. The ground station notices nothing."""
     bench = secured_bench(start, fleet.config("vehicle", "naze-2"))
     with fleet.open("pilot", "pilot") as pilot:
@@ -148,7 +148,7 @@ def test_settings_that_cannot_be_used_end_the_start_with_a_sentence(tmp_path: Pa
 
 @pytest.mark.parametrize("of", ["zenoh-tls", "zenoh-password"])
 def test_the_examples_are_proof_enough_for_commands(tmp_path: Path, of: str) -> None:
-    """No "I know" is needed where everybody proves who it is."""
+    """No "I know" is needed where everyone proves who it is."""
     example = Path(__file__).parents[2] / "examples" / of / "vehicle.json5"
     config = write_config(tmp_path, f'config_file = "{example}"\ncommands = true\nmavlink_in = true')
     settings = load_settings(config, "sim:", (), tmp_path)

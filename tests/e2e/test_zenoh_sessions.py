@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sessions: nobody there, a router that comes late, goes and comes back; receivers that stall; names used twice."""
+"""Sessions: no router, a late router, a router that restarts; stalled receivers; duplicate names."""
 
 import signal
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""QGroundControl plans: what is read, what is refused and in which words."""
+"""QGroundControl plans: accepted files, and refusals with their messages."""
 
 import json
 import math
@@ -161,7 +161,7 @@ def test_a_damaged_plan_is_refused_with_the_place(document: Any, words: list[str
 @pytest.mark.parametrize(
     "data", [b"", b"{", b'{"fileType":\n "Plan",\n "mission": {"items": [', b"\xff\xfe{", b"{}" * 9]
 )
-def test_a_plan_that_is_no_json_is_refused(data: bytes) -> None:
+def test_a_plan_that_is_not_a_json_is_refused(data: bytes) -> None:
     with pytest.raises(MissionFileError, match=r"^field\.plan"):
         read_mission_file(data, "field.plan")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""QGC WPL 110 files: what is read, what is refused and in which words."""
+"""QGC WPL 110 files: accepted files, and refusals with their messages."""
 
 import math
 import random
@@ -60,7 +60,7 @@ def test_a_file_as_mission_planner_writes_it(end: str) -> None:
     ],
     ids=["byte order mark", "spaces", "blank lines and remarks"],
 )
-def test_other_hands_write_it_differently(lines: list[str]) -> None:
+def test_files_of_other_programs(lines: list[str]) -> None:
     assert same(read(*lines), ITEMS)
 
 

@@ -100,7 +100,7 @@ def test_push_to_one_and_pull_it_into_a_file(fleet: Fleet, tmp_path: Path) -> No
     assert [(each["vehicle"], each["error"]) for each in data] == [("owl", None), ("kite", None)]
 
 
-def test_changes_are_told(fleet: Fleet, tmp_path: Path) -> None:
+def test_changes_are_reported(fleet: Fleet, tmp_path: Path) -> None:
     plan = [*plain_plan(4, start=90), PlanRow(178, p2=5.0)]
     pushed = fleet.ask("push", plan_file(tmp_path, plan), "--vehicle", "kite")
     assert "4 of 5 stored: 1 dropped; 2 corrections\n" in pushed.stdout, pushed

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What goes away or hangs while the fleet is looked at or written to; nothing of it stops the others."""
+"""Vehicles and routers that disappear or hang during fleet commands do not stop the others."""
 
 import json
 import os
@@ -76,7 +76,7 @@ class Command:
 
 
 def long_push(fleet: Fleet, *options: str) -> Command:
-    """Begin to write the long mission to all, and return when the slow vehicle is in the middle of it."""
+    """Start to write the long mission to all, and return when the slow vehicle is in the middle of it."""
     file = fleet.folder / "long.waypoints"
     file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(_COUNT))]))
 
@@ -236,7 +236,7 @@ def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
     assert "Traceback" not in terminal.text
 
 
-def test_a_router_that_hangs_is_no_empty_fleet(fleet: Fleet) -> None:
+def test_a_router_that_hangs_is_not_a_empty_fleet(fleet: Fleet) -> None:
     """The session is open, and the router then says nothing more."""
     router = fleet.router.process
     config = zenoh.Config()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The examples for a fleet behind a router, as they stand: who comes in, who does not and why, who may do what."""
+"""The examples for a fleet behind a router, unchanged: who comes in, who does not and why, who may do what."""
 
 import datetime
 import json

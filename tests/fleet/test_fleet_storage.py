@@ -39,7 +39,7 @@ def stored_names(looking: zenoh.Session, suffix: str) -> set[str]:
     return {str(reply.ok.key_expr).split("/")[1] for reply in replies if reply.ok}
 
 
-def test_the_dead_are_stored_but_not_listed(stored: tuple[Fleet, zenoh.Session]) -> None:
+def test_dead_vehicles_are_stored_but_not_listed(stored: tuple[Fleet, zenoh.Session]) -> None:
     fleet, looking = stored
     assert stored_names(looking, "state") == {"kite", "owl"}
     listed = fleet.listed()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How `naze-bridge fleet` finds its way in, and what it says if there is none."""
+"""How `naze-bridge fleet` connects, and its messages if that fails."""
 
 import re
 import socket
@@ -26,14 +26,14 @@ def sentence_of(*arguments: str | Path, code: int = 1) -> str:
     return ended.stderr.splitlines()[-1]
 
 
-def test_a_fleet_of_nobody(router: Router) -> None:
+def test_an_empty_fleet(router: Router) -> None:
     listed = run_naze_bridge("fleet", "list", "--connect", router.endpoint)
     assert (listed.returncode, listed.stdout) == (0, "No vehicle is alive under 'fleet'.\n")
     pushed = sentence_of("push", EXAMPLES / "naze-field.waypoints", "--all", "--connect", router.endpoint)
     assert "no vehicle is alive under 'fleet'" in pushed
 
 
-def test_of_several_endpoints_the_first_that_answers(router: Router) -> None:
+def test_the_first_endpoint_to_answer_is_used(router: Router) -> None:
     dead = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     listed = run_naze_bridge("fleet", "list", "--connect", dead, "--connect", router.endpoint)
     assert listed.returncode == 0, listed
@@ -54,7 +54,7 @@ def test_no_router() -> None:
     assert sentence == f"naze-bridge: cannot join the fleet: {endpoint}: connection refused"
 
 
-def test_somebody_else_listens_there() -> None:
+def test_another_program_listens_there() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
         assert "is a zenoh router" in sentence_of("list", "--connect", endpoint)
@@ -91,13 +91,13 @@ def test_zenoh_files_that_cannot_be_used(tmp_path: Path) -> None:
     assert "names no connect/endpoints" in sentence_of("list", "--zenoh-config", broken)
 
 
-def test_for_whom() -> None:
+def test_vehicles_must_be_named() -> None:
     file = EXAMPLES / "naze-field.waypoints"
     assert "--vehicle NAME, or --all" in sentence_of("push", file, code=2)
     assert "--vehicle NAME, or --all" in sentence_of("push", file, "--all", "--vehicle", "a", code=2)
 
 
-def test_a_file_that_is_no_mission_goes_nowhere(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_mission_goes_nowhere(tmp_path: Path) -> None:
     file = tmp_path / "plan"
     file.write_text("I am no mission")
     ended = run_naze_bridge("fleet", "push", file, "--all")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What `fleet watch` shows in a terminal of 80 x 24, and how old it says that a state is."""
+"""The screen of `fleet watch` in a terminal of 80 x 24, and the age it shows for each state."""
 
 import json
 from typing import Any

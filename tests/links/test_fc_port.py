@@ -181,7 +181,7 @@ async def test_what_a_uart_does_not_take_is_dropped_by_whole_frames(line: Line) 
     await line.stop()
 
 
-async def test_a_stuck_uart_goes_on_with_whole_frames_as_it_takes_them(line: Line) -> None:
+async def test_a_stuck_uart_continues_with_whole_frames_as_it_takes_them(line: Line) -> None:
     """The wire is read a little at a time, so that frames are cut everywhere by what the terminal takes."""
     port = line.start()
     await until(lambda: line.opened, "the port")

@@ -21,7 +21,7 @@ FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
 
 
 class Ears:
-    """Notes what a link tells, and who is to be spoken to."""
+    """Records a link's events and its default peers."""
 
     def __init__(self) -> None:
         self.heard: list[tuple[Peer, bytes]] = []
@@ -204,7 +204,7 @@ async def test_a_client_too_many_takes_the_place_of_another(links: Links) -> Non
     assert await received(clients[len(clients) // 2]) == b""
 
 
-async def test_who_takes_nothing_any_more_is_hung_up(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_client_that_reads_nothing_is_disconnected(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp_link, "_STALL_MS", 500)
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
@@ -221,8 +221,8 @@ async def test_who_takes_nothing_any_more_is_hung_up(links: Links, monkeypatch: 
     assert links.ears.default_peers == {}
 
 
-async def test_who_does_not_read_answers_is_hung_up_after_all_were_sent_to(links: Links) -> None:
-    """Nobody is told in the middle of a round: what others are sent would get out of order."""
+async def test_who_does_not_read_answers_is_disconnected_after_all_were_sent_to(links: Links) -> None:
+    """No one is told in the middle of a round: what others are sent would get out of order."""
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
     links.tcp(port)

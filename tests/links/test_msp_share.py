@@ -67,7 +67,7 @@ async def shared(*, write: bool = False) -> AsyncIterator[tuple[Daemon, Program]
 
 
 @pytest.mark.parametrize("is_v2", [False, True])
-async def test_questions_are_answered_beside_telemetry(is_v2: bool) -> None:
+async def test_questions_are_answered_alongside_telemetry(is_v2: bool) -> None:
     async with shared() as (daemon, program):
         polled = daemon.traffic["fc"].pieces_received
         replies = await program.ask(IDENT, is_v2=is_v2, times=10)

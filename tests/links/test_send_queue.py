@@ -69,6 +69,6 @@ def test_the_newest_telemetry_is_there_after_a_stall() -> None:
     assert queue.dropped == 100 - left.count(b"\xfd")
 
 
-def test_what_must_be_kept_and_does_not_fit_is_told() -> None:
+def test_what_must_be_kept_and_does_not_fit_is_reported() -> None:
     queue = SendQueue(LIMIT)
     assert not all(queue.add(chunk) for chunk in chunks([1] * 100))

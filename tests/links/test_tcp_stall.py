@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""TCP clients that stop reading cost nobody anything, and find what matters when they read again."""
+"""TCP clients that stop reading cost no one anything, and find what matters when they read again."""
 
 import asyncio
 import os
@@ -118,7 +118,7 @@ async def test_without_a_descriptor_left_it_does_not_spin(monkeypatch: pytest.Mo
         async with asyncio.timeout(10):
             while link._resting is None:  # noqa: ASYNC110 - a product's timer, not an event of ours
                 await asyncio.sleep(0)
-        # Nobody wakes the loop up for the one that waits.
+        # No one wakes the loop up for the one that waits.
         assert not loop.remove_reader(link._socket.fileno())
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

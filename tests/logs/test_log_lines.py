@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a program's log looks like to whoever reads it, or does not; each log is a program's own."""
+"""The log of a program, with and without a reader."""
 
 import json
 import os
@@ -24,7 +24,7 @@ def run(script: str, *shell: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=True)
 
 
-def test_what_was_left_out_is_told_even_if_it_never_comes_again() -> None:
+def test_what_was_left_out_is_reported_even_if_it_never_comes_again() -> None:
     printed = run("""
 for _ in range(50): log.info("gcs.found", station="one")
 log.warning("fc.lost")
@@ -66,6 +66,6 @@ log.info("fc.found")
     assert json.loads(lines[-1])["event"] == "fc.found"
 
 
-def test_a_program_whose_standard_error_is_closed_goes_on() -> None:
+def test_a_program_whose_standard_error_is_closed_continues() -> None:
     ended = run('log.error("fc.lost")\nprint("went on")', "sh", "-c", 'exec "$@" 2>&-', "sh")
     assert ended.stdout == "went on\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MAVLink 1 as those know it who know nothing else: fixed payload sizes, no extension fields."""
+"""MAVLink 1 for receivers that know only it: fixed payload sizes, no extension fields."""
 
 import pytest
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1

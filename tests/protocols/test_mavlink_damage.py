@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bad line: whatever is damaged in a stream of frames, the others come through, and nothing else does."""
+"""Damage in a stream of frames: all intact frames are found, and nothing else."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -121,8 +121,8 @@ FRAME = telemetry("MAVLink 2", 2, 0)[1]
 @pytest.mark.parametrize(
     "header",
     [
-        bytes((0xFD, 255, 0, 0, 1, 1, 1, 0xFF, 0xFF, 0xFF)),  # a message that nobody knows
-        bytes((0xFD, 255, 2, 0, 1, 1, 1, 0, 0, 0)),  # an incompatibility flag that nobody knows
+        bytes((0xFD, 255, 0, 0, 1, 1, 1, 0xFF, 0xFF, 0xFF)),  # a message that no one knows
+        bytes((0xFD, 255, 2, 0, 1, 1, 1, 0, 0, 0)),  # an incompatibility flag that no one knows
         bytes((0xFE, 255, 1, 1, 1, 0)),  # no HEARTBEAT of MAVLink 1 is so long
         bytes((0xFE, 255, 1, 1, 1, 3)),
     ],
@@ -153,7 +153,7 @@ def test_silence_gives_out_what_a_cut_frame_was_hiding() -> None:
 
 
 def test_bytes_are_missing_in_a_signature() -> None:
-    """Nobody without the key can tell; but what comes behind it must not be lost."""
+    """No one without the key can tell; but what comes behind it must not be lost."""
     before, cut, after = telemetry(SIGNED, 3, 4)
     for missing in range(1, SIGNATURE_SIZE + 1):
         found = split([before, cut[:-missing], after], Random(missing))

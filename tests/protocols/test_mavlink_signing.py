@@ -138,7 +138,7 @@ def test_our_timestamps_never_repeat_whatever_the_clock_does() -> None:
     assert taken == [start, start + 1, start + 2, start + 3, start + TICKS_PER_S, start + TICKS_PER_S + 1]
 
 
-def test_who_has_no_clock_goes_on_where_he_stopped_and_follows_who_has_one() -> None:
+def test_without_a_clock_timestamps_continue_and_follow_a_peers() -> None:
     stored = ticks(NOON)
     signing = our_side(unix_s=0.0, at_least=stored)
     assert signing.check(frame_of(pymavlink_side(timestamp=stored - TOLERANCE - 1))) is Check.LATE

@@ -60,7 +60,7 @@ def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
 
 
 def _overlapped(before: bytes, frame: MspFrame, found: list[MspFrame]) -> bool:
-    """Tell whether bytes before it and bytes of its own make up another valid frame."""
+    """True if bytes before it and bytes of its own make up another valid frame."""
     stream = before + frame.encode()
     return any(one.encode() in stream and stream.rfind(one.encode()) + len(one.encode()) > len(before) for one in found)
 

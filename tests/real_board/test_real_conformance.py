@@ -36,7 +36,7 @@ from tests.support.real_bench import RealBench
 
 
 class RealDevice:
-    """The image in the clothes of the conformance tests' devices; see mission_devices.Device."""
+    """The image with the interface of the conformance tests' devices; see mission_devices.Device."""
 
     def __init__(self, bench: RealBench) -> None:
         self._bench = bench

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The player of captures: who asks as was asked then gets what was answered then."""
+"""The capture player: the recorded requests get the recorded replies."""
 
 from collections.abc import Sequence
 
@@ -84,7 +84,7 @@ def test_who_asks_more_or_less_often_gets_the_state_of_that_time() -> None:
         assert listener.listen(at + 0.1) == [(round(at + 0.01, 3), reply(Msp.STATUS, number))]
 
 
-def test_what_was_not_answered_then_is_not_answered_now() -> None:
+def test_unanswered_requests_stay_unanswered() -> None:
     events = [opened(0.0), wrote(1.0, IDENT), wrote(2.0, IDENT), read(2.01, reply(Msp.IDENT, 7))]
     listener = Listener(events)
     listener.ask(1.0, IDENT)
@@ -155,7 +155,7 @@ def test_the_speed_is_that_of_the_recorded_port() -> None:
     assert Listener([read(0.0, b"$M", None)]).player.baud == 115200
 
 
-def test_a_closed_port_says_nothing_and_its_times_are_told() -> None:
+def test_a_closed_port_says_nothing_and_its_times_are_reported() -> None:
     events = [opened(0.0), wrote(0.5, STATUS), read(0.51, reply(Msp.STATUS)), closed(2.0), opened(5.0), closed(9.0)]
     listener = Listener(events, tempo=2.0)
     assert listener.player.outages == [(1.0, 2.5)]
@@ -168,7 +168,7 @@ def test_a_closed_port_says_nothing_and_its_times_are_told() -> None:
 
 @given(st.data())
 def test_whatever_was_read_is_played_byte_for_byte(data: st.DataObject) -> None:
-    """Who asks the same at the same times reads the same bytes in the same order: noise, cut frames, bursts, all."""
+    """The same requests at the same times read the same bytes in the same order: noise, truncated frames, bursts."""
     frames = st.sampled_from([reply(Msp.STATUS, 1), reply(Msp.IDENT), reply(Msp.STATUS, 2), b"$M>", b"$", b"\xfe\x09"])
     deeds = st.one_of(
         st.sampled_from([STATUS, IDENT, STATUS + IDENT]).map(lambda asked: (UartDeed.WRITE, asked)),

@@ -27,7 +27,7 @@ def test_all_is_written_in_order_before_the_end() -> None:
     assert ended == [True]
 
 
-def test_a_disk_that_hangs_holds_nobody_up_and_is_told_once() -> None:
+def test_a_disk_that_hangs_holds_nobody_up_and_is_reported_once() -> None:
     hangs, goes_on = threading.Event(), threading.Event()
     written: list[bytes] = []
 

@@ -95,7 +95,7 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
     assert names(tmp_path) == sorted([*others, "2026-11-21 12-00-00.tlog"])
 
 
-def test_a_folder_that_cannot_be_is_told_once_and_tried_again(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_is_reported_once_and_tried_again(tmp_path: Path) -> None:
     (tmp_path / "logs").write_text("in the way")
     folder = TlogFolder(tmp_path / "logs", TlogLimits())
     with capture_logs() as events:
@@ -130,7 +130,7 @@ def test_a_disk_that_is_nearly_full_is_left_to_others(tmp_path: Path, is_recordi
     assert names(tmp_path)[-1] == "2026-11-21 12-05-00.tlog"
 
 
-def test_a_full_disk_is_told_once_and_what_fitted_can_be_read(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_once_and_what_fitted_can_be_read(tmp_path: Path) -> None:
     """The kernel's own refusal in the middle of a record; a limit of this process stands in for the disk's."""
     folder = TlogFolder(tmp_path, TlogLimits(), lambda _: PLENTY)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)

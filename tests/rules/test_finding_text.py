@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The words that a pilot reads."""
+"""The texts for the pilot."""
 
 import math
 from dataclasses import replace

@@ -255,7 +255,7 @@ def test_every_height_is_taken_as_relative(command: int, frame: int, is_finding:
 
 @pytest.mark.parametrize("frame", [0, 3, 5, 6, 10, 11])
 @pytest.mark.parametrize("command", [LAND, ROI, SET_ROI])
-def test_the_frame_of_a_height_that_is_not_used_is_no_finding(command: int, frame: int) -> None:
+def test_the_frame_of_a_height_that_is_not_used_is_not_a_finding(command: int, frame: int) -> None:
     assert stored(item(command, frame=frame))[1] == {}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a list becomes on INAV and MultiWii NAV: docs/inav.md, row by row, and what holds for every list."""
+"""The rules for INAV and MultiWii NAV: docs/inav.md, row by row, and properties of every list."""
 
 import math
 from dataclasses import replace
@@ -102,7 +102,7 @@ def test_what_can_be_held_is_held_and_read_as_it_was_sent(sent: MissionItem, rec
         (item(C.NAV_LAND, at=False), A.LAND, [("lat_e7", 0, LAT), ("lon_e7", 0, LON), ("alt_m", 0, 50)]),
     ],
 )  # fmt: skip
-def test_what_cannot_be_held_is_told(sent: MissionItem, record: NavAction, findings: list[tuple[Any, ...]]) -> None:
+def test_what_cannot_be_held_is_reported(sent: MissionItem, record: NavAction, findings: list[tuple[Any, ...]]) -> None:
     assert kept(WP, sent, WP)[1].action == record
     assert [told[1:] for told in said(WP, sent, WP)] == findings
 
@@ -148,7 +148,7 @@ def test_a_speed_goes_back_to_the_set_one() -> None:
     assert [shown.p2 for shown in verdict_on(*sent).items if shown.command == C.DO_CHANGE_SPEED] == [7, -2]
 
 
-def test_of_a_speed_what_is_lost_is_told() -> None:
+def test_of_a_speed_what_is_lost_is_reported() -> None:
     assert said(speed(0.1, 0, 50), WP) == [
         (1, "p3", 50, 0),
         (1, "p1", 0, 1),
@@ -247,7 +247,7 @@ def test_as_many_records_fit_as_the_flight_controller_says() -> None:
     assert check_count(180, MULTIWII) is not None
 
 
-def test_home_is_no_record_and_may_be_anywhere() -> None:
+def test_home_is_not_a_record_and_may_be_anywhere() -> None:
     for lat in (0, None, LAT, 2**31 - 1):
         verdict = check_list([replace(HOME, lat_e7=lat), WP], INAV, (11, 22))
         assert (verdict.result, len(verdict.records), verdict.findings) == (Result.ACCEPTED, 1, ())
@@ -343,7 +343,7 @@ def test_what_is_not_used_is_no_news_unless_something_is_lost() -> None:
     assert news(item(C.NAV_LOITER_TURNS, p1=3)) == [News.NOTICE, News.WARNING]
 
 
-def test_legs_after_a_jump_are_flown_at_their_own_speeds_which_is_told_and_shown() -> None:
+def test_legs_after_a_jump_are_flown_at_their_own_speeds_which_is_reported_and_shown() -> None:
     sent = (WP, WP, speed(5), WP, WP, jump(1))
     verdict = verdict_on(*sent)
     assert [(f.seq, f.was, f.becomes, f.news) for f in verdict.findings] == [(6, 1, 1, News.WARNING)]
@@ -509,7 +509,7 @@ def test_another_planners_list_that_is_read_and_written_again_is_the_same(
         (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=1), ""),
     ],
 )
-def test_what_a_changed_leg_loses_is_told(record: NavRecord, lost: str) -> None:
+def test_what_a_changed_leg_loses_is_reported(record: NavRecord, lost: str) -> None:
     held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
     items = list(items_from_records(held, home_item((LAT, LON))))
     items[2] = replace(items[2], alt_m=40.0)

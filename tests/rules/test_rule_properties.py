@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What holds for every list whatever, judged by a second reading of the rules (rule_oracle.py)."""
+"""Properties of every list, checked by a second implementation of the rules (rule_oracle.py)."""
 
 import math
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The unit: how far it is shut, and that each door that is open says why beside its line."""
+"""The unit's exposure, and the reasons in it for each remaining permission."""
 
 import shutil
 import subprocess
@@ -54,7 +54,7 @@ def test_it_opens_serial_ports_and_no_other_device() -> None:
     assert {line.removeprefix("DeviceAllow=") for line in settings() if line.startswith("DeviceAllow=")} == _SERIAL
 
 
-def test_every_open_door_says_why() -> None:
+def test_each_permission_has_its_reason() -> None:
     """What the comments call "not" is what systemd-analyze finds open."""
     comments = " ".join(line[1:] for line in _UNIT.read_text().splitlines() if line.startswith("#"))
     for door in (

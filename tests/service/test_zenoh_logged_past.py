@@ -43,7 +43,7 @@ def write(folder: Path, begun_s: float, *records: tuple[float, Message], compid:
 
 
 def test_texts_and_arming_in_order(tmp_path: Path) -> None:
-    """The file that is full in flight goes on in the next one: the craft is not armed twice."""
+    """The file that is full in flight continues in the next one: the craft is not armed twice."""
     write(tmp_path, NOON_S, (NOON_S, heartbeat(armed=True)), (NOON_S + 5, text("Mission: 12 items")), flight=True)
     write(tmp_path, NOON_S + 6, (NOON_S + 6, heartbeat(armed=True)), (NOON_S + 9, heartbeat(armed=False)))
     write(tmp_path, NOON_S + 600, (NOON_S + 600, heartbeat(armed=True)))
@@ -67,7 +67,7 @@ def test_only_the_range(tmp_path: Path) -> None:
 
 
 def test_a_part_of_a_long_log(tmp_path: Path) -> None:
-    """It is not read from its beginning; whether the craft was armed before the range is known all the same."""
+    """It is not read from its beginning; whether the craft was armed before the range is known anyway."""
     flight = [(NOON_S + second, heartbeat(armed=1000 <= second < 2000)) for second in range(3600)]
     path = write(tmp_path, NOON_S, *flight)
     with path.open("ab") as file:

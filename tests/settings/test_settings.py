@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings from files, drop-ins, environment and flags, and what is said of those that cannot be used."""
+"""Settings from files, drop-ins, environment and flags, and messages about invalid ones."""
 
 import os
 import tomllib
@@ -35,7 +35,7 @@ def problems(folder: Path, text: str, **drop_ins: str) -> list[str]:
     return [str(problem).removeprefix(f"{folder}/") for problem in caught.value.problems]
 
 
-def test_a_drop_in_goes_over_the_file_and_a_later_one_over_it(folder: Path) -> None:
+def test_drop_ins_override_the_file_and_earlier_drop_ins(folder: Path) -> None:
     settings = load(folder, "sysid = 2\ntakeoff_max_m = 20", a="sysid = 3\nlog_level = 'debug'", b="sysid = 4")
     assert (settings.sysid, settings.takeoff_max_m, settings.log_level) == (4, 20, "debug")
 
@@ -47,7 +47,7 @@ def test_a_drop_in_adds_to_a_table(folder: Path) -> None:
     assert load(folder, "", a="").zenoh is None
 
 
-def test_the_environment_goes_over_files_and_flags_over_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flags_override_the_environment_which_overrides_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NAZE_BRIDGE_SYSID", "9")
     monkeypatch.setenv("NAZE_BRIDGE_FC", "/dev/ttyUSB7")
     monkeypatch.setenv("NAZE_BRIDGE_GCS", "udpin:127.0.0.1:1 tcpin:127.0.0.1:2")
@@ -81,7 +81,7 @@ def test_a_wrong_variable_is_named(
     assert words in found
 
 
-def test_all_that_is_wrong_is_told_at_once_with_its_line(folder: Path) -> None:
+def test_all_that_is_wrong_is_reported_at_once_with_its_line(folder: Path) -> None:
     text = """
 # a comment
 sysid = 300
@@ -187,13 +187,13 @@ def test_odd_values_make_one_short_sentence(folder: Path, text: str, words: str)
         (b"#" * (2 << 20), "this cannot be read: it is larger than 1 MB"),
     ],
 )
-def test_a_file_that_is_no_configuration(folder: Path, content: bytes, words: str) -> None:
+def test_a_file_that_is_not_a_configuration(folder: Path, content: bytes, words: str) -> None:
     (folder / "conf.d" / "x.toml").write_bytes(content)
     (found,) = problems(folder, "")
     assert found.startswith(f"conf.d/x.toml: {words}")
 
 
-def test_what_is_no_file(folder: Path) -> None:
+def test_what_is_not_a_file(folder: Path) -> None:
     os.mkfifo(folder / "conf.d" / "a.toml")
     (folder / "conf.d" / "b.toml").mkdir()
     (folder / "conf.d" / "c.toml").symlink_to("/dev/null")

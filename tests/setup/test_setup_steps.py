@@ -77,7 +77,7 @@ def test_a_fresh_card(tmp_path: Path, model: str) -> None:
     _, _, line = MODELS[model]
     assert pi.read(CONFIG).splitlines()[-1] == line
     assert "dtparam=audio=on\n[cm4]" in pi.read(CONFIG)
-    # serial0 is the Pi 5's debug socket: its console is in nobody's way.
+    # serial0 is the Pi 5's debug socket: its console is in no one's way.
     has_console = "console=serial0,115200" in pi.read(CMDLINE)
     assert has_console is (model == "5")
     assert "console=tty1 root=PARTUUID=1-02 rootwait" in pi.read(CMDLINE)

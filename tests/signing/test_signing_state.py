@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Timestamps that outlive the daemon, on a machine whose clock does not."""
+"""Timestamps that survive a restart on a machine without a battery-backed clock."""
 
 import asyncio
 import json
@@ -180,7 +180,7 @@ async def test_without_a_key_there_is_no_file(tmp_path: Path) -> None:
         "\xff",
     ],
 )
-async def test_a_damaged_file_is_told_and_replaced(tmp_path: Path, content: str) -> None:
+async def test_a_damaged_file_is_reported_and_replaced(tmp_path: Path, content: str) -> None:
     pi = Pi(tmp_path)
     pi.path.write_bytes(content.encode("latin-1"))
     with capture_logs() as told:

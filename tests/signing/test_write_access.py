@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table form of a `gcs` setting, and the key file: what is understood, and what is said of the rest."""
+"""The table form of a `gcs` setting, and the key file: accepted forms, and messages about others."""
 
 import os
 from pathlib import Path
@@ -39,7 +39,7 @@ def complaint(tmp_path: Path, gcs: str) -> str:
     return text
 
 
-def test_a_string_and_a_table_beside_each_other(tmp_path: Path, key_file: Path) -> None:
+def test_a_string_and_a_table_alongside_each_other(tmp_path: Path, key_file: Path) -> None:
     config = tmp_path / "naze-bridge.toml"
     table = f'{{address = "{LINK}", key_file = "{key_file}", writers = ["192.168.4.0/24", "::1"]}}'
     config.write_text(f'fc = "sim:"\ngcs = ["tcpin:127.0.0.1:5760", {table}]\n')
@@ -52,7 +52,7 @@ def test_a_string_and_a_table_beside_each_other(tmp_path: Path, key_file: Path) 
     assert str(found[1].key) not in repr(settings)
 
 
-def test_a_key_file_is_looked_for_beside_the_file_that_names_it(tmp_path: Path, key_file: Path) -> None:
+def test_a_key_file_is_looked_for_alongside_the_file_that_names_it(tmp_path: Path, key_file: Path) -> None:
     found = access(tmp_path, f'{{address = "{LINK}", key_file = "{key_file.name}"}}')
     assert found[LINK].key == key_from_passphrase(WORDS)
 
@@ -126,13 +126,13 @@ def test_the_passphrase_is_all_but_the_end_of_the_line(key_file: Path, content: 
 
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"x" * 5000])
-def test_what_is_no_passphrase(key_file: Path, content: bytes) -> None:
+def test_what_is_not_a_passphrase(key_file: Path, content: bytes) -> None:
     key_file.write_bytes(content)
     with pytest.raises(AddressError, match="must hold the passphrase on one line"):
         read_key(key_file)
 
 
-def test_what_is_no_text(key_file: Path) -> None:
+def test_what_is_not_a_text(key_file: Path) -> None:
     key_file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(AddressError, match="holds no text") as caught:
         read_key(key_file)

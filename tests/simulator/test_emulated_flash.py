@@ -48,7 +48,7 @@ def test_the_core_stands_still_while_a_page_is_erased() -> None:
     assert rig.run(0.003).ram(0x4000, 2) == b"\xfe\xca"
 
 
-def test_operations_fail_as_often_as_they_are_told_to() -> None:
+def test_operations_fail_as_often_as_they_are_reported_to() -> None:
     steps = unlock().store(CR, PG).load(CR).store_half(PLACE, 1).load(SR).store(SR, PROGRAM_ERROR).store_half(PLACE, 2)
     rig = Rig(steps.load(PLACE))
     rig.board.faults.flash_failures = 1

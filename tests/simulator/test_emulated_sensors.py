@@ -91,7 +91,7 @@ def test_the_barometers_coefficients_carry_their_checksum() -> None:
     assert remainder >> 12 == words[7] & 0xF
 
 
-def test_the_barometer_converts_what_it_is_told_to() -> None:
+def test_the_barometer_converts_what_it_is_reported_to() -> None:
     temperature = int.from_bytes(bytes(ask(MS5611, 0, 3, (0x58,))), "big")
     pressure = int.from_bytes(bytes(ask(MS5611, 0, 3, (0x48,))), "big")
     assert temperature == 8_569_150

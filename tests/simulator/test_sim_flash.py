@@ -31,7 +31,7 @@ def test_an_erase_leaves_the_other_page_alone() -> None:
     assert memory[PAGE_SIZE : PAGE_SIZE + 4] == b"kept"
 
 
-def test_the_time_that_it_takes_is_told_once() -> None:
+def test_the_time_that_it_takes_is_reported_once() -> None:
     flash, _, _ = make()
     flash.erase(0, 0.02)
     flash.program(0, b"ab", 0.001)

@@ -83,7 +83,7 @@ def test_the_speed_of_a_leg(speed: int, seconds: int) -> None:
     assert flight.bench.now == pytest.approx(seconds, abs=1.5)
 
 
-def test_in_a_mission_the_modes_below_it_are_told_too() -> None:
+def test_in_a_mission_the_modes_below_it_are_reported_too() -> None:
     flight = Flight(waypoint(20), waypoint(40))
     flight.until(lambda status: status[1] == 5)
     assert flight.modes() == {"ARM", "ANGLE", "NAV WP", "NAV ALTHOLD"}
@@ -117,13 +117,13 @@ def test_a_jump_to_nowhere_that_came_in_flight_is_a_crash() -> None:
     assert flight.bench.board.counters.crashes == 1
 
 
-def test_a_jump_for_ever_never_ends() -> None:
+def test_a_jump_forever_never_ends() -> None:
     flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=Action.JUMP, p1=1, p2=-1))
     with pytest.raises(AssertionError):
         flight.until(is_finished, 200)
 
 
-def test_what_is_no_place_is_passed_by() -> None:
+def test_what_is_not_a_place_is_passed_by() -> None:
     flight = Flight(waypoint(3), waypoint(action=Action.SET_HEAD, p1=90), waypoint(6, Action.SET_POI), waypoint(9))
     flight.until(is_finished)
     assert flight.numbers() == [1, 4]
@@ -168,7 +168,7 @@ def test_the_nose_is_down_and_the_sign_is_plus() -> None:
     assert struct.unpack("<hhh", flight.bench.payload(108))[1] > 0
 
 
-def test_the_switch_stops_the_mission_and_goes_on_with_it() -> None:
+def test_the_switch_stops_the_mission_and_continues_with_it() -> None:
     flight = Flight(waypoint(20), waypoint(40), waypoint(60))
     flight.until(lambda status: status[3] == 2)
     flight.bench.faults.boxes = 0

@@ -290,7 +290,7 @@ def test_disarmed_all_missions_are_counted_and_armed_the_one_that_is_selected() 
     ]
 
 
-def test_the_selected_mission_is_told_as_a_setting_and_save_goes_back_to_the_first() -> None:
+def test_the_selected_mission_is_reported_as_a_setting_and_save_goes_back_to_the_first() -> None:
     bench = several()
     bench.faults.selected_mission = 2
     assert bench.payload_v2(0x1003, SELECTED) == b"\2"

@@ -65,7 +65,7 @@ def test_channels(version: str, receiver: bool, channels: int) -> None:
     assert len(bench.payload(105)) == 2 * channels
 
 
-def test_msp_v2_beside_v1() -> None:
+def test_msp_v2_alongside_v1() -> None:
     """Lengths as INAV 9.1.0's own simulator has them."""
     bench = MspBench("inav", MspOptions(platform=1, pitot=True), Faults(arming_blockers=1 << 18))
     lengths = {command: len(bench.payload_v2(command)) for command in (0x2000, 0x2002, 0x2009, 0x2010)}
@@ -95,7 +95,7 @@ def test_a_box_whose_bit_is_beyond_the_32_is_not_told() -> None:
     assert struct.unpack_from("<I", bench.payload(101), 6)[0] == 1 << 4
 
 
-def test_home_and_the_present_place_are_told_with_their_altitude_above_the_sea() -> None:
+def test_home_and_the_present_place_are_reported_with_their_altitude_above_the_sea() -> None:
     bench = MspBench("inav")
     for number in (0, 255):
         place = bench.read(number)

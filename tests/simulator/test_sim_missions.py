@@ -188,7 +188,7 @@ def test_a_window_of_two_chunks_fills_the_line() -> None:
 # -- every request may be repeated ---------------------------------------------------------------------------
 
 
-def test_begin_of_the_same_list_goes_on_and_of_another_starts_anew() -> None:
+def test_begin_of_the_same_list_continues_and_of_another_starts_again() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
     standing = bench.progress(encode_chunk(records, 0, 15).frame)

@@ -155,7 +155,7 @@ def test_the_main_loop_answers_at_most_every_looptime() -> None:
     assert 0.04 < bench.now - before < 0.06
 
 
-def test_a_hang_answers_nothing_and_goes_on_when_released() -> None:
+def test_a_hang_answers_nothing_and_continues_when_released() -> None:
     bench = Bench()
     bench.naze.faults.hang = True
     assert bench.ask(IDENT, timeout=3.0) is None

@@ -119,7 +119,7 @@ def test_a_return_home_by_the_switch_lands_if_the_waypoint_last_read_has_p1(p1: 
     assert status(bench)[:2] == (2, state)
 
 
-def test_while_a_mission_is_flown_a_waypoint_gets_no_answer_and_none_is_told() -> None:
+def test_while_a_mission_is_flown_a_waypoint_gets_no_answer_and_none_is_reported() -> None:
     bench = flying()
     assert status(bench)[:2] == (3, 5)
     assert bench.ask(SET_WP, waypoint(9).pack(1)) is None
@@ -166,7 +166,7 @@ def test_a_hold_is_counted_in_16_bits(hold: int, seconds: float) -> None:
 
 
 @pytest.mark.parametrize("action", [Action.SET_POI, Action.SET_HEAD])
-def test_the_end_is_overlooked_on_what_is_no_place(action: int) -> None:
+def test_the_end_is_overlooked_on_what_is_not_a_place(action: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
     bench.upload([waypoint(number) for number in range(1, 6)])
     bench.upload([waypoint(1), waypoint(2), waypoint(3, action)])

@@ -66,7 +66,7 @@ class Client:
         self.socket.close()
 
     def ask(self, command: int, payload: bytes = b"", timeout: float = PATIENCE) -> Frame | None:
-        """None after the time-out; ConnectionError if it was hung up."""
+        """None after the timeout; ConnectionError if it was disconnected."""
         self.socket.sendall(request(command, payload))
         self.socket.settimeout(timeout)
         heard = b""

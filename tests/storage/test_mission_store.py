@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What goes into the store comes out again, and finding it does not get slower as missions gather."""
+"""Missions come out of the store as they went in, and lookups do not slow down as it fills."""
 
 import math
 import sqlite3
@@ -75,7 +75,7 @@ def test_parameters_that_were_not_given_stay_not_given(store: MissionStore) -> N
     assert item["alt_m"] == -math.inf
 
 
-def test_a_file_name_that_is_no_utf8_does_not_keep_a_mission_out(store: MissionStore) -> None:
+def test_a_file_name_that_is_not_a_utf8_does_not_keep_a_mission_out(store: MissionStore) -> None:
     number = store.add(replace(mission(1), source="file caf\udce9.plan"))
     stored = store.get(number)
     assert stored is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One daemon on one state directory, whatever became of the last one."""
+"""One daemon per state directory, also after a crash of the last one."""
 
 import os
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A damaged file never stops the daemon: it is kept aside whole, its name is told, and a new one works."""
+"""A damaged store never stops the daemon: the file is renamed and reported, and a new one is created."""
 
 import random
 import sqlite3
@@ -248,7 +248,7 @@ def test_what_was_kept_aside_can_be_opened_for_rescue(path: Path, killed: bytes)
 
 
 def test_a_file_of_another_program(path: Path) -> None:
-    """A sound database with a table of our name and no schema number is none of ours."""
+    """A sound database with a table of our name and no schema number is not ours."""
     connection = sqlite3.connect(path)
     connection.execute("CREATE TABLE missions (something TEXT)")
     connection.close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was acknowledged is there after a kill -9, and after a power cut that tore what was being written."""
+"""Acknowledged missions survive kill -9 and power cuts during a write."""
 
 import os
 import random

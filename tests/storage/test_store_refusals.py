@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where nothing can be stored, one sentence says why, and what was stored before is still there."""
+"""If nothing can be stored, one sentence gives the reason, and earlier missions are kept."""
 
 import sqlite3
 import subprocess
@@ -54,7 +54,7 @@ print(len(numbers))
 
 
 @pytest.mark.parametrize("limit", [150_000, 400_001])
-def test_a_full_disk_is_told_and_costs_only_what_it_refused(tmp_path: Path, limit: int) -> None:
+def test_a_full_disk_is_reported_and_costs_only_what_it_refused(tmp_path: Path, limit: int) -> None:
     path = tmp_path / "missions.db"
     add_error, conclude_error, listed, added = run(FULL_DISK, str(path), str(limit)).stdout.splitlines()
     assert add_error.startswith(f"cannot store the mission in {path}: the disk is full")
@@ -73,7 +73,7 @@ def test_a_full_disk_is_told_and_costs_only_what_it_refused(tmp_path: Path, limi
         assert (last.outcome, last.detail) == ("VERIFIED", "after")
 
 
-# Root may write anywhere, so the one who tries is nobody.
+# Root may write anywhere, so the one who tries is no one.
 AS_NOBODY = """
 import os, sys
 from pathlib import Path
@@ -141,7 +141,7 @@ def test_another_program_holds_the_file(tmp_path: Path) -> None:
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(StoreError, match=r"cannot store the mission in .*: another process has locked it"):
             store.add(mission(1))
-        assert store.list(9) == []  # reading goes on
+        assert store.list(9) == []  # reading continues
         with pytest.raises(StoreError, match="another process has locked it"):
             open_store(path, now=0.0)
         other.execute("ROLLBACK")

@@ -56,7 +56,7 @@ class Stranger:
 
 
 class Attack(threading.Thread):
-    """Does something over and over, `per_s` times a second, until it is over."""
+    """Repeats an action `per_s` times a second until it is left."""
 
     def __init__(self, deed: Callable[[], None], per_s: float) -> None:
         super().__init__(daemon=True)

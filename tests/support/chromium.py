@@ -48,7 +48,7 @@ class Browser:
         return self.driver.find_elements(By.CSS_SELECTOR, selector)
 
     def text(self, selector: str) -> str:
-        """What a reader sees there at this moment, even if the page is just being drawn anew."""
+        """What a reader sees there at this moment, even if the page is just being drawn again."""
         script = "const e = document.querySelector(arguments[0]); return e?.innerText ?? e?.textContent ?? ''"
         return str(self.run(script, selector))
 

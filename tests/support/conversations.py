@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What ground stations do with missions: an upload and a download with the client's own repeats."""
+"""A ground station's upload and download, with the client's own repeats."""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -108,12 +108,12 @@ class Upload:
         return self.result is not None or self.gave_up
 
     def run(self, seconds: float = 60.0) -> MissionResult | None:
-        """Let the world go on until the upload is over."""
+        """Let the world continue until the upload has ended."""
         self.station.world.run_until(lambda _: self.is_over, seconds)
         return self.result
 
     def stop(self) -> None:
-        """Fall silent for ever, as a crashed ground station does."""
+        """Fall silent forever, as a crashed ground station does."""
         self.gave_up = True
 
     def _count(self) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other things than a Harakiri that may sit on the line, as a `peer` of the world."""
+"""Devices other than a Harakiri on the line, as a `peer` of the world."""
 
 import itertools
 import random

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The least that passes for an INAV or a MultiWii NAV, as a `peer` of the world, with faults that real ones have not.
+"""A minimal INAV or MultiWii NAV as a `peer` of the world, with faults that real ones do not have.
 
-What real ones do is simulated in simulator; this one is for what they should never do, and for what is lost.
+Real behaviour is in simulator/; this is for wrong behaviour and losses.
 """
 
 import random

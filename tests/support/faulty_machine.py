@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A machine made of files: what the checks read, with the faults that a test puts in."""
+"""A machine made of files, as read by doctor's checks, with injected faults."""
 
 import grp
 import os
@@ -37,7 +37,7 @@ class FaultyMachine(Host):
         return file
 
     def owned_by(self, path: str, group: str) -> None:
-        """Give a file to a group: really, and so as root; as somebody else the group is one's own."""
+        """Give a file to a group: really, and so as root; as another program the group is one's own."""
         if os.geteuid() == 0:
             os.chown(self.path(path), 0, grp.getgrnam(group).gr_gid)
 

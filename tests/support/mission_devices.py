@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controllers that must not be told apart: the firmware's C core, and what the simulated Naze runs."""
+"""Flight controllers that must behave identically: the firmware's C core, and the simulated Naze's."""
 
 from typing import Protocol
 
@@ -42,7 +42,7 @@ class Device(Protocol):
 
 
 class Simulated:
-    """The simulated Naze's mission extension, in the same clothes as the C core."""
+    """The simulated Naze's mission extension, with the interface of the C core."""
 
     def __init__(self, boot_missions: BootMissions) -> None:
         self._boot_missions = boot_missions

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission Planner as a scripted client: what it sends, what it waits for and how long (docs/ground-stations.md).
+"""Mission Planner as a scripted client: its messages, waits and timeouts (docs/ground-stations.md).
 
-Only its behaviour on the link is here. Its timers may be scaled down (`pace`); everything else is as it is there, the
-odd things above all: it takes any ack to MISSION_COUNT for "go on", it understands only MISSION_REQUEST (40) while it
-sends MISSION_ITEM_INT, and its own loops eat each other's packets (`appetite`).
+Only its behaviour on the link is here. Its timers may be scaled down (`pace`); everything else is as in the original,
+quirks included: it takes any ack to MISSION_COUNT for "continue", it understands only MISSION_REQUEST (40) while
+it sends MISSION_ITEM_INT, and its own loops eat each other's packets (`appetite`).
 """
 
 import random
@@ -29,7 +29,7 @@ _STREAMS = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
 
 
 class UploadFailed(Exception):
-    """The dialogue that its user sees. `result` is the code that its logic went by, None for a time-out."""
+    """The dialogue that its user sees. `result` is the code that its logic went by, None for a timeout."""
 
     def __init__(self, text: str, result: MissionResult | None = None) -> None:
         super().__init__(text)
@@ -253,7 +253,7 @@ class MissionPlanner:
         return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def request_version(self) -> None:
-        """AUTOPILOT_VERSION_REQUEST, 500 ms x 3; without an answer it goes on with no capabilities."""
+        """AUTOPILOT_VERSION_REQUEST, 500 ms x 3; without an answer it continues with no capabilities."""
         for _ in range(3):
             self.send(messages.MAVLink_autopilot_version_request_message(*self._target))
             for message in self._packets(0.5):
@@ -261,7 +261,7 @@ class MissionPlanner:
                     return
 
     def _request_parameters(self) -> None:
-        """The list every 4 s, for ever if none comes; then the gaps, by index."""
+        """The list every 4 s, forever if none comes; then the gaps, by index."""
         deadline = time.monotonic() + _PATIENCE_S
         while not self._parameter_count:
             assert time.monotonic() < deadline, "it would ask for parameters for ever"
@@ -376,7 +376,7 @@ class MissionPlanner:
             self._write_item(rows, at, use_int=True)
 
     def _start_upload(self, count: int) -> None:
-        """MISSION_COUNT, 700 ms x 4. A request for item 0 or 1 means "go on", and so does ANY ack."""
+        """MISSION_COUNT, 700 ms x 4. A request for item 0 or 1 means "continue", and so does ANY ack."""
         for _ in range(4):
             self.send(messages.MAVLink_mission_count_message(*self._target, count, 0))
             for message in self._packets(0.7):
@@ -405,7 +405,7 @@ class MissionPlanner:
         raise TimedOut("Timeout on read - setWP")
 
     def _requested_seq(self, at: int) -> int:
-        """After INVALID_SEQUENCE: go on where the vehicle asks next; if it asks for nothing, skip silently."""
+        """After INVALID_SEQUENCE: continue where the vehicle asks next; if it asks for nothing, skip silently."""
         for message in self._packets(1.5):
             if message.get_type() == "MISSION_REQUEST":
                 seq: int = message.seq

@@ -56,7 +56,7 @@ class PlainStation:
         self.send(self._dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
 
     def has_data(self) -> bool:
-        """Tell whether anything came that was not read yet."""
+        """True if anything came that was not read yet."""
         return bool(select.select([self._socket], [], [], 0)[0])
 
     def wait_for(self, *kinds: str) -> Any:

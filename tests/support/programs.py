@@ -68,7 +68,7 @@ def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.Comple
 
 
 class Program:
-    """One `naze-bridge` that goes on until it is told to end; what it prints is kept in a file."""
+    """One `naze-bridge` that continues until it is told to end; what it prints is kept in a file."""
 
     def __init__(self, output: Path, *arguments: str) -> None:
         self._output = output

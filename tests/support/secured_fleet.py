@@ -19,7 +19,7 @@ _ELSEWHERE = "/etc/naze-bridge"
 
 @dataclass(frozen=True)
 class Fleet:
-    """A router, and the folder with everybody's files. `endpoint` is what the examples call router.local."""
+    """A router, and the folder with everyone's files. `endpoint` is what the examples call router.local."""
 
     folder: Path
     endpoint: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a soak does to a daemon, and who watches it meanwhile. All that is drawn is drawn from a seed."""
+"""The events of a soak and its monitors. All random choices come from a seed."""
 
 import os
 import random
@@ -32,7 +32,7 @@ _ROUNDING_E7 = 40
 
 
 class Stalls(threading.Thread):
-    """Watches how long the machine lets nobody run: what happens then is no fault of the daemon's."""
+    """Watches how long the machine lets no one run: what happens then is no fault of the daemon's."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
@@ -57,7 +57,7 @@ class Stalls(threading.Thread):
 
 
 class Witness(threading.Thread):
-    """A well-behaved ground station that wants all the telemetry there is, and checks what it gets."""
+    """A ground station that requests all telemetry and checks it."""
 
     def __init__(self, address: tuple[str, int], stalls: Stalls, pid: int) -> None:
         super().__init__(daemon=True)
@@ -84,7 +84,7 @@ class Witness(threading.Thread):
             if time.monotonic() >= beat_due:
                 beat_due += 1.0
                 self._send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-                # Each time: wishes are forgotten with a peer that others have displaced.
+                # Each time: requests are forgotten with a peer that others have displaced.
                 self._send(m.MAVLink_command_long_message(VEHICLE, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             if select.select([self._socket], [], [], 0.1)[0]:
                 data, extra, _, _ = self._socket.recvmsg(2048, 64)
@@ -121,7 +121,7 @@ class Witness(threading.Thread):
 
 
 class Weather(threading.Thread):
-    """What happens to the flight controller: of all kinds, drawn like cards, and each is over after a while."""
+    """What happens to the flight controller: of all kinds, drawn like cards, and each has ended after a while."""
 
     def __init__(self, board: Board, chance: random.Random) -> None:
         super().__init__(daemon=True)
@@ -154,7 +154,7 @@ class Weather(threading.Thread):
         self._board.set("plug")
 
     def _move(self) -> None:
-        """Plugged in again, it has another name behind the same link, because somebody else has its own."""
+        """Plugged in again, it has another name behind the same link, because another program has its own."""
         self._board.set("unplug")
         taken = os.openpty()
         self._board.set("plug")
@@ -187,7 +187,7 @@ class Weather(threading.Thread):
 
 
 class Crowd:
-    """Ground stations that come, go, stall, move, talk rubbish, and write missions; and strangers that attack."""
+    """Ground stations that come, go, stall, move, send garbage and write missions; and attackers."""
 
     def __init__(self, daemon: Daemon, udp_port: int, tcp_port: int, chance: random.Random) -> None:
         self._daemon = daemon
@@ -293,11 +293,11 @@ class Crowd:
                 try:
                     self._say(client, m.MAVLink_param_request_list_message(1, 1))
                 except OSError:
-                    # The daemon does not read on, or has hung up.
+                    # The daemon does not read on, or has disconnected.
                     return
 
     def _flood(self, board: Board) -> None:
-        """Ask for everything as fast as can be."""
+        """Request everything as fast as possible."""
         asked = [
             m.MAVLink_param_request_list_message(1, 1),
             m.MAVLink_mission_count_message(1, 1, 9),

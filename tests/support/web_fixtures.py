@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of the status page start with."""
+"""Fixtures for the status page's tests."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A whole world in simulated time: the bridge, a simulated Naze on a wire, a store, and ground stations over the air.
 
-Nothing here sleeps, opens a socket or reads a clock. What holds for everything that the bridge does is asserted at
-every step: whole frames without hazard bytes to the flight controller, deadlines that lie ahead, a bounded queue of
-conversations.
+Nothing here sleeps, opens a socket or reads a clock. Invariants are asserted at every step: whole frames without
+hazard bytes to the flight controller, deadlines that lie ahead, a bounded queue of conversations.
 """
 
 import heapq
@@ -393,7 +392,7 @@ class GroundStation:
         return [message for _, message in self.heard if not types or message.get_type() in types]
 
     def is_meant(self, message: Message) -> bool:
-        """Tell whether a message is addressed to exactly this one, as Mission Planner wants it."""
+        """True if a message is addressed to exactly this one, as Mission Planner wants it."""
         address = (getattr(message, "target_system", None), getattr(message, "target_component", None))
         return address == (self.sysid, self.compid)
 
@@ -421,5 +420,5 @@ class GroundStation:
             if delay:
                 self.world.after(delay, arrive)
             else:
-                # At once, but after what is under way now: a ground station never answers inside of the bridge.
+                # At once, but after what is in progress now: a ground station never answers inside of the bridge.
                 self.world.at(self.world.now, arrive)

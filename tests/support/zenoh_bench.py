@@ -52,7 +52,7 @@ def key(suffix: str, vehicle: str = VEHICLE) -> str:
 
 
 def body(data: zenoh.Sample | zenoh.ReplyError) -> Any:
-    """What a sample, a reply or an error holds."""
+    """The content of a sample, a reply or an error."""
     return decoded(data.payload.to_bytes(), str(data.encoding))
 
 

@@ -38,7 +38,7 @@ class Router(Program):
         assert self.is_alive, self.printed
 
     def stop(self) -> None:
-        """Go away; what is stopped (SIGSTOP) goes on first."""
+        """Go away; what is stopped (SIGSTOP) continues first."""
         if self.is_alive:
             self.process.send_signal(signal.SIGCONT)
             self.process.terminate()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lists side by side: nothing is left out, and nothing differs without a reason."""
+"""Comparison of lists: no row is missing, and every difference has a reason."""
 
 import math
 from dataclasses import asdict, replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Big answers are made one at a time and once; what may still change is made anew."""
+"""Large responses are made one at a time and only once, unless they may still change."""
 
 import asyncio
 
@@ -30,7 +30,7 @@ async def test_what_is_final_is_made_once() -> None:
     assert answers == ["answer 1"] * 5
     for other in range(2, 12):
         await kept.get(str(other), maker.make)
-    assert await kept.get("1", maker.make) == "answer 12"  # but not kept for ever
+    assert await kept.get("1", maker.make) == "answer 12"  # but not kept forever
 
 
 async def test_what_may_change_is_made_each_time_but_never_two_at_once() -> None:

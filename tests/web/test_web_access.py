@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The status page and strangers: who may read, who may change something, and what a bad request comes to."""
+"""Access to the status page: reading, changing with the token, and bad requests."""
 
 import socket
 from pathlib import Path
@@ -133,7 +133,7 @@ def raw(bench: WebBench, *parts: bytes) -> bytes:
             while data := connection.recv(65536):
                 answer += data
         except OSError:
-            pass  # hung up on, in the middle of what nobody reads
+            pass  # disconnected on, in the middle of what no one reads
         return answer
 
 
@@ -197,7 +197,7 @@ def test_without_the_setting_there_is_no_page(start: Starter) -> None:
 
 
 def test_a_page_that_cannot_be_served_holds_up_nothing(start: Starter) -> None:
-    """An access point's address that comes up late, or a port that somebody has: the bridge is there all the same."""
+    """An access point's address that comes up late, or a port that somebody has: the bridge is there anyway."""
     with socket.socket() as owner:
         owner.bind(("127.0.0.1", 0))
         owner.listen()
@@ -224,7 +224,7 @@ def test_without_a_token_the_page_can_be_read_and_nothing_more(start: Starter) -
     assert web.ask("/api/state").status == 200
 
 
-def test_a_stop_hangs_up_on_browsers(web: WebBench) -> None:
+def test_a_stop_closes_the_browsers_connections(web: WebBench) -> None:
     with web.connect() as silent:
         assert web.ask("/api/state").status == 200
         assert web.daemon.end() == 0

@@ -86,7 +86,7 @@ _VISITORS = 3
 
 
 class _Giver(asyncio.Protocol):
-    """Answers with more than the sockets between them hold, and hangs up when all is read."""
+    """Answers with more than the sockets between them hold, and disconnects when all is read."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -95,7 +95,7 @@ class _Giver(asyncio.Protocol):
 
 
 class _NoticedDoor(Door):
-    """Tells when everybody who came has left."""
+    """Tells when everyone who came has left."""
 
     def __init__(self) -> None:
         super().__init__(lifetime_s=0.2)
@@ -110,7 +110,7 @@ class _NoticedDoor(Door):
 
 
 async def _is_cut_off(serve: type[asyncio.Protocol]) -> None:
-    """Connect and do nothing; return when the door knows of nobody."""
+    """Connect and do nothing; return when the door knows of no one."""
     door = _NoticedDoor()
     server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, serve), "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
@@ -124,9 +124,9 @@ async def _is_cut_off(serve: type[asyncio.Protocol]) -> None:
         server.close()
 
 
-async def test_who_says_nothing_is_cut_off() -> None:
+async def test_a_silent_connection_is_closed() -> None:
     await _is_cut_off(asyncio.Protocol)
 
 
-async def test_who_reads_nothing_is_cut_off() -> None:
+async def test_a_connection_that_does_not_read_is_closed() -> None:
     await _is_cut_off(_Giver)

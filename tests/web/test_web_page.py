@@ -56,7 +56,7 @@ def test_a_page_that_is_reloaded_at_once_loses_no_file(page: Browser) -> None:
     page.open()
 
 
-def test_how_everything_is(page: Browser) -> None:
+def test_the_overview(page: Browser) -> None:
     assert page.text("#badges") == "DISARMED"
     assert page.text("#headline") == "Harakiri with the mission extension, STABILIZE, 12.6 V"
     assert (page.value("State"), page.value("Mode")) == ("disarmed", "STABILIZE")
@@ -129,7 +129,7 @@ def own_bench(tmp_path: Path) -> Iterator[WebBench]:
         yield bench
 
 
-def test_what_strangers_say_is_text(own_bench: WebBench) -> None:
+def test_foreign_text_is_not_markup(own_bench: WebBench) -> None:
     """A file's name and a ground station's words come from outside."""
     evil = "<img src=x onerror=alert(1)><script>alert(2)</script>"
     item = {"command": 16, "frame": 3, "p1": 0, "p2": 3, "p3": 0, "p4": 0, "lat_e7": 453838000, "lon_e7": 84733000}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The `[web]` table and the token's file: what is taken, and what is said of what cannot be."""
+"""The `[web]` table and the token's file: accepted values, and messages about others."""
 
 from pathlib import Path
 
@@ -46,7 +46,7 @@ def test_one_word_in_the_environment_is_enough(tmp_path: Path, monkeypatch: pyte
         ),
     ],
 )
-def test_what_cannot_be_is_one_sentence(tmp_path: Path, text: str, said: list[str]) -> None:
+def test_an_invalid_table_is_one_sentence(tmp_path: Path, text: str, said: list[str]) -> None:
     with pytest.raises(SettingsError) as caught:
         load(tmp_path, text)
     (problem,) = map(str, caught.value.problems)
