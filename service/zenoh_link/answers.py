@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Queries about the vehicle: state, history, mission/current and mission/list."""
+"""Queries about the vehicle: state, overview, history, mission/current and mission/list."""
 
 from bridge.bridge import Bridge
 from service.control.mission_data import Json, strict
 from service.daemon.api import MissionJobs
 from service.zenoh_link import keys
 from service.zenoh_link.history import History
-from service.zenoh_link.payload import Payloads
+from service.zenoh_link.overview import overview_of
+from service.zenoh_link.payload import Payloads, plain
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.vehicle_data import VehicleData, mission_current
 
@@ -28,6 +29,7 @@ class Answers:
         self._history = history
         self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.STATE: self._state,
+            keys.OVERVIEW: self._overview,
             keys.HISTORY: self._past,
             keys.MISSION_CURRENT: self._mission_current,
             keys.MISSION_LIST: self._mission_list,
@@ -35,6 +37,9 @@ class Answers:
 
     async def _state(self, question: Question) -> None:
         self._tell(question, keys.STATE, self._data.state())
+
+    async def _overview(self, question: Question) -> None:
+        self._tell(question, keys.OVERVIEW, plain(overview_of(self._data.state())))
 
     async def _past(self, question: Question) -> None:
         most = _whole_number(question, "positions", 0, _MAX_POSITIONS)

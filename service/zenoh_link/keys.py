@@ -31,13 +31,15 @@ class SampleDelivery(Enum):
 class ZenohKey:
     """One key. `schema`: file name below schemas/, without its suffix; None: the payload is raw MAVLink.
 
-    `kept`: the number of samples kept for subscribers that lost some; 0: none.
+    `kept`: the number of samples kept for subscribers that lost some; 0: none. `is_compact`: CBOR in any case,
+    and the time in whole seconds.
     """
 
     suffix: str
     schema: str | None
     delivery: SampleDelivery
     kept: int = 0
+    is_compact: bool = False
 
     @property
     def is_published(self) -> bool:
@@ -47,6 +49,7 @@ class ZenohKey:
 
 TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}
 STATE = ZenohKey(f"{_V}/state", "state", SampleDelivery.DROP, kept=1)
+OVERVIEW = ZenohKey(f"{_V}/overview", "overview", SampleDelivery.DROP, is_compact=True)
 EVENT = ZenohKey(f"{_V}/event", "event", SampleDelivery.RELIABLE, kept=256)
 HISTORY = ZenohKey(f"{_V}/history", "history", SampleDelivery.REPLY)
 MISSION_CURRENT = ZenohKey(f"{_V}/mission/current", "mission_current", SampleDelivery.RELIABLE, kept=1)
@@ -66,6 +69,7 @@ COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS, RATES)
 KEYS = (
     *TELEMETRY.values(),
     STATE,
+    OVERVIEW,
     EVENT,
     HISTORY,
     MISSION_CURRENT,

@@ -34,6 +34,7 @@ from service.zenoh_link.history import History
 from service.zenoh_link.keys import ZenohKey
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
+from service.zenoh_link.overview import overview_of
 from service.zenoh_link.payload import Payloads, plain
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
@@ -194,6 +195,10 @@ class Node:
         marks = (state["status"]["armed"], state["mission"], state["link"]["state"], state["others_of_this_name"])
         if self._publisher.is_declared and self._rates.admits_state(marks, self._loop.time()):
             self._publisher.put(keys.STATE, state)
+        if self._publisher.has_readers(keys.OVERVIEW):
+            overview = overview_of(state)
+            if self._rates.admits_overview(overview.marks, self._loop.time()):
+                self._publisher.put(keys.OVERVIEW, plain(overview))
         held = self._daemon.bridge.missions.held
         if held is not self._held:
             self._held = held

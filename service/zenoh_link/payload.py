@@ -49,24 +49,31 @@ class Payloads:
 
     def encoding(self, key: ZenohKey) -> zenoh.Encoding:
         """The encoding of a key's samples."""
-        return encoding_of(key, self._encoding)
+        return encoding_of(key, self._encoding_for(key))
 
     def encode(self, key: ZenohKey, body: Json) -> bytes:
         """Encode a payload. May be called on any thread."""
-        if self._encoding is PayloadEncoding.CBOR and key.schema is not None:
+        if self._encoding_for(key) is PayloadEncoding.CBOR and key.schema is not None:
             return compact.dumps(key.schema, body)
         return _to_json(body)
+
+    def _envelope(self, key: ZenohKey, seq: int) -> Json:
+        time_s = self._clock()
+        return {"v": VERSION, "seq": seq, "time_s": round(time_s) if key.is_compact else time_s}
+
+    def _encoding_for(self, key: ZenohKey) -> PayloadEncoding:
+        return PayloadEncoding.CBOR if key.is_compact else self._encoding
 
     def head(self, key: ZenohKey) -> Json:
         """Begin the next payload of a key."""
         seq = self._next.get(key.suffix, 0)
         self._next[key.suffix] = seq + 1
-        return {"v": VERSION, "seq": seq, "time_s": self._clock()}
+        return self._envelope(key, seq)
 
     def answer(self, key: ZenohKey, body: Json) -> bytes:
         """Make the reply to a query: it has the number of the last sample."""
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
-        return self.encode(key, {"v": VERSION, "seq": seq, "time_s": self._clock(), **body})
+        return self.encode(key, self._envelope(key, seq) | body)
 
 
 def plain(thing: Any) -> Json:

@@ -15,6 +15,7 @@ from service.settings.zenoh import STATE_NAME, ZenohProfile
 #: The metered profile: a group every 5 s if it has changed, else every 30 s, like the state.
 _METERED_S = 5.0
 _IDLE_S = 30.0
+_OVERVIEW, _OVERVIEW_S = "overview", 10.0
 #: The changes that count; noise does not, nor does a field that is not listed.
 _CHANGES: Mapping[Group, Mapping[str, float]] = {
     Group.ATTITUDE: {"roll_deg": 2, "pitch_deg": 2, "heading_deg": 5},
@@ -43,7 +44,7 @@ class SampleRates:
         #: The groups sent more rarely while unchanged, each with the values of its last sample.
         self._last: dict[str, Any] = dict.fromkeys(self._interval_s.keys() - {STATE_NAME} - limits_hz.keys())
         self._idle_until: dict[str, float] = {}
-        self._interval_s |= {name: 1 / hz if hz else inf for name, hz in limits_hz.items()}
+        self._interval_s |= {_OVERVIEW: _OVERVIEW_S} | {name: 1 / hz if hz else inf for name, hz in limits_hz.items()}
         self._requests: dict[str, tuple[float, float]] = {}
         self._due_at: dict[str, float] = {}
         self._sent: dict[str, object] = {}
@@ -68,6 +69,10 @@ class SampleRates:
     def admits_state(self, marks: object, now: float) -> bool:
         """True if the state goes out now. `marks`: values whose change is sent at once."""
         return STATE_NAME not in self._interval_s or self._admits(STATE_NAME, marks, now)
+
+    def admits_overview(self, marks: object, now: float) -> bool:
+        """True if the overview goes out now. `marks`: values whose change is sent at once."""
+        return self._admits(_OVERVIEW, marks, now)
 
     def request(self, name: str, rate_hz: float, until: float) -> None:
         """Raise a rate until that time. The owner's own rate stays the minimum."""

@@ -17,6 +17,7 @@ from protocols.mission_item import MissionItem
 from service.control.mission_data import Json
 from service.zenoh_link.compact import CBOR_KEY, SCHEMAS, object_schema
 from service.zenoh_link.keys import VERSION
+from service.zenoh_link.overview import Overview
 from storage.mission_store import MissionSummary
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -57,6 +58,7 @@ def schemas() -> dict[str, Json]:
         },
         **_fields(VehicleReport),
     }
+    made["overview"] = _fields(Overview)
     made["event"] = {
         "level": {"enum": ["debug", "info", "warning", "error"]},
         "event": {"type": "string", "pattern": r"^[a-z0-9_]+(\.[a-z0-9_]+)+$"},

@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import pytest
 import zenoh
 from zenoh import ext
 
@@ -118,6 +119,12 @@ def test_a_recorder_of_everything_is_not_a_ground_station(start: Starter) -> Non
         status = bench.daemon.status()
         assert status is not None
         assert status["ground_stations"] == []
+        overview = reader.wait("overview", lambda each: each["mission_count"] is not None)
+        state = reader.of("state")[-1]
+        assert (overview["link"], overview["armed"], overview["mission_count"]) == ("MSP", False, 0)
+        assert overview["lat_e7"] == pytest.approx(state["position"]["lat_deg"] * 1e7, abs=100)
+        assert ask_surely(opened, "overview")["mission_checksum"] == int(state["mission"]["checksum"], 16)
+        assert all(len(each.payload) <= 60 for each in reader.samples if str(each.key_expr) == key("overview"))
         assert not [each for each in reader.samples if "@" in str(each.key_expr)]
 
 
