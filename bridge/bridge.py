@@ -24,9 +24,8 @@ from bridge.gcs.guard import Guard
 from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, MissionService
+from bridge.missions.mission_service import NO_LINK, MissionService, MissionTransfer
 from bridge.model.events import EventLog, Incidents
-from bridge.model.mission_transfer import MissionTransfer
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import FlightState
 from bridge.vehicle.commands import CommandService

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from bridge.gcs.station import Peer, Station
 from bridge.model.events import EventLog
-from protocols.mavlink.command_result import CommandResult
+from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame

@@ -161,16 +161,6 @@ def _lasting(reply: MspFrame, size: int | None) -> MspFrame:
     return replace(reply, payload=reply.payload[:size])
 
 
-def limit(seconds: float, size: int = 0) -> Conversation[None]:
-    """From now on, take no longer than this; see Limit."""
-    yield TimeLimit(seconds, size)
-
-
-def pause(seconds: float) -> Conversation[None]:
-    """Wait."""
-    yield Pause(seconds)
-
-
 def save(mission: ArrivedMission) -> Conversation[int | None]:
     """Store a received mission; its number, or None if the store failed."""
     number: int | None = yield Save(mission)

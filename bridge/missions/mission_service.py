@@ -6,9 +6,10 @@ Ground stations (bridge.vehicle.mission_upload, mission_download) and the comman
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Any
 
-from bridge.line.conversation import Conversation, LinkLost, Stopped, conclude, find_pending, pause, recall, save
+from bridge.line.conversation import Conversation, Pause, conclude, find_pending, recall, save
 from bridge.missions.fc_mission_store import (
     LIST_IS_GONE,
     AnyFcMissionStore,
@@ -20,7 +21,6 @@ from bridge.missions.fc_mission_store import (
 from bridge.missions.list_check import MissionRules
 from bridge.missions.mission_texts import summary
 from bridge.model.mission_log import ArrivedMission, Outcome, PendingMission
-from bridge.model.mission_transfer import MissionTransfer, TransferStep
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.vehicle import Vehicle
 from bridge.model.verdict import Result, Verdict
@@ -30,6 +30,23 @@ from protocols.mission_record import ListIdentity, identify
 #: The timeout for a running flash write (docs/mission-rules.md).
 _BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
+
+
+class TransferStep(Enum):
+    """The two halves of an upload; a push has only the second."""
+
+    RECEIVING = "receiving"
+    WRITING = "writing"
+
+
+@dataclass(frozen=True, slots=True)
+class MissionTransfer:
+    """`done` of `total` items or records. All records written does not mean verified: read-back follows."""
+
+    source: str
+    step: TransferStep
+    done: int
+    total: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +87,7 @@ _ERASED = "erased there to make room; `naze-bridge missions restore` writes it a
 _NO_COPY = "Nothing written: a mission that does not fit next to it could not be copied to the Pi"
 NO_LINK = Refusal(MissionResult.DENIED, "No link to the flight controller")
 _BUSY = Refusal(MissionResult.DENIED, "Flight controller is busy writing: try again")
-_STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
+STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again later")
 OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
@@ -130,7 +147,7 @@ class MissionService:
     def occupied(self) -> Refusal | None:
         """The reason that no list can be written now, if there is one."""
         if self._closed:
-            return _STOPPING
+            return STOPPING
         return None if self._owner is None else OCCUPIED
 
     def acquire(self, owner: object) -> Refusal | None:
@@ -163,35 +180,27 @@ class MissionService:
         if (armed := self.armed_refusal()) is not None:
             return armed
         waited_s = 0.0
-        try:
-            while True:
-                if self._dialect is None:
-                    return self._refusal
-                yield from self._dialect.reload()
-                report = yield from self._dialect.report()
-                if report is None:
-                    return NO_LINK
-                if report.state is StoreState.READY:
-                    return report
-                if report.state is StoreState.ARMED:
-                    return ARMED
-                if waited_s >= _BUSY_TIMEOUT_S:
-                    return _BUSY
-                yield from pause(_BUSY_INTERVAL_S)
-                waited_s += _BUSY_INTERVAL_S
-        except Stopped:
-            return _STOPPING
-        except LinkLost:
-            return NO_LINK
+        while True:
+            if self._dialect is None:
+                return self._refusal
+            yield from self._dialect.reload()
+            report = yield from self._dialect.report()
+            if report is None:
+                return NO_LINK
+            if report.state is StoreState.READY:
+                return report
+            if report.state is StoreState.ARMED:
+                return ARMED
+            if waited_s >= _BUSY_TIMEOUT_S:
+                return _BUSY
+            yield Pause(_BUSY_INTERVAL_S)
+            waited_s += _BUSY_INTERVAL_S
 
     def rules(self) -> Conversation[MissionRules | Refusal]:
         """The rules of the current flight controller, armed or not."""
         if self._dialect is None:
             return self._refusal
-        try:
-            report = yield from self._dialect.report()
-        except LinkLost:
-            return NO_LINK
+        report = yield from self._dialect.report()
         return NO_LINK if report is None else report.rules
 
     def deliver(
@@ -277,20 +286,15 @@ class MissionService:
         dialect = self._dialect
         if dialect is None:
             return self._refusal
-        try:
-            report = yield from dialect.report()
-            if report is None:
-                return NO_LINK
-            if self.held is not None and self.held.identity == report.stored:
-                return self._refreshed(dialect, self.held)
-            if report.state is StoreState.ARMED and report.stored is None and not dialect.reads_armed:
-                return ARMED
-            records = yield from dialect.pull()
-            if records is None:
-                return NO_LINK
-        except Stopped:
-            return _STOPPING
-        except LinkLost:
+        report = yield from dialect.report()
+        if report is None:
+            return NO_LINK
+        if self.held is not None and self.held.identity == report.stored:
+            return self._refreshed(dialect, self.held)
+        if report.state is StoreState.ARMED and report.stored is None and not dialect.reads_armed:
+            return ARMED
+        records = yield from dialect.pull()
+        if records is None:
             return NO_LINK
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:

@@ -20,7 +20,7 @@ from bridge.gcs.cost import TOO_MANY_WRITES, Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.vehicle.own_vehicle import OwnVehicle
-from protocols.mavlink.command_result import CommandResult
+from protocols.mavlink.command import CommandResult
 from protocols.mavlink.dialect import messages
 
 _MAX_U16, _MAX_I32 = (1 << 16) - 1, (1 << 31) - 1

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from bridge.gcs.ground import Ground
-from bridge.line.conversation import Conversation, LinkLost
+from bridge.line.conversation import Conversation, LinkLost, Stopped
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, MissionService
+from bridge.missions.mission_service import NO_LINK, STOPPING, MissionService
 from bridge.model.events import EventLog, Incidents
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
@@ -30,9 +30,11 @@ class MissionContext:
     def run(
         self, conversation: Conversation[T | Refusal], on_done: Callable[[T | Refusal, float], None], now: float
     ) -> None:
-        """Run a conversation; `on_done` gets its result and the time. A lost link is a refusal."""
+        """Run a conversation; `on_done` gets its result and the time. A lost line is a refusal, too."""
 
         def done(result: T | Refusal | LinkLost, at: float) -> None:
-            on_done(NO_LINK if isinstance(result, LinkLost) else result, at)
+            if isinstance(result, LinkLost):
+                result = STOPPING if isinstance(result, Stopped) else NO_LINK
+            on_done(result, at)
 
         self.runner.start(conversation, done, now)

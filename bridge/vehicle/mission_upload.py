@@ -16,12 +16,11 @@ from bridge.gcs.station import Peer, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
-from bridge.missions.mission_service import NO_LINK, OCCUPIED, DeliveryResult
+from bridge.missions.mission_service import NO_LINK, OCCUPIED, DeliveryResult, MissionTransfer, TransferStep
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.events import Level
 from bridge.model.finding import Finding, News
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.mission_transfer import MissionTransfer, TransferStep
 from bridge.model.refusal import ARMED, Refusal
 from bridge.model.verdict import CLEARED_LIST, Result, Verdict
 from bridge.vehicle.mission_context import MissionContext
@@ -338,17 +337,15 @@ class MissionUploads:
         if self._in(Asking) and not self._is_asking and now >= self._may_ask_at:
             self._is_asking = True
             self._may_ask_at = now + _ASK_INTERVAL_S
-            self._runner.start(self._missions.preflight(), self._asked, now)
+            self._context.run(self._missions.preflight(), self._asked, now)
 
-    def _asked(self, answer: StoreReport | Refusal | LinkLost, now: float) -> None:
+    def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
         self._is_asking = False
         for upload in self._in(Asking):
             self._answered(upload, answer, now)
 
-    def _answered(self, upload: _Upload, answer: StoreReport | Refusal | LinkLost, now: float) -> None:
-        if isinstance(answer, LinkLost):
-            answer = NO_LINK
-        elif isinstance(answer, StoreReport) and (rejection := check_count(upload.count, answer.rules)):
+    def _answered(self, upload: _Upload, answer: StoreReport | Refusal, now: float) -> None:
+        if isinstance(answer, StoreReport) and (rejection := check_count(upload.count, answer.rules)):
             answer = Refusal(rejection.ack, rejection.finding.text())
         if isinstance(answer, Refusal):
             self._handle(upload, Ended(answer), now)

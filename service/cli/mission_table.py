@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from bridge.model.finding import DROPPED, Finding, News
-from protocols.mavlink.command_name import command_name
+from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 from service.control.mission_data import Json, mission_items
 

@@ -44,8 +44,7 @@ from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.kept_answers import KeptAnswers
 from service.web.link_history import LinkHistory
 from service.web.metrics import CONTENT_TYPE, Metrics
-from service.web.mission_files import MissionFiles
-from service.web.mission_writer import MissionWriter
+from service.web.mission_files import MissionFiles, MissionWriter
 from service.web.telemetry_logs import TelemetryLogs
 from service.web.token import Token, TokenError
 from storage.store_error import StoreError

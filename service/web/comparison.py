@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
 from bridge.model.finding import DROPPED, REJECTED, Finding
-from protocols.mavlink.command_name import command_name
+from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 from service.control.mission_data import Json, mission_items
 

@@ -6,6 +6,8 @@ milliseconds, so checks run one at a time with a pause after each.
 """
 
 import asyncio
+import secrets
+from collections.abc import Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
 
@@ -18,12 +20,50 @@ from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
 from service.web.access import Refused
 from service.web.comparison import MAX_ROWS, checked_mission
-from service.web.mission_writer import MissionWriter
+from storage.store_error import StoreError
 
 _PAUSE_S = 0.25
 _MAX_NAME = 80
 #: A page of another site cannot send this type without a preflight request, which is refused.
 _CONTENT_TYPE = "application/octet-stream"
+
+
+Progress = Callable[[Json], None]
+
+
+class MissionWriter:
+    """One write at a time. `state`: the present or latest one as the page shows it, None before the first."""
+
+    def __init__(self) -> None:
+        self._task: asyncio.Task[None] | None = None
+        self.state: Json | None = None
+
+    def begin(self, what: str, write: Callable[[Progress], Awaitable[Json]]) -> str:
+        """Start writing; returns the write's id, by which the page knows its own result. Refused: one is running."""
+        if self._task is not None and not self._task.done():
+            raise Refused(HTTPStatus.CONFLICT, "Another mission is being written: wait until it has finished.")
+        state: Json = {"id": secrets.token_hex(8), "what": what, "records": 0, "done": False, "ok": False, "text": ""}
+        self.state = state
+        self._task = asyncio.get_running_loop().create_task(self._run(write, state))
+        return str(state["id"])
+
+    async def close(self) -> None:
+        """Stop waiting for the result; the daemon itself has ended the transfer."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    async def _run(self, write: Callable[[Progress], Awaitable[Json]], state: Json) -> None:
+        def progress(told: Json) -> None:
+            state["records"] = told["progress"]
+
+        try:
+            answer = await write(progress)
+            state |= {"ok": answer["ack"] == "MAV_MISSION_ACCEPTED", "text": answer["text"]}
+        except (ControlError, StoreError, ValueError) as error:
+            state["text"] = str(error)
+        finally:
+            state["done"] = True
 
 
 class MissionFiles:

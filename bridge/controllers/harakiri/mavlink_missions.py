@@ -16,7 +16,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.mission_store import HarakiriStore
 from bridge.controllers.harakiri.rules import MAV_COMMANDS, items_from_records
 from bridge.controllers.harakiri.single_precision import degrees_read_e7, degrees_to_send
-from bridge.line.conversation import Await, Conversation, LinkLost, Stopped, Transmit, pause
+from bridge.line.conversation import Await, Conversation, LinkLost, Pause, Stopped, Transmit
 from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult, StoreReport, StoreState
 from bridge.model.vehicle import Vehicle
 from protocols.mavlink.codec import MavlinkDecoder, pack
@@ -56,7 +56,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
 
     def report(self) -> Conversation[StoreReport | None]:
         """Its state from telemetry; the stored list is unknown until it is read."""
-        yield from pause(0.0)
+        yield from ()
         armed = self._vehicle.armed
         if armed is None:
             return None
@@ -76,7 +76,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
                         yield from self._write(items, progress)
                     except Stopped:
                         raise PushFailed(PushFailure.STOPPED) from None
-                    yield from pause(_WRITTEN_AFTER_S)
+                    yield Pause(_WRITTEN_AFTER_S)
                     held = yield from self.pull()
                     return PushResult(None if held == records else PushFailure.UNCERTAIN)
                 except PushFailed as failed:
@@ -87,7 +87,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
                     if failed.is_final:
                         break
                     if failure is PushFailure.BUSY:
-                        yield from pause(_WRITTEN_AFTER_S)
+                        yield Pause(_WRITTEN_AFTER_S)
         except LinkLost:
             failure = PushFailure.UNCERTAIN
         return PushResult(failure)

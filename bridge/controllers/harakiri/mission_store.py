@@ -12,11 +12,11 @@ from bridge.line.conversation import (
     Conversation,
     LinkLost,
     OutOfTime,
+    Pause,
     Stopped,
+    TimeLimit,
     ask,
     ask_surely,
-    limit,
-    pause,
     receive,
     send,
 )
@@ -112,7 +112,7 @@ class HarakiriMissions(HarakiriStore):
         wanted = identify(records)
         failure = PushFailure.NO_ANSWER
         self._may_be_stored = False
-        yield from limit(_PUSH_S, 2 * len(records) * (RECORD_SIZE + FRAME_OVERHEAD))
+        yield TimeLimit(_PUSH_S, 2 * len(records) * (RECORD_SIZE + FRAME_OVERHEAD))
         try:
             for _ in range(_MAX_BEGINS):
                 try:
@@ -207,7 +207,7 @@ class HarakiriMissions(HarakiriStore):
             answer = None if reply is None else decode(reply.payload)
             if answer is None or answer.status is not ReplyStatus.BUSY or waited_s >= _BUSY_TIMEOUT_S:
                 return answer
-            yield from pause(_BUSY_INTERVAL_S)
+            yield Pause(_BUSY_INTERVAL_S)
             waited_s += _BUSY_INTERVAL_S
 
     def _transfer(self, records: Sequence[WpRecord], begun: Staged, progress: PushProgress) -> Conversation[None]:
@@ -271,7 +271,7 @@ class HarakiriMissions(HarakiriStore):
     def _look_what_is_stored(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
         """Ask if COMMIT succeeded after all; only silence leaves it uncertain."""
         try:
-            yield from limit(_LOOK_S)
+            yield TimeLimit(_LOOK_S)
             info = yield from self._read_info()
         except LinkLost:
             info = None

@@ -12,7 +12,7 @@ from bridge.controllers.harakiri.rules import (
     command_rules,
 )
 from bridge.missions.list_check import UNUSED, Range
-from protocols.mavlink.command_name import command_name
+from protocols.mavlink.command import command_name
 from protocols.mission_item import Command
 
 _PLACES = {

@@ -6,6 +6,8 @@ Not a peer, because peers that have only a router in common do not see each othe
 
 import json
 import queue
+import subprocess
+import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +16,6 @@ from typing import Any
 
 import zenoh
 
-from service.cli.fleet.refusal import refusal
 from service.settings.zenoh_config import connect_endpoints, in_short, tls_files
 from service.zenoh_link.endpoint_trouble import endpoint_trouble
 from service.zenoh_link.keys import full
@@ -24,6 +25,14 @@ DEFAULT_ENDPOINT = "tcp/localhost:7447"
 AT_ONCE = 50
 #: For peers that do not speak zenoh; zenoh's own default is 10 s.
 _OPEN_TIMEOUT_MS = 3000
+_TRY = "import sys, zenoh; zenoh.init_log_from_env_or('error'); zenoh.open(zenoh.Config.from_json5(sys.stdin.read()))"
+_TIMEOUT_S = 6.0
+#: The log messages of zenoh 1.10 on either side of a rejected handshake.
+_REASONS = {
+    "reason INVALID": "the router accepts no more sessions: raise transport/unicast/max_sessions in its configuration",
+    "reason GENERIC": "the router does not accept this user and password",
+    "in response to an InitSyn": "the router requires a user and a password: give them in --zenoh-config",
+}
 
 
 class FleetError(Exception):
@@ -51,7 +60,7 @@ def open_session(address: FleetAddress) -> zenoh.Session:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        trouble = refusal(config) or endpoint_trouble(endpoints, tls_files(config))
+        trouble = _refusal(config) or endpoint_trouble(endpoints, tls_files(config))
         raise FleetError(f"cannot join the fleet: {trouble}") from error
 
 
@@ -155,3 +164,19 @@ def _from_file(path: Path) -> zenoh.Config:
         raise FleetError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
     except zenoh.ZError as error:
         raise FleetError(f"{path} is not a zenoh configuration: {in_short(error)}") from error
+
+
+def _refusal(config: zenoh.Config) -> str | None:
+    """The router's reason, in one line; None if it gave none. Blocks for some seconds."""
+    try:
+        tried = subprocess.run(  # noqa: S603  # this Python, without any user input
+            [sys.executable, "-c", _TRY],
+            input=str(config),
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT_S,
+            check=False,
+        )
+    except (subprocess.TimeoutExpired, OSError):
+        return None
+    return next((said for sign, said in _REASONS.items() if sign in tried.stdout), None)
