@@ -5,7 +5,7 @@ import sys
 
 from service.cli.cli_page import helps
 from service.cli.main import main
-from service.machine.version import version
+from service.machine.package import version
 
 _HEAD = """\
 .TH NAZE-BRIDGE 1 "" "naze-bridge {version}" "User Commands"

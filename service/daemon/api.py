@@ -24,7 +24,7 @@ from protocols.mission_record import pack_records
 from service.control.client import ControlError
 from service.control.mission_data import MOST, Json, mission_items, to_json, verdict_data, whole_number
 from service.daemon.daemon import Daemon
-from service.machine.version import version
+from service.machine.package import version
 from service.recording.store_worker import as_dicts
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission, StoreError
 

@@ -30,9 +30,8 @@ from service.links.gcs_links import GcsLink, LinkError, open_link
 from service.links.msp_share import Share, open_share
 from service.links.port_finder import PortFinder
 from service.links.signing_state import SigningState
-from service.machine.documentation import page
 from service.machine.host import Host
-from service.machine.version import version
+from service.machine.package import page, version
 from service.recording.recorder import Recording
 from service.recording.store_worker import StoreWorker
 from service.settings import PassThroughRule, Settings

@@ -35,7 +35,7 @@ from service.control.mission_data import MOST, Json, mission_items, to_json
 from service.daemon.api import MissionJobs
 from service.daemon.daemon import Daemon
 from service.machine.host import Host
-from service.machine.version import version
+from service.machine.package import version
 from service.recording.recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, Refused, check_token, guarded

@@ -20,7 +20,7 @@ from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
 from service.control.mission_data import Json
 from service.daemon.daemon import Daemon
-from service.machine.version import version
+from service.machine.package import version
 from service.settings.zenoh import host_name
 
 #: The content type of /metrics.

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.machine.host import Host
-from service.machine.version import version
+from service.machine.package import version
 from service.recording.store_worker import DATABASE_NAME
 
 _SYNCED = "/run/systemd/timesync/synchronized"

@@ -5,8 +5,8 @@ import re
 from collections.abc import Sequence
 
 from service.cli.doctor.checked import Checked, note, ok, problem
-from service.machine.documentation import page
 from service.machine.host import Host
+from service.machine.package import page
 from service.settings.addresses import GcsAddress
 
 #: The state of listening sockets in /proc/net/tcp.

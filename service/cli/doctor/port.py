@@ -8,8 +8,8 @@ from pathlib import Path
 
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.links.serial_ports import serial_ports
-from service.machine.documentation import page
 from service.machine.host import LOGIN_PROGRAMS, Host, Process
+from service.machine.package import page
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import FcAddress, SerialFc
 

@@ -12,7 +12,6 @@ from protocols.mission_file import MissionFileError, write_qgc_wpl
 from service.cli.command_group import CommandGroup
 from service.cli.fleet.conditions import Condition, matching
 from service.cli.fleet.enroll_command import enroll
-from service.cli.fleet.fleet_table import complaints, fleet_table
 from service.cli.fleet.options import (
     INTERRUPTED,
     PATH,
@@ -25,6 +24,7 @@ from service.cli.fleet.options import (
 from service.cli.fleet.pull import Held, pull
 from service.cli.fleet.push_command import push_mission, verify_mission
 from service.cli.fleet.roll_call import alive, chosen, roll_call
+from service.cli.fleet.tables import complaints, fleet_table
 from service.cli.fleet.watch import watching
 from service.cli.fleet.watch_screen import print_changes, show_screen
 from service.cli.mission_source import save_mission

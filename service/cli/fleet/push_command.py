@@ -21,9 +21,9 @@ from service.cli.fleet.options import (
     where_option,
 )
 from service.cli.fleet.push import FleetPush, push
-from service.cli.fleet.push_table import progress_bars, push_data, push_summary, push_table, trial_table
 from service.cli.fleet.roll_call import alive, chosen, roll_call
 from service.cli.fleet.session import FleetError
+from service.cli.fleet.tables import progress_bars, push_data, push_summary, push_table, trial_table
 from service.cli.fleet.trial import Trial, try_mission
 from service.cli.mission_source import mission_bytes
 from service.cli.printing import print_json, print_table

@@ -17,8 +17,8 @@ from rich.live import Live
 from rich.text import Text
 
 from service.cli.fleet.conditions import Condition
-from service.cli.fleet.fleet_table import watch_table
 from service.cli.fleet.session import is_connected
+from service.cli.fleet.tables import watch_table
 from service.cli.fleet.vehicle import FleetVehicle, in_order
 from service.cli.fleet.watch import Watch
 from service.cli.printing import print_json

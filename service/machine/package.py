@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The location of documentation pages on this machine."""
+"""The installed naze-bridge: its version, and the location of its documentation on this machine."""
 
+from importlib import metadata
 from pathlib import Path
 
 _INSTALLED = Path("/usr/share/doc/naze-bridge")
@@ -10,3 +11,11 @@ _IN_PACKAGE = Path(__file__).is_relative_to("/usr/lib/naze-bridge")
 def page(name: str) -> str:
     """The path to give in a message for `name`, a path in the repository such as "docs/signing.md"."""
     return str(_INSTALLED / name) if _IN_PACKAGE else name
+
+
+def version() -> str:
+    """The installed version; "unknown" in a folder that was never installed."""
+    try:
+        return metadata.version("naze-bridge")
+    except metadata.PackageNotFoundError:
+        return "unknown"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The progress and the result of a push to the fleet, for a terminal."""
+"""The fleet, and the progress and result of a push to it, as tables for a terminal."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich import box
@@ -14,13 +14,86 @@ from rich.text import Text
 from service.cli.fleet.payload import part, text, whole
 from service.cli.fleet.push import FleetPush, PushState
 from service.cli.fleet.trial import Trial
+from service.cli.fleet.vehicle import FleetVehicle
 from service.control.mission_data import Json
 
+_UNKNOWN = "-"
 _ANSWERS = {
     True: Text("yes", style="green"),
     False: Text("no", style="bold red"),
     None: Text("not known", style="yellow"),
 }
+
+
+def _table(caption: Text | None = None) -> Table:
+    padding = (0, 1, 0, 0)
+    return Table(box=box.SIMPLE_HEAD, padding=padding, show_edge=False, caption=caption, caption_justify="left")
+
+
+def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table:
+    """One row per bridge, each on one line of 80 columns: vehicle, age of its state, problem."""
+    table = _table()
+    table.add_column("Vehicle", no_wrap=True, overflow="ellipsis", max_width=20)
+    table.add_column("Armed", no_wrap=True)
+    for title in ("Battery", "Height"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("Mission", no_wrap=True)
+    table.add_column("Heard", justify="right", no_wrap=True)
+    table.add_column("Problem, or mode", no_wrap=True, overflow="ellipsis", max_width=20)
+    for vehicle, age_s, problem in rows:
+        name, _, armed, battery, _, _, height, mission = _cells(vehicle)
+        age = Text(_UNKNOWN if age_s is None else f"{age_s:.0f} s")
+        last = Text(problem, style="yellow") if problem else Text(vehicle.mode or _UNKNOWN)
+        table.add_row(name, armed, battery, height, mission, age, last)
+    return table
+
+
+def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
+    """Make one row per bridge."""
+    caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
+    table = _table(caption)
+    table.add_column("Vehicle", overflow="fold")
+    table.add_column("Speaks", no_wrap=True)
+    table.add_column("Armed")
+    for title in ("Battery", "Latitude", "Longitude", "Height"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("Mission", no_wrap=True)
+    for vehicle in fleet:
+        table.add_row(*_cells(vehicle))
+    return table
+
+
+def complaints(fleet: Iterable[FleetVehicle]) -> list[str]:
+    """The problems of the fleet, a line each."""
+    lines: dict[str, None] = {}
+    for vehicle in fleet:
+        if vehicle.bridges > 1:
+            line = f"{vehicle.name}: {vehicle.bridges} bridges use this name; give each one its own (zenoh.vehicle)"
+            lines[line] = None
+        if not vehicle.answers:
+            lines[f"{vehicle.name}: alive, but sends no state"] = None
+    return list(lines)
+
+
+def _cells(vehicle: FleetVehicle) -> list[Text]:
+    armed = {True: Text("ARMED", style="bold red"), False: Text("no"), None: Text(_UNKNOWN)}[vehicle.armed]
+    mission = _UNKNOWN
+    if vehicle.mission_count is not None:
+        mission = f"{vehicle.mission_count:3} {vehicle.mission_checksum}" if vehicle.mission_count else "none"
+    return [
+        Text(vehicle.name),
+        Text(vehicle.protocol or _UNKNOWN),
+        armed,
+        _number(vehicle.battery_v, ".1f", " V"),
+        _number(vehicle.lat_deg, ".5f"),
+        _number(vehicle.lon_deg, ".5f"),
+        _number(vehicle.height_m, ".0f", " m"),
+        Text(mission),
+    ]
+
+
+def _number(value: float | None, form: str, unit: str = "") -> Text:
+    return Text(_UNKNOWN if value is None else f"{value:{form}}{unit}")
 
 
 @contextmanager
@@ -41,7 +114,7 @@ def progress_bars(fleet: FleetPush, item_count: int) -> Iterator[Callable[[Fleet
 
 def push_table(fleet: FleetPush) -> Table:
     """One row per vehicle: its result, and the reason."""
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    table = _table()
     table.add_column("Vehicle", overflow="fold")
     table.add_column("Push", no_wrap=True)
     table.add_column("Details")
@@ -60,7 +133,7 @@ def _result(progress: PushState) -> Text:
 
 def trial_table(trials: Sequence[Trial], question: str, answer: Callable[[Trial], bool | None]) -> Table:
     """One row per vehicle: the answer to a question, and each correction below it."""
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    table = _table()
     table.add_column("Vehicle", overflow="fold")
     table.add_column("Records", justify="right", no_wrap=True)
     table.add_column("Checksum", no_wrap=True)
