@@ -25,8 +25,8 @@ class Mavlink(State):
         self.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=not profile.is_passed_through)
         if not profile.is_passed_through:
             port.runner.mavlink_up(self._line)
-        if event.found.heard is not None:
-            self.telemetry.take([event.found.heard], now)
+        if event.heard is not None:
+            self.telemetry.take([event.heard], now)
 
     @property
     def bad_checksums(self) -> int | None:
