@@ -305,11 +305,14 @@ class Vehicle:
         return news
 
     def home_or_position(self) -> Home | None:
-        """Home; before it is known, the current position."""
-        position = self.last(GlobalPosition)
+        """Home; before it is known, the current position, at the altitude of the launch."""
+        position, height = self.last(GlobalPosition), self.last(Height)
         if self.home is not None or position is None:
             return self.home
-        return Home(position.lat_e7, position.lon_e7, position.altitude_m)
+        altitude_m = position.altitude_m
+        if self.armed and height is not None and altitude_m is not None:
+            altitude_m -= height.height_m
+        return Home(position.lat_e7, position.lon_e7, altitude_m)
 
     def place(self) -> tuple[int, int] | None:
         """The same in degrees * 1e7."""

@@ -326,6 +326,7 @@ def test_a_craft_that_is_armed_from_the_start_has_an_item_0(board: str | Telemet
     assert item.get_type() == "MISSION_ITEM_INT"
     world.run(3)
     (home_item,) = ask(station, request_message(0))
+    assert home_item.z == pytest.approx(131, abs=1.5)  # where it was launched: it is higher by now
     for home in station.said("HOME_POSITION")[-1:]:
         assert (home_item.x, home_item.y, home_item.z) == (home.latitude, home.longitude, home.altitude / 1000)
     assert not any("disarm to change" in text for text in station.texts())
