@@ -53,16 +53,16 @@ def main() -> int:
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.ERROR))
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     if load > cores / 2:
-        print(f"Other programs keep this machine busy (load {load:.1f} on {cores} cores): expect figures to be worse.")
+        print(f"This machine is busy (load {load:.1f} on {cores} cores): the figures will be worse.")
     figures: list[Figure] = []
     for name in names:
         print(f"Measuring {name} ...", flush=True)
         figures += _BENCHMARKS[name]()
     print_table(figures)
-    print(f"Kept in {keep_json(figures, load)}")
+    print(f"Saved in {keep_json(figures, load)}")
     missed = sum(figure.is_missed for figure in figures)
     if missed:
-        print(f"{missed} of the targets missed")
+        print(f"{missed} targets missed")
     return int(missed > 0)
 
 

@@ -50,7 +50,7 @@ def measure() -> list[Figure]:
     """Measure all forwarders on this machine, on one CPU and, if there are two, on separate ones."""
     peers = forwarders()
     for name in set(_OTHERS) - {peer.name for peer in peers}:
-        print(f"  without {name}: it is not on this machine")
+        print(f"  without {name}: not installed")
     here, *others = sorted(os.sched_getaffinity(0))
     with on_cpu(here):
         figures = _judged(_rounds(peers, here, _ROUNDS))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The time in which the daemon finds a flight controller, finds it again, and its verdicts on noise.
+"""The times to find a flight controller and to find it again, and wrong verdicts on noise.
 
 Daemon and simulated Naze run in separate processes. The daemon is running without a port when the clock starts: the
 port appears with a flight controller on it, and the clock stops with a line of the daemon's log, so the figures include

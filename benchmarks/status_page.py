@@ -52,7 +52,7 @@ def measure() -> list[Figure]:
             pressed = _pushes_ms(state_dir)
         answered = sum(float(line) for line in (folder / "browsers.log").read_text().splitlines())
         after = resident_mb(bridge.pid)
-    floor = Floor(statistics.median(quiet), "in peace")
+    floor = Floor(statistics.median(quiet), "undisturbed")
     name = f"push of 146 records under {answered:.0f} answers/s"
     return [
         Figure("daemon with everything on, page not open: CPU of one core", percent, "%", None, _PROMISED_PERCENT),

@@ -5,7 +5,7 @@
 #include "board.h"
 #include "mw.h"
 
-/* The slots lie right below the configuration. stm32_flash.ld refuses to link a program that reaches LINKED_BELOW. */
+/* The slots are directly below the configuration. stm32_flash.ld refuses to link a program that reaches LINKED_BELOW. */
 #define MISSION_FLASH_ADDR (FLASH_WRITE_ADDR - NM_FLASH_SIZE)
 #define LINKED_BELOW 0x0801DC00u
 
@@ -73,7 +73,7 @@ static void set_radius(void *self, uint16_t radius_cm)
 {
     (void)self;
     cfg.gps_wp_radius     = radius_cm;
-    ScheduleEEPROMwriteMS = 1; /* in this loop: arming and missions need not wait for it */
+    ScheduleEEPROMwriteMS = 1; /* in this loop, so that arming and missions do not wait for it */
 }
 
 static void list_changed(void *self, const uint8_t *records, uint16_t count)
@@ -88,7 +88,7 @@ static const nm_board_t board = {
     erase_page, program, flash, now_ms, armed, write_pending, radius, set_radius, list_changed,
 };
 
-/* The capacity that the core reports is the one that the firmware has. */
+/* The core must report the firmware's capacity. */
 typedef char floppy_holds_capacity[FDByteSize / sizeof(wp_t) == NM_CAPACITY && sizeof(wp_t) == NM_RECORD_SIZE ? 1 : -1];
 
 void MissionLoad(void)

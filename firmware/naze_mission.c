@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#define SEAL 0x0000u /* the one value that can be told from every torn or erased state, and that no torn one can pass */
+#define SEAL 0x0000u /* differs from every erased or partly programmed state */
 
 enum { MAGIC_AT = 0, COUNT_AT = 2, SEQUENCE_AT = 4, CHECKSUM_AT = 8, HEADER_CHECKSUM_AT = 12, SEAL_AT = 16, HEADER_SIZE = 18 };
 
@@ -35,7 +35,7 @@ static void put32(uint8_t *to, uint32_t value)
     put16(to + 2, (uint16_t)(value >> 16));
 }
 
-/* Go on with a CRC-32 of which `checksum` is the value so far (0 of nothing). Half a byte at a time: 64 bytes of table. */
+/* Continue a CRC-32 whose value so far is `checksum` (initially 0). Half a byte at a time: 64 bytes of table. */
 static uint32_t crc32(uint32_t checksum, const uint8_t *data, uint32_t length)
 {
     static const uint32_t table[16] = {
@@ -104,7 +104,7 @@ static bool blank(const uint8_t *bytes, uint16_t length)
     return true;
 }
 
-/* Erase the pages that need it. The header's page goes first, so that no cut can leave an old header above half erased records. */
+/* Erase pages that are not blank, the header's first: a cut must not leave an old header with half erased records. */
 static bool erase_slot(const nm_t *m, uint8_t slot)
 {
     for (uint8_t page = 0; page < NM_SLOT_PAGES; page++) {
@@ -123,7 +123,7 @@ static bool program(const nm_t *m, uint8_t slot, uint16_t at, const uint8_t *dat
            memcmp(slot_flash(m, slot) + at, data, length) == 0;
 }
 
-/* Make the slot that is not in use, whose records stand, the one that counts. */
+/* Make the other slot, whose records are complete, the one in use. */
 static bool seal_slot(nm_t *m, nm_list_t list)
 {
     const uint8_t slot = unused_slot(m);
@@ -137,7 +137,7 @@ static bool seal_slot(nm_t *m, nm_list_t list)
     if (!program(m, slot, 0, header, SEAL_AT))
         return false;
     if (!program(m, slot, SEAL_AT, header + SEAL_AT, HEADER_SIZE - SEAL_AT)) {
-        /* A seal that reads wrong now might read right at the next start: take the slot away. */
+        /* A seal that reads wrong now might read right at the next start: invalidate the slot. */
         (void)m->board->erase(m->self, (uint8_t)(slot * NM_SLOT_PAGES));
         return false;
     }
@@ -145,7 +145,7 @@ static bool seal_slot(nm_t *m, nm_list_t list)
     return true;
 }
 
-/* Is this very list stored, and still what is in flash? */
+/* Is this list stored, and intact in flash? */
 static bool is_stored(const nm_t *m, nm_list_t list)
 {
     return same(list, m->stored) &&
@@ -171,7 +171,7 @@ static bool spend_write(nm_t *m)
     return true;
 }
 
-/* Make the unused slot ready for records. */
+/* Prepare the unused slot for records. */
 static nm_status_t clear_slot(nm_t *m)
 {
     const uint8_t slot = unused_slot(m);
@@ -306,7 +306,7 @@ static int reply_progress(const nm_t *m, uint8_t *reply, nm_status_t status)
     return reply_list(reply, status, m->open ? m->staged : nothing);
 }
 
-/* The checksum is computed from flash, which takes 2 ms for a full list: armed, the main loop is not held up for that. */
+/* The checksum is computed from flash, which takes 2 ms for a full list: while armed, the main loop must not wait for that. */
 static int reply_stored(const nm_t *m, uint8_t *reply, nm_status_t status)
 {
     nm_list_t list = m->stored;
@@ -370,7 +370,7 @@ static int reply_radius(const nm_t *m, uint8_t *reply, nm_status_t status)
 
 /* ---- requests --------------------------------------------------------------------------------------------------------- */
 
-/* Take the mask off, in place. Returns the body's length, or 0 if this is no masked form. */
+/* Unmask in place. Returns the body's length, or 0 if the payload is not masked. */
 static uint8_t unmask(uint8_t *payload, uint8_t size)
 {
     if (size % 2 == 0)

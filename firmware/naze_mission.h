@@ -2,9 +2,9 @@
 /*
  * Mission lists over MSP: the flight controller's side of docs/msp-mission.md, version 1.
  *
- * The core takes one MSP command with its payload and gives the reply's payload; it knows nothing of serial ports, of the
- * firmware around it, or of time beyond a millisecond counter. No heap, no float, no globals: all state is one nm_t of the
- * caller's (under 56 bytes on a 32 bit target). What it needs from the board comes in through an nm_board_t.
+ * The core takes an MSP command with its payload and returns the reply's payload. It does not depend on serial ports or on
+ * the firmware around it, and its only time is a millisecond counter. No heap, no float, no globals: the caller owns all
+ * state, one nm_t (under 56 bytes on a 32 bit target). It calls the board through an nm_board_t.
  *
  * THE FLASH
  *   NM_PAGES pages of NM_PAGE_SIZE bytes, two slots of NM_SLOT_PAGES each, written in turn. A slot is a header and, from
@@ -12,29 +12,29 @@
  *
  *       0  u16  magic, NM_MAGIC
  *       2  u16  count of records
- *       4  u32  sequence: 1 for the first list ever written, then one more for each
+ *       4  u32  sequence: 1 for the first list ever written, incremented for each
  *       8  u32  CRC-32 of the records
  *      12  u32  CRC-32 of the 12 bytes before
  *      16  u16  seal, 0000: programmed last, after all else has been read back
  *
- *   A slot counts only if all of this and the CRC over its records is right; of two, the later sequence counts (serial number
- *   arithmetic). The slot that counts is never touched: BEGIN erases the other one, CHUNK programs its records straight into
- *   it, COMMIT its header and then the seal. So a power cut at any moment leaves the old list or the new one, whole, and no RAM
- *   is spent on staging. Every program and erase is verified by reading back.
+ *   A slot is valid only if all of this and the CRC over its records is right; of two valid slots, the later sequence is in use
+ *   (serial number arithmetic). The slot in use is never touched: BEGIN erases the other one, CHUNK programs its records
+ *   directly, COMMIT its header and then the seal. So a power cut at any moment leaves the complete old or new list, and
+ *   staging needs no RAM. Every program and erase operation is verified by reading back.
  *
- *   Wear: a list costs at most one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. Pages that are
- *   blank are not erased again, and a list that is stored already is not written again. nm_t.sequence (INFO's last field)
+ *   Wear: a list costs at most one erase of one slot, so 10,000 erase cycles last for 20,000 different lists. Blank
+ *   pages are not erased again, and a list that is already stored is not written again. nm_t.sequence (INFO's last field)
  *   counts the lists written.
  *
  *   A companion in a loop must not wear out the flash: BEGINs that need an erase and RADIUS requests that change the
  *   configuration share a budget of NM_WRITE_BURST writes after a reset and one more every NM_WRITE_INTERVAL_MS, up to
- *   NM_WRITE_BURST again. Without a write left they answer NM_BUSY, and INFO says so (flag bit 3). At that rate 10,000 erases
- *   take 34 days of power without a pause. nm_store() is outside the budget: it must not lose a list.
+ *   NM_WRITE_BURST again. With the budget spent they return NM_BUSY, and INFO reports it (flag bit 3). At that rate 10,000
+ *   erases take 34 days of continuous power. nm_store() is not limited: it must not lose a list.
  *
  * USE
- *   nm_start() once, when the flash can be read; nm_poll() in every main loop; nm_handle() for every valid MSP request whose
- *   command nm_handle() may know; nm_store() wherever the firmware is about to save a list that it got some other way.
- *   All from one context, never from an interrupt. The core is not reentrant for one nm_t.
+ *   nm_start() once, when the flash can be read; nm_poll() in every main loop; nm_handle() for every valid MSP request with an
+ *   unknown command; nm_store() wherever the firmware saves a list that it received by other means. Call all from one
+ *   context, never from an interrupt. The core is not reentrant for one nm_t.
  *
  * TIME
  *   BEGIN takes as long as the board's page erases, up to three (STM32F103: 20..40 ms each). A full CHUNK programs 120 half-words
@@ -53,15 +53,15 @@
 #define NM_VERSION 1u
 
 #define NM_RECORD_SIZE 16u
-#define NM_CAPACITY 146u       /* records in a list: what Harakiri's FloppyDisk holds */
+#define NM_CAPACITY 146u       /* records in a list, as in Harakiri's FloppyDisk */
 #define NM_CHUNK_RECORDS 15u   /* most records in one CHUNK */
-#define NM_CHUNK_WINDOW 2u     /* CHUNKs that may be unanswered: while one is programmed (9 ms), 104 of the ring's 256 bytes come in */
+#define NM_CHUNK_WINDOW 2u     /* most unanswered CHUNKs: while one is programmed (9 ms), 104 of the ring's 256 bytes arrive */
 #define NM_READ_RECORDS 6u     /* most records in one READ: two replies fit the 255 bytes of the transmit ring */
-#define NM_BYTE_TIMEOUT_MS 50u /* the receiver's inter-byte time-out (INFO reports it, the receiver around the core keeps it) */
+#define NM_BYTE_TIMEOUT_MS 50u /* the receiver's inter-byte timeout: reported by INFO, kept by the receiver */
 #define NM_IDLE_TIMEOUT_MS 5000u
 #define NM_MAX_RADIUS_CM 2000u
-#define NM_WRITE_BURST 64u     /* flash writes that requests may cause in a row: more than a day of trying out missions needs */
-#define NM_WRITE_INTERVAL_MS 300000u /* ... and how often one more is allowed */
+#define NM_WRITE_BURST 64u     /* flash writes that requests may cause in a row: more than a day of testing missions needs */
+#define NM_WRITE_INTERVAL_MS 300000u /* ... and the interval at which one more is allowed */
 
 #define NM_PAGE_SIZE 1024u
 #define NM_SLOT_PAGES 3u
@@ -103,13 +103,13 @@ typedef enum {
     NM_BAD_RECORD = 12
 } nm_status_t;
 
-/* What the core needs of the board. `self` is the pointer given to nm_start(), for the board's own use. */
+/* The board's functions. `self` is the pointer given to nm_start(), for the board's own use. */
 typedef struct {
     /* Erase page 0..NM_PAGES-1 to FF. False if the flash controller reported an error; the core verifies in any case. */
     bool (*erase)(void *self, uint8_t page);
     /* Program `length` (even) bytes at the even `offset` 0..NM_FLASH_SIZE-1, half-word by half-word, in ascending order. */
     bool (*program)(void *self, uint16_t offset, const uint8_t *data, uint16_t length);
-    /* Where NM_FLASH_SIZE bytes of flash can be read. */
+    /* The address at which NM_FLASH_SIZE bytes of flash can be read. */
     const uint8_t *(*flash)(void *self);
     /* A counter of milliseconds that may wrap at 2^32. */
     uint32_t (*millis)(void *self);
@@ -118,13 +118,13 @@ typedef struct {
     bool (*write_pending)(void *self);
     /* gps_wp_radius, cm. */
     uint16_t (*radius)(void *self);
-    /* Take over a new gps_wp_radius and see that it is stored with the configuration. Called for changes only. */
+    /* Set a new gps_wp_radius and have it stored with the configuration. Called for changes only. */
     void (*set_radius)(void *self, uint16_t radius_cm);
     /* A COMMIT has made another list the stored one: `records` points into the flash. */
     void (*list_changed)(void *self, const uint8_t *records, uint16_t count);
 } nm_board_t;
 
-/* A list: how many records, and the CRC-32 over their bytes. */
+/* A list: the number of records, and the CRC-32 over their bytes. */
 typedef struct {
     uint32_t checksum;
     uint16_t count;
@@ -134,13 +134,13 @@ typedef struct {
 typedef struct {
     const nm_board_t *board;
     void *self;
-    nm_list_t stored;     /* the list in the slot that counts; empty if none does */
-    nm_list_t wanted;     /* the open transfer: what BEGIN announced, */
-    nm_list_t staged;     /* ... what is in the other slot by now, */
-    uint32_t heard_ms;    /* ... and when it was last heard of */
-    uint32_t sequence;    /* of the slot that counts; 0 if none does */
-    uint32_t credited_ms; /* when the write budget last grew, or would have if it had not been full */
-    uint8_t slot;         /* the slot that counts: 0, 1, or NM_SLOTS if none does */
+    nm_list_t stored;     /* the list in the slot in use; empty if there is none */
+    nm_list_t wanted;     /* the open transfer: the list announced by BEGIN, */
+    nm_list_t staged;     /* ... the records already in the other slot, */
+    uint32_t heard_ms;    /* ... and the time of its last request */
+    uint32_t sequence;    /* of the slot in use; 0 if there is none */
+    uint32_t credited_ms; /* when the write budget last grew, or would have grown if not full */
+    uint8_t slot;         /* the slot in use: 0, 1, or NM_SLOTS if there is none */
     uint8_t writes_left;  /* in the budget */
     bool open;            /* a transfer is open */
 } nm_t;
@@ -148,18 +148,18 @@ typedef struct {
 /* Find the newest valid list. Reads flash only. `board` and `self` must live as long as `m` is used. */
 void nm_start(nm_t *m, const nm_board_t *board, void *self);
 
-/* Drop an open transfer if the craft is armed or nothing was heard of it for 5 s; let the write budget grow. */
+/* Drop an open transfer if the craft is armed or after 5 s without a request; let the write budget grow. */
 void nm_poll(nm_t *m);
 
 /*
  * Answer one request. `buffer` holds its payload of `size` bytes and takes the reply's payload; it has room for
- * NM_BUFFER_SIZE bytes. Returns the reply's length, or -1 if the command is none of this page's (buffer untouched).
+ * NM_BUFFER_SIZE bytes. Returns the reply's length, or -1 if the command is not one of the above (buffer untouched).
  */
 int nm_handle(nm_t *m, uint8_t command, uint8_t *buffer, uint8_t size);
 
 /*
- * Make `count` records the stored list, the way COMMIT does; an open transfer is dropped. For lists the firmware got without
- * this extension. Returns NM_OK, NM_SAME (nothing written), NM_ARMED, NM_NO_SPACE or NM_FLASH (the old list is whole).
+ * Make `count` records the stored list, as COMMIT does; an open transfer is dropped. For lists that the firmware received
+ * without this extension. Returns NM_OK, NM_SAME (nothing written), NM_ARMED, NM_NO_SPACE or NM_FLASH (the old list is whole).
  */
 nm_status_t nm_store(nm_t *m, const uint8_t *records, uint16_t count);
 

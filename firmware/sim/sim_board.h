@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * A flight controller of memory around the mission core: for the host tests, the emulated Cortex-M3, the fuzzer and, as a
+ * A flight controller in memory around the mission core: for the host tests, the emulated Cortex-M3, the fuzzer and, as a
  * shared library, for Python (tests/conformance/c_core.py).
  *
- * Its flash keeps the rules of the STM32F103's: erase works on whole pages and sets every bit; program works on half-words that
- * must be erased, or writes 0000. Anything else is refused and counted in `violations`. Behind the core's pages lies a page
- * that stands for the configuration and must not change.
+ * Its flash follows the rules of the STM32F103's: erase works on whole pages and sets every bit; program works on erased
+ * half-words, or writes 0000. Anything else is refused and counted in `violations`. The page after the core's represents the
+ * configuration and must not change.
  *
- * The power can be cut at any flash operation (an erase of one page, a program of one half-word). The operation is then left
- * undone, half done (some bits moved, others not), or done, and everything but the flash is lost.
+ * The power can be cut at any flash operation (an erase of one page, a program of one half-word). The operation is then not
+ * done, half done (only some bits changed) or done, and everything but the flash is lost.
  *
  * Around the core is a byte receiver with the patched firmware's rules (INBUF_SIZE, inter-byte time-out).
  */
@@ -23,10 +23,10 @@
 #define SIM_FLASH_SIZE (NM_FLASH_SIZE + NM_PAGE_SIZE)
 #define SIM_FRAME_SIZE (6u + NM_BUFFER_SIZE)
 
-/* How far the operation got at which the power was cut. */
+/* The state of the operation during which the power was cut. */
 typedef enum { SIM_CUT_BEFORE, SIM_CUT_WITHIN, SIM_CUT_AFTER } sim_cut_t;
 
-/* How a flash operation fails: the controller says so, or it says nothing and a bit stays as it was. */
+/* How a flash operation fails: reported by the controller, or unreported with an unchanged bit. */
 typedef enum { SIM_FAIL_LOUD, SIM_FAIL_SILENT } sim_fail_t;
 
 typedef struct {
@@ -46,10 +46,10 @@ typedef struct {
     sim_cut_t cut;
     uint32_t fail_at; /* let this operation fail; 0: none */
     sim_fail_t fail;
-    uint32_t random; /* which bits of a half done operation moved */
+    uint32_t random; /* which bits of a half done operation changed */
 
     uint32_t changes; /* calls of list_changed */
-    uint16_t list_count; /* the list in RAM, as the firmware around the core has it */
+    uint16_t list_count; /* the list in the surrounding firmware's RAM */
     uint8_t list[NM_CAPACITY * NM_RECORD_SIZE];
 
     uint8_t frame[SIM_FRAME_SIZE]; /* being received */
@@ -67,7 +67,7 @@ void sim_init(sim_t *s);
 sim_t *sim_create(void);
 void sim_destroy(sim_t *s);
 
-/* Reset: everything but the flash and the saved gps_wp_radius is forgotten. */
+/* Reset: only the flash and the saved gps_wp_radius are kept. */
 void sim_power_up(sim_t *s);
 
 /* Count flash operations from 0 again, and cut the power at the `cut_at`th (0: never). */
@@ -76,7 +76,7 @@ void sim_cut_at(sim_t *s, uint32_t cut_at, sim_cut_t cut);
 /* Count flash operations from 0 again, and let the `fail_at`th fail (0: none). */
 void sim_fail_at(sim_t *s, uint32_t fail_at, sim_fail_t fail);
 
-/* nm_handle() with `size` bytes of payload in `buffer`; -1: no command of the core's, -2: the power was cut. */
+/* nm_handle() with `size` bytes of payload in `buffer`; -1: not a command of the core, -2: the power was cut. */
 int sim_request(sim_t *s, uint8_t command, uint8_t *buffer, uint8_t size);
 
 /* nm_store(); -2: the power was cut. */
@@ -89,7 +89,7 @@ void sim_advance(sim_t *s, uint32_t milliseconds);
 void sim_arm(sim_t *s, bool armed);
 
 /*
- * Receive a byte. Returns the length of the reply frame that it brought about, written to `reply` (SIM_FRAME_SIZE bytes),
+ * Receive a byte. Returns the length of the resulting reply frame, written to `reply` (SIM_FRAME_SIZE bytes),
  * 0 if there is none, -2: the power was cut.
  */
 int sim_receive(sim_t *s, uint8_t byte, uint8_t *reply);
@@ -97,7 +97,7 @@ int sim_receive(sim_t *s, uint8_t byte, uint8_t *reply);
 /* Is the configuration page as sim_init() filled it? */
 bool sim_config_intact(const sim_t *s);
 
-/* For callers who do not see the struct. */
+/* For callers without access to the struct. */
 void sim_set_write_pending(sim_t *s, bool pending);
 uint32_t sim_operations(const sim_t *s);
 uint32_t sim_violations(const sim_t *s);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * A fuzzer's input as the life of a board: a byte of what happens, and its operands.
+ * Interprets a fuzzer's input as events on a board: a byte for the event, and its operands.
  *
  *   0..15     that many + 1 bytes arrive as they are
- *   16..31    a request arrives: command 190 + (low 3 bits), size byte, masked payload; its checksum is put right
+ *   16..31    a request arrives: command 190 + (low 3 bits), size byte, masked payload; its checksum is corrected
  *   32..39    time passes: 1, 10, 49, 50, 999, 4999, 5001, 60000 ms
  *   40, 41    disarmed, armed
  *   42, 43    no write scheduled, a write scheduled
@@ -12,8 +12,8 @@
  *   46 n      failure of the (n + 1)th
  *   47 n      the firmware itself saves a list of n records
  *
- * Whatever comes: the flash's rules are kept, the configuration is untouched, the list changes only by a COMMIT or by the
- * firmware, and what is stored has the checksum that is reported.
+ * Always: the flash's rules are kept, the configuration is untouched, the list changes only by a COMMIT or by the firmware,
+ * and the stored list has the reported checksum.
  */
 #include "sim_board.h"
 

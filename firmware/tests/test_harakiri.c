@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Tests of harakiri_mission.c: how the list in cfg, the list in the flash slots and the copy in the configuration go together.
- * Harakiri itself is played by this file: it makes the calls that the patches make.
+ * Tests of harakiri_mission.c: the list in cfg, the list in the flash slots and the copy in the configuration. This file
+ * stands in for Harakiri: it makes the calls that the patches make.
  */
 #include "harakiri_mission.c"
 
@@ -106,7 +106,7 @@ static void power_up(void)
     read_configuration();
 }
 
-/* A chip with nothing but a configuration, in which an unpatched firmware left a list of `count` records. */
+/* A chip with only a configuration, with a list of `count` records from an unpatched firmware. */
 static void new_chip(uint16_t count, uint8_t fill)
 {
     memset(at(MISSION_FLASH_ADDR), 0xFF, FLASH_END - MISSION_FLASH_ADDR);
@@ -237,7 +237,7 @@ static void test_writing_waits_for_a_scheduled_write(void)
     f.ARMED = 1;
     CHECK(push_one(0) == NM_ARMED);
     f.ARMED = 0;
-    MissionPoll(); /* not its business: without FEATURE_PASS Harakiri's main loop serves the write */
+    MissionPoll(); /* does nothing: without FEATURE_PASS Harakiri's main loop writes */
     CHECK(push_one(0) == NM_BUSY);
     serve_scheduled_write();
     CHECK(push_one(0) == NM_OK);

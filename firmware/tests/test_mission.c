@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Tests of the mission core on a board of memory. Runs on the host and on an emulated Cortex-M3. */
+/* Tests of the mission core on a board in memory. Runs on the host and on an emulated Cortex-M3. */
 #include "sim_board.h"
 
 #include <stdio.h>
@@ -157,7 +157,7 @@ static int simple(uint8_t command)
     return sim_request(&board, command, buffer, 0);
 }
 
-/* The companion's procedure, in short: BEGIN, CHUNKs, COMMIT. Returns the last status, or -2. */
+/* The companion's procedure, shortened: BEGIN, CHUNKs, COMMIT. Returns the last status, or -2. */
 static int push(const list_t *list)
 {
     int status = begin(list);
@@ -195,7 +195,7 @@ static void fresh_board(const list_t *stored)
         CHECK(push(stored) == (stored->count ? NM_OK : NM_SAME) && holds(stored));
 }
 
-/* A board that holds `old`, and whose other slot holds a full list from before that must be erased. */
+/* A board with `old`, and an earlier full list in the other slot, which must be erased. */
 static void used_board(const list_t *old)
 {
     const list_t older = list_of(NM_CAPACITY, 99);
@@ -300,7 +300,7 @@ static void test_blank_pages_are_not_erased(void)
     CHECK(push(&full) == NM_OK && holds(&full) && all_erases() == 2);
 }
 
-/* BEGIN and a CHUNK, over and over: each BEGIN finds a slot that is not blank. */
+/* Repeated BEGIN and CHUNK: each BEGIN finds a slot that is not blank. */
 static unsigned begins_until_busy(const list_t *list)
 {
     for (unsigned count = 0;; count++) {
@@ -418,7 +418,7 @@ static void test_armed(void)
     CHECK(!transfer_open() && chunk(&list, 15, 5) == NM_ARMED && begin(&list) == NM_ARMED && commit(&old) == NM_ARMED);
     CHECK(radius(300, 300 ^ 0xFFFF) == NM_ARMED && le(buffer + 1, 2) == 200 && store(&list) == NM_ARMED);
     CHECK(read(0, 6) == 3 + 4 * 16 && buffer[0] == NM_OK);
-    /* In flight COMMIT answers from RAM: it does not read 2 KB of flash for a checksum. */
+    /* In flight COMMIT replies from RAM: it does not read 2 KB of flash for a checksum. */
     board.flash[NM_RECORDS_OFFSET] ^= 1;
     CHECK(commit(&old) == NM_ARMED && le(buffer + 1, 2) == 4 && le(buffer + 3, 4) == checksum(&old));
     board.flash[NM_RECORDS_OFFSET] ^= 1;
@@ -521,7 +521,7 @@ static int recover(const list_t *list)
     return status == NM_SAME ? NM_OK : status;
 }
 
-/* After a cut: the board starts with `old` or `new`, whole, and has an untouched configuration. */
+/* After a cut: the board starts with the complete `old` or `new`, and an unchanged configuration. */
 static void check_whole(const list_t *old, const list_t *new)
 {
     cuts++;
@@ -588,7 +588,7 @@ static void cut_scenarios(uint16_t records, bool again)
     cut_everywhere(&old, &none, store, again);
 }
 
-/* Here three lists are in play: what stands after a cut is the old one, the first pushed, or the second. */
+/* With three lists: after a cut the old one, the first pushed or the second is stored. */
 static void cut_repeated_push(uint16_t records)
 {
     const list_t old = list_of((uint16_t)(records - 1), 77), second = list_of(records, 11);
@@ -627,7 +627,7 @@ static void test_power_cuts(void)
 #ifdef __arm__
 enum { PAINTED = 2048, PAINT = 0xA5 };
 
-/* How far answering a request reaches below this function's frame: paint, call, look. */
+/* The stack used below this function's frame to handle a request: paint, call, inspect. */
 __attribute__((noinline)) static unsigned stack_of(uint8_t command, uint8_t size)
 {
     volatile uint8_t *const frame = __builtin_frame_address(0);

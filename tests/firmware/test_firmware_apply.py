@@ -85,7 +85,7 @@ def test_applies_and_removes_without_a_trace(workshop: Workshop) -> None:
     assert after["src/mw.h"] == MW
     for name in CORE:
         assert after[f"src/{name}"] == (FIRMWARE / name).read_bytes()
-    assert workshop.run("--remove") == (0, "Tree: as it was before the patch\n")
+    assert workshop.run("--remove") == (0, "Tree: restored to the state before the patch\n")
     assert workshop.files() == before
 
 
@@ -169,7 +169,7 @@ def test_a_half_patched_tree_is_completed(workshop: Workshop) -> None:
 def test_a_half_patched_tree_is_restored(workshop: Workshop) -> None:
     before = workshop.files()
     half_patch(workshop)
-    assert workshop.run("--remove") == (0, "Tree: as it was before the patch (it was half patched)\n")
+    assert workshop.run("--remove") == (0, "Tree: restored to the state before the patch (it was half patched)\n")
     assert workshop.files() == before
 
 

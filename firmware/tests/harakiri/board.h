@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Stands in for Harakiri's headers when harakiri_mission.c is tested on the host: the few names that it uses, and nothing else.
+ * Replaces Harakiri's headers when harakiri_mission.c is tested on the host: only the names that it uses.
  * test_harakiri.c defines the functions; the flash is memory at the STM32F103's address.
  */
 #ifndef BOARD_H

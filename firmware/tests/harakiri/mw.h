@@ -1,2 +1,2 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* harakiri_mission.c includes this too; board.h has all of it. */
+/* Also included by harakiri_mission.c; everything is in board.h. */
