@@ -34,19 +34,9 @@ static void check(bool condition, const char *what, int line)
 
 typedef struct {
     uint16_t count;
+    uint32_t checksum;
     uint8_t records[NM_CAPACITY * NM_RECORD_SIZE];
 } list_t;
-
-static list_t list_of(uint16_t count, uint8_t seed)
-{
-    list_t list;
-    memset(&list, 0, sizeof list);
-    list.count = count;
-    for (uint16_t i = 0; i < count * NM_RECORD_SIZE; i++)
-        list.records[i] = i % NM_RECORD_SIZE == NM_RECORD_SIZE - 1 ? (uint8_t)(i / NM_RECORD_SIZE % 8)
-                                                                  : (uint8_t)(seed + i * 31u + i / 256u);
-    return list;
-}
 
 static uint32_t bitwise_crc32(const uint8_t *data, uint32_t length)
 {
@@ -59,16 +49,32 @@ static uint32_t bitwise_crc32(const uint8_t *data, uint32_t length)
     return ~crc;
 }
 
-static uint32_t checksum(const list_t *list)
+static list_t list_of(uint16_t count, uint8_t seed)
 {
-    return bitwise_crc32(list->records, list->count * NM_RECORD_SIZE);
+    list_t list;
+    memset(&list, 0, sizeof list);
+    list.count = count;
+    for (uint16_t i = 0; i < count * NM_RECORD_SIZE; i++)
+        list.records[i] = i % NM_RECORD_SIZE == NM_RECORD_SIZE - 1 ? (uint8_t)(i / NM_RECORD_SIZE % 8)
+                                                                  : (uint8_t)(seed + i * 31u + i / 256u);
+    list.checksum = bitwise_crc32(list.records, list.count * NM_RECORD_SIZE);
+    return list;
+}
+
+/* The list, with another byte at `at`. */
+static list_t with_byte(const list_t *list, uint16_t at, uint8_t byte)
+{
+    list_t changed = *list;
+    changed.records[at] = byte;
+    changed.checksum = bitwise_crc32(changed.records, changed.count * NM_RECORD_SIZE);
+    return changed;
 }
 
 /* Is the list in flash and in RAM this one, byte for byte? */
 static bool holds(const list_t *list)
 {
     const nm_t *core = &board.core;
-    if (core->stored.count != list->count || core->stored.checksum != checksum(list) || board.list_count != list->count)
+    if (core->stored.count != list->count || core->stored.checksum != list->checksum || board.list_count != list->count)
         return false;
     return list->count == 0 || (!memcmp(nm_records(core), list->records, list->count * NM_RECORD_SIZE) &&
                                 !memcmp(board.list, list->records, list->count * NM_RECORD_SIZE));
@@ -119,12 +125,12 @@ static int send_list(uint8_t command, uint32_t count, uint32_t crc)
 
 static int begin(const list_t *list)
 {
-    return send_list(NM_BEGIN, list->count, checksum(list));
+    return send_list(NM_BEGIN, list->count, list->checksum);
 }
 
 static int commit(const list_t *list)
 {
-    return send_list(NM_COMMIT, list->count, checksum(list));
+    return send_list(NM_COMMIT, list->count, list->checksum);
 }
 
 static int chunk(const list_t *list, uint16_t first, uint16_t count)
@@ -211,7 +217,7 @@ static void test_push_and_read_back(void)
     list_t copy = list_of(0, 0);
     fresh_board(NULL);
     CHECK(push(&list) == NM_OK);
-    CHECK(le(buffer + 1, 2) == list.count && le(buffer + 3, 4) == checksum(&list));
+    CHECK(le(buffer + 1, 2) == list.count && le(buffer + 3, 4) == list.checksum);
     CHECK(holds(&list) && board.changes == 1);
     for (uint16_t first = 0; first < list.count; first = (uint16_t)(first + NM_READ_RECORDS)) {
         const int length = read(first, 200);
@@ -232,7 +238,7 @@ static void test_info(void)
     board.write_pending = true;
     CHECK(simple(NM_INFO) == 24);
     CHECK(buffer[0] == NM_OK && buffer[1] == NM_VERSION && buffer[2] == (2 | 4) && buffer[3] == 15 && buffer[4] == 2 && buffer[5] == 6);
-    CHECK(le(buffer + 6, 2) == 146 && le(buffer + 8, 2) == 5 && le(buffer + 10, 4) == checksum(&list));
+    CHECK(le(buffer + 6, 2) == 146 && le(buffer + 8, 2) == 5 && le(buffer + 10, 4) == list.checksum);
     CHECK(le(buffer + 14, 2) == 200 && le(buffer + 16, 2) == 50 && le(buffer + 18, 2) == 0 && le(buffer + 20, 4) == 1);
     sim_arm(&board, true);
     CHECK(simple(NM_INFO) == 24 && buffer[2] == (1 | 2));
@@ -385,9 +391,7 @@ static void test_malformed_requests(void)
 
 static void test_refusals(void)
 {
-    const list_t old = list_of(4, 1), list = list_of(20, 2);
-    list_t bad = list;
-    bad.records[16 * 3 + 15] = 8;
+    const list_t old = list_of(4, 1), list = list_of(20, 2), bad = with_byte(&list, 16 * 3 + 15, 8);
     fresh_board(&old);
     CHECK(chunk(&list, 0, 1) == NM_NO_TRANSFER && commit(&list) == NM_NO_TRANSFER && commit(&old) == NM_OK);
     CHECK(send_list(NM_BEGIN, NM_CAPACITY + 1, 5) == NM_NO_SPACE && send_list(NM_BEGIN, 0xFFFF, 5) == NM_NO_SPACE);
@@ -420,7 +424,7 @@ static void test_armed(void)
     CHECK(read(0, 6) == 3 + 4 * 16 && buffer[0] == NM_OK);
     /* In flight COMMIT replies from RAM: it does not read 2 KB of flash for a checksum. */
     board.flash[NM_RECORDS_OFFSET] ^= 1;
-    CHECK(commit(&old) == NM_ARMED && le(buffer + 1, 2) == 4 && le(buffer + 3, 4) == checksum(&old));
+    CHECK(commit(&old) == NM_ARMED && le(buffer + 1, 2) == 4 && le(buffer + 3, 4) == old.checksum);
     board.flash[NM_RECORDS_OFFSET] ^= 1;
     sim_arm(&board, false);
     CHECK(chunk(&list, 15, 5) == NM_NO_TRANSFER && board.operations == before && holds(&old));
@@ -480,7 +484,7 @@ static void test_rot_is_noticed(void)
     fresh_board(&old);
     CHECK(push(&list) == NM_OK);
     board.flash[NM_SLOT_SIZE + NM_RECORDS_OFFSET + 5] ^= 4;
-    CHECK(commit(&list) == NM_NO_TRANSFER && le(buffer + 3, 4) != checksum(&list));
+    CHECK(commit(&list) == NM_NO_TRANSFER && le(buffer + 3, 4) != list.checksum);
     sim_power_up(&board);
     CHECK(holds(&old));
     CHECK(push(&list) == NM_OK && holds(&list));
@@ -571,8 +575,7 @@ static void cut_everywhere(const list_t *old, const list_t *new, act_t act, bool
 
 static int push_twice(const list_t *list)
 {
-    list_t first = *list;
-    first.records[0] ^= 1;
+    const list_t first = with_byte(list, 0, list->records[0] ^ 1);
     const int status = push(&first);
     return status == NM_OK ? push(list) : status;
 }
@@ -592,8 +595,7 @@ static void cut_scenarios(uint16_t records, bool again)
 static void cut_repeated_push(uint16_t records)
 {
     const list_t old = list_of((uint16_t)(records - 1), 77), second = list_of(records, 11);
-    list_t first = second;
-    first.records[0] ^= 1;
+    const list_t first = with_byte(&second, 0, second.records[0] ^ 1);
     for (uint32_t at = 1;; at += STEP) {
         for (int cut = SIM_CUT_BEFORE; cut <= SIM_CUT_AFTER; cut++) {
             fresh_board(&old);
@@ -654,7 +656,7 @@ static void measure_stack(void)
         else if (i == 5)
             put(buffer + 3, 6, 2);
         else
-            put(buffer + 3, i == 6 ? 300 ^ 0xFFFF : checksum(&list), i == 6 ? 2 : 4);
+            put(buffer + 3, i == 6 ? 300 ^ 0xFFFF : list.checksum, i == 6 ? 2 : 4);
         const unsigned stack = stack_of((uint8_t)(NM_INFO + i), sizes[i]);
         CHECK(buffer[0] == NM_OK);
         most = stack > most ? stack : most;
