@@ -124,11 +124,11 @@ lock:
 
 # Through a temporary file: the generator imports the present one.
 message-table: $(VENV)/.test-ready
-	$(BIN)/python -m protocols.mavlink.make_message_table > $(VENV)/message_table.py
+	$(BIN)/python -m generators.message_table > $(VENV)/message_table.py
 	mv $(VENV)/message_table.py protocols/mavlink/
 
 cli-page: $(VENV)/.test-ready
-	$(BIN)/python -m service.cli.cli_page > docs/cli.md
+	$(BIN)/python -m generators.cli_page > docs/cli.md
 
 # The table of INAV's and MultiWii's treatment of each command.
 inav-page: $(VENV)/.test-ready
@@ -138,20 +138,20 @@ inav-page: $(VENV)/.test-ready
 
 # The table of Harakiri's records for each command.
 rules-page: $(VENV)/.test-ready
-	$(BIN)/python -m bridge.controllers.harakiri.rules_page > docs/rules.table
+	$(BIN)/python -m generators.rules_page > docs/rules.table
 	sed -i -e '/begin: make rules-page/,/end: make rules-page/{/make rules-page -->/!d}' \
 	    -e '/begin: make rules-page/r docs/rules.table' docs/mission-rules.md
 	rm docs/rules.table
 
 # The sample file of all settings, and their reference page.
 config-sample: $(VENV)/.test-ready
-	$(BIN)/python -m service.settings.sample > systemd/config.toml
+	$(BIN)/python -m generators.config_sample > systemd/config.toml
 	sed -i '/begin: make config-sample/,$$d' docs/configuration.md
 	echo '<!-- begin: make config-sample -->' >> docs/configuration.md
-	$(BIN)/python -m service.settings.sample --page >> docs/configuration.md
+	$(BIN)/python -m generators.config_sample --page >> docs/configuration.md
 
 zenoh-schemas: $(VENV)/.test-ready
-	$(BIN)/python -m service.zenoh_link.schema_files
+	$(BIN)/python -m generators.zenoh_schemas
 
 clean:
 	rm -rf $(VENV) build dist .demo .hypothesis .mypy_cache .pytest_cache .ruff_cache benchmarks/results

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from click.shell_completion import get_completion_class
 
+from generators.man_page import man_page
 from service.cli.main import main
-from service.cli.man_page import man_page
 
 _HERE = Path(__file__).resolve().parent
 _LIB = Path("usr/lib/naze-bridge")

@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from service.cli.cli_page import page
+from generators.cli_page import page
 
 
 def test_the_page_is_up_to_date() -> None:

@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from bridge.controllers.harakiri.rules_page import table
+from generators.rules_page import table
 
 
 def test_the_table_is_up_to_date() -> None:

@@ -9,9 +9,9 @@ import pytest
 import zenoh
 from jsonschema import Draft202012Validator
 
+from generators.zenoh_schemas import schemas, text
 from service.zenoh_link.compact import SCHEMAS as FOLDER
 from service.zenoh_link.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION
-from service.zenoh_link.schema_files import schemas, text
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until

@@ -8,10 +8,10 @@ import pytest
 from pymavlink.dialects.v10 import all as mavlink_1
 from pymavlink.dialects.v20 import all as mavlink_2
 
+from generators.message_table import table
 from protocols.mavlink import message_table
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mavlink.make_message_table import table
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 from protocols.mavlink.target import target_of
 

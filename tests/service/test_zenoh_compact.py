@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from generators.zenoh_schemas import numbered
 from service.zenoh_link import compact
 from service.zenoh_link.compact import CBOR_KEY, SCHEMAS
-from service.zenoh_link.schema_files import numbered
 
 NAMES = sorted(path.stem for path in SCHEMAS.iterdir() if path.stem != "command_reply")
 NUMBERS = st.none() | st.floats(allow_nan=False) | st.integers(-(2**63), 2**63) | st.booleans() | st.text(max_size=9)

@@ -6,8 +6,8 @@ import tomllib
 from hypothesis import given
 from hypothesis import strategies as st
 
+from generators.config_sample import sample
 from service.settings.config_files import key_lines
-from service.settings.sample import sample
 
 TEXT = '''# settings
 sysid = 3

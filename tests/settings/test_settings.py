@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from generators.config_sample import page, sample
 from service.settings import Settings, SettingsError, load_settings
-from service.settings.sample import page, sample
 from service.settings.table import KEYS
 from tests.support.programs import run_naze_bridge
 

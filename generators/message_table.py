@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m protocols.mavlink.make_message_table`: print a new message_table.py from pymavlink's dialect `all`.
+"""`python -m generators.message_table`: print a new message_table.py from pymavlink's dialect `all`.
 
 A frame can only be checked with its message's CRC_EXTRA, so that every message counts that any flight controller may
 send; pymavlink's own module of that dialect would cost the daemon 6 MB on top of the one that it speaks.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manual page, naze-bridge(1), from the --help texts: `python -m service.cli.man_page`."""
+"""The manual page, naze-bridge(1), from the --help texts: `python -m generators.man_page`."""
 
 import sys
 
-from service.cli.cli_page import helps
+from generators.cli_page import helps
 from service.cli.main import main
 from service.machine.package import version
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample configuration file, and the table of the reference page: `python -m service.settings.sample [--page]`.
+"""The sample configuration file, and the table of the reference page: `python -m generators.config_sample [--page]`.
 
 Both are made from the table of keys; a test compares them with the files in the repository (`make config-sample`).
 """
