@@ -99,7 +99,7 @@ class Bridge:
     @property
     def is_passing_through(self) -> bool:
         """True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes."""
-        return not self._is_represented and isinstance(self.session.state, Mavlink)
+        return self._incoming.routes is not None and isinstance(self.session.state, Mavlink)
 
     def fc_received(self, data: bytes, now: float) -> None:
         """Handle bytes from the port."""

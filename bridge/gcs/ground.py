@@ -160,7 +160,7 @@ class Ground:
             frames += splitter.reset()
         self.bad_frames += splitter.bad_frames - bad_before
         # Our own frames come back from a broadcast, or from a router that floods.
-        return [frame for frame in frames if (frame.sysid, frame.compid) != (self._sysid, self._compid)]
+        return [frame for frame in frames if frame.sender != (self._sysid, self._compid)]
 
     def admits(self, peer: Peer, now: float) -> bool:
         """False if a frame must be ignored, because it comes from one of too many new addresses."""

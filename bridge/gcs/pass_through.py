@@ -32,7 +32,7 @@ class PassThrough:
 
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
         """Send the autopilot's frames on."""
-        self._aboard.add((frames[0].sysid, frames[0].compid))
+        self._aboard.add(frames[0].sender)
         for_all = without_target(frames)
         if for_all is not None:
             self._send(for_all)
@@ -53,7 +53,7 @@ class PassThrough:
 
         `to_stations` False: its sender may only read, and reaches no other station.
         """
-        speaker = frame.sysid, frame.compid
+        speaker = frame.sender
         if speaker in self._aboard:
             # The autopilot's own frame, returned by a router that floods.
             return False
@@ -82,7 +82,7 @@ class PassThrough:
         return [peer for peer in self._ground.peers() if is_there(peer)]
 
     def _send_alone(self, frame: MavlinkFrame) -> None:
-        self._aboard.add((frame.sysid, frame.compid))
+        self._aboard.add(frame.sender)
         if frame.msgid == _NEVER_FORWARDED:
             return
         system, component = target_of(frame)

@@ -62,6 +62,12 @@ class MavlinkFrame:
         return raw[6] if raw[0] == MAGIC_V2 else raw[4]
 
     @property
+    def sender(self) -> tuple[int, int]:
+        """The sending system and component."""
+        raw = self.raw
+        return (raw[5], raw[6]) if raw[0] == MAGIC_V2 else (raw[3], raw[4])
+
+    @property
     def msgid(self) -> int:
         """The message id."""
         raw = self.raw
