@@ -54,7 +54,7 @@ _ATTITUDES_HZ = 50
 _ONLY_ATTITUDES_HZ = {row.msgid: 0 for row in TELEMETRY} | {messages.MAVLINK_MSG_ID_ATTITUDE: _ATTITUDES_HZ}
 _SETTLING_S = 2.0
 _WATCHED_S = 20
-_ANSWERS = 2000
+_ANSWERS = 1000
 #: The daemon and the bare loop take turns, so that both see the same load of the machine.
 _ANSWERS_A_TURN = 100
 ATTITUDES = 1800

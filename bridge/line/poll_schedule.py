@@ -10,6 +10,7 @@ so a long round trip slows the fast ones down by itself.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
+from operator import attrgetter
 
 from bridge.line.conversation import Send
 from bridge.line.msp_link import MspLink
@@ -118,6 +119,9 @@ class _Slot:
         return self.due + self.interval_s if self.poll.command is Msp.STATUS else inf
 
 
+_DUE = attrgetter("due")
+
+
 class PollSchedule:
     """The schedule of one line: `begin` when a flight controller is found, then `ask` at each deadline."""
 
@@ -213,9 +217,10 @@ class PollSchedule:
         """The time of the next request; infinity if a reply must arrive first."""
         room = link.room
         earliest = inf
-        for slot in self._slots.values():
-            if slot.due < earliest:
-                earliest = min(earliest, slot.may_be_asked_at(link, room))
+        for slot in sorted(self._slots.values(), key=_DUE):
+            if slot.due >= earliest:
+                break
+            earliest = min(earliest, slot.may_be_asked_at(link, room))
         return max(earliest, self._free_at)
 
     def _look_at(self, link: MspLink, beside_missions: bool) -> None:
