@@ -127,6 +127,7 @@ class Daemon:
             self._finder.move_on = self._port.move_on
             self._followers.append(self._finder)
         self._timer: asyncio.TimerHandle | None = None
+        self._deadline = self._loop.time()  # of the next tick
         self._search_report: asyncio.TimerHandle | None = None
 
     @property
@@ -232,13 +233,13 @@ class Daemon:
         for effect in bridge.runner.take_store_effects():
             self._carry_out(effect)
         self._tell_followers()
-        deadline = bridge.next_deadline()
+        self._deadline = bridge.next_deadline()
         if self._timer is not None:
-            if self._timer.when() <= deadline:
-                # Every received byte moves the deadline. An early tick costs less than a new timer.
+            if self._timer.when() <= self._deadline:
+                # Every reply postpones the deadline. A timer that fires too early costs less than a new one each time.
                 return
             self._timer.cancel()
-        self._timer = self._loop.call_at(deadline, self._tick)
+        self._timer = self._loop.call_at(self._deadline, self._tick)
 
     def _send_datagrams(self) -> None:
         for peer, data in self.bridge.ground.take_datagrams():
@@ -387,8 +388,12 @@ class Daemon:
             self.flush()
 
     def _tick(self) -> None:
+        now = self._loop.time()
+        if now < self._deadline:
+            self._timer = self._loop.call_at(self._deadline, self._tick)
+            return
         self._timer = None
-        self.bridge.tick(self._loop.time())
+        self.bridge.tick(now)
         self.flush()
 
     def _carry_out(self, effect: StoreEffect) -> None:
