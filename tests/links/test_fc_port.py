@@ -88,9 +88,17 @@ class Line:
             due = began_at + index / rate_hz
             while loop.time() < due:  # noqa: ASYNC110 (a timer is rounded up to whole ms)
                 await asyncio.sleep(0)
-            os.write(self.wire, attitude(first + index))
+            await self._write(attitude(first + index))
             await asyncio.sleep(0)
         return first + count
+
+    async def _write(self, data: bytes) -> None:
+        """Write all; on a busy machine the terminal may be full."""
+        while data:
+            try:
+                data = data[os.write(self.wire, data) :]
+            except BlockingIOError:
+                await asyncio.sleep(0.001)
 
     def _on_open(self) -> None:
         self.opened += 1
