@@ -120,7 +120,7 @@ def test_a_list_that_would_set_off_a_trap_is_refused(hazard: int) -> None:
     items = waypoints(6)
     items[3] = replace(items[3], lat_e7=round(degrees * 1e7))
     assert Upload(station, items).run() is A.DENIED
-    assert any("trap" in text for text in station.texts())
+    assert any("firmware bug" in text for text in station.texts())
     assert holds(world, waypoints(5))
     world.assert_line_was_clean()
 
