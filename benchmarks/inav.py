@@ -124,7 +124,7 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
     daemon = Daemon(Settings(fc, [GcsAddress("udpout", "127.0.0.1", free_udp_port())]))
     running = asyncio.create_task(daemon.run())
     try:
-        while daemon.bridge.missions.dialect is None or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push
+        while daemon.bridge.missions.fc_store is None or daemon.bridge.runner.is_busy:  # noqa: ASYNC110 - as in push
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(turn * _RUNS + run)) for run in range(_RUNS)]
     finally:
@@ -135,11 +135,11 @@ async def _push_all(fc: FcAddress, turn: int) -> list[float]:
 async def _push(daemon: Daemon, records: tuple[NavRecord, ...]) -> float:
     """Push one list; returns the seconds from the first record's frame to the proof of the last."""
     loop = asyncio.get_running_loop()
-    dialect = daemon.bridge.missions.dialect
-    assert dialect is not None
+    fc_store = daemon.bridge.missions.fc_store
+    assert fc_store is not None
     proven_at: list[float] = []
     done: asyncio.Future[object] = loop.create_future()
-    push = dialect.push(records, lambda _number: proven_at.append(loop.time()))
+    push = fc_store.push(records, lambda _number: proven_at.append(loop.time()))
     daemon.bridge.runner.start(push, lambda result, _: done.set_result(result), loop.time())
     daemon.flush()
     result = await done

@@ -59,7 +59,7 @@ async def _push_all(link: Path) -> list[float]:
     daemon = Daemon(settings)
     running = asyncio.create_task(daemon.run())
     try:
-        while daemon.bridge.missions.dialect is None:  # noqa: ASYNC110 - only the daemon's log says so
+        while daemon.bridge.missions.fc_store is None:  # noqa: ASYNC110 - only the daemon's log says so
             await asyncio.sleep(0.01)
         return [await _push(daemon, _records(seed)) for seed in range(_RUNS)]
     finally:
@@ -76,11 +76,11 @@ def _records(seed: int) -> tuple[WpRecord, ...]:
 async def _push(daemon: Daemon, records: tuple[WpRecord, ...]) -> float:
     """Push one list; returns the seconds from the first CHUNK to the verified checksum."""
     loop = asyncio.get_running_loop()
-    dialect = daemon.bridge.missions.dialect
-    assert dialect is not None
+    fc_store = daemon.bridge.missions.fc_store
+    assert fc_store is not None
     begun_at: list[float] = []
     done: asyncio.Future[tuple[PushResult | LinkLost, float]] = loop.create_future()
-    push = _noting_first_chunk(dialect.push(records, lambda _: None), lambda: begun_at.append(loop.time()))
+    push = _noting_first_chunk(fc_store.push(records, lambda _: None), lambda: begun_at.append(loop.time()))
     daemon.bridge.runner.start(push, lambda result, _: done.set_result((result, loop.time())), loop.time())
     daemon.flush()
     result, ended_at = await done

@@ -97,7 +97,7 @@ class MissionService:
     def __init__(self, vehicle: Vehicle) -> None:
         self._endings: list[tuple[ArrivedMission, DeliveryResult]] = []
         self._vehicle = vehicle
-        self._dialect: AnyFcMissionStore | None = None
+        self._fc_store: AnyFcMissionStore | None = None
         self._refusal = NO_LINK
         self._owner: object | None = None
         self._closed = False
@@ -114,7 +114,7 @@ class MissionService:
 
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
         """Switch to another flight controller; a Refusal becomes the reply to every attempt."""
-        self._dialect, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
+        self._fc_store, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
         self.former_home = self.home_item()
         self.held = None
         self._is_settled = self._told_unloaded = False
@@ -122,17 +122,17 @@ class MissionService:
     @property
     def others(self) -> tuple[HeldMission, ...]:
         """Further missions in the flight controller's store, as last read."""
-        if self._dialect is None:
+        if self._fc_store is None:
             return ()
         return tuple(
-            HeldMission(identify(records), records, self._dialect.items(records, {}))
-            for records in self._dialect.others
+            HeldMission(identify(records), records, self._fc_store.items(records, {}))
+            for records in self._fc_store.others
         )
 
     @property
-    def dialect(self) -> AnyFcMissionStore | None:
+    def fc_store(self) -> AnyFcMissionStore | None:
         """The mission store of the current flight controller; None if it has none."""
-        return self._dialect
+        return self._fc_store
 
     def home_item(self) -> MissionItem | None:
         """Item 0 of the last known list."""
@@ -140,9 +140,9 @@ class MissionService:
 
     def seq_of(self, number: int) -> int:
         """The seq of the item for the flight controller's record `number`; 0: none is known."""
-        if self._dialect is None or self.held is None:
+        if self._fc_store is None or self.held is None:
             return 0
-        return self._dialect.seq_of(self.held.records, number)
+        return self._fc_store.seq_of(self.held.records, number)
 
     def occupied(self) -> Refusal | None:
         """The reason that no list can be written now, if there is one."""
@@ -164,7 +164,7 @@ class MissionService:
 
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed; saves a request to a busy board."""
-        return ARMED if self._dialect is not None and self._vehicle.armed else None
+        return ARMED if self._fc_store is not None and self._vehicle.armed else None
 
     def close(self) -> None:
         """Accept no more transfers: the bridge is stopping."""
@@ -181,10 +181,10 @@ class MissionService:
             return armed
         waited_s = 0.0
         while True:
-            if self._dialect is None:
+            if self._fc_store is None:
                 return self._refusal
-            yield from self._dialect.reload()
-            report = yield from self._dialect.report()
+            yield from self._fc_store.reload()
+            report = yield from self._fc_store.report()
             if report is None:
                 return NO_LINK
             if report.state is StoreState.READY:
@@ -198,9 +198,9 @@ class MissionService:
 
     def rules(self) -> Conversation[MissionRules | Refusal]:
         """The rules of the current flight controller, armed or not."""
-        if self._dialect is None:
+        if self._fc_store is None:
             return self._refusal
-        report = yield from self._dialect.report()
+        report = yield from self._fc_store.report()
         return NO_LINK if report is None else report.rules
 
     def deliver(
@@ -224,13 +224,13 @@ class MissionService:
             cancelled = verdict.ack is MissionResult.OPERATION_CANCELLED
             outcome = Outcome.CANCELLED if cancelled else Outcome.REJECTED
             return (yield from self._conclude(number, outcome, verdict.ack, reason))
-        dialect = self._dialect
-        if dialect is None:
+        fc_store = self._fc_store
+        if fc_store is None:
             return (yield from self._conclude(number, Outcome.FAILED, self._refusal.ack, self._refusal.text))
-        if not (yield from self._copy_erased(dialect, verdict.records)):
+        if not (yield from self._copy_erased(fc_store, verdict.records)):
             return (yield from self._conclude(number, Outcome.FAILED, MissionResult.DENIED, _NO_COPY))
         before = None if self.held is None else self.held.identity
-        result = yield from self._push(dialect, arrived, progress)
+        result = yield from self._push(fc_store, arrived, progress)
         if result.failure is PushFailure.UNCERTAIN:
             self._pending.append(PendingMission(number, identify(verdict.records), before))
             self._is_settled, self.held = False, None
@@ -267,7 +267,7 @@ class MissionService:
         return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
 
     def _push(
-        self, dialect: AnyFcMissionStore, arrived: ArrivedMission, progress: Callable[[int], None]
+        self, fc_store: AnyFcMissionStore, arrived: ArrivedMission, progress: Callable[[int], None]
     ) -> Conversation[PushResult]:
         records = arrived.verdict.records
 
@@ -277,31 +277,31 @@ class MissionService:
 
         self.writing = MissionTransfer(arrived.source, TransferStep.WRITING, 0, len(records))
         try:
-            return (yield from dialect.push(records, written))
+            return (yield from fc_store.push(records, written))
         finally:
             self.writing = None
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
         """The flight controller's list; a cached copy is used only if the checksum is the same."""
-        dialect = self._dialect
-        if dialect is None:
+        fc_store = self._fc_store
+        if fc_store is None:
             return self._refusal
-        report = yield from dialect.report()
+        report = yield from fc_store.report()
         if report is None:
             return NO_LINK
         if self.held is not None and self.held.identity == report.stored:
-            return self._refreshed(dialect, self.held)
-        if report.state is StoreState.ARMED and report.stored is None and not dialect.reads_armed:
+            return self._refreshed(fc_store, self.held)
+        if report.state is StoreState.ARMED and report.stored is None and not fc_store.reads_armed:
             return ARMED
-        records = yield from dialect.pull()
+        records = yield from fc_store.pull()
         if records is None:
             return NO_LINK
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:
-            return self._refreshed(dialect, self.held)
+            return self._refreshed(fc_store, self.held)
         sent_as = yield from recall(identity)
-        held = HeldMission(identity, records, dialect.items(records, sent_as or {}))
-        if dialect is self._dialect:
+        held = HeldMission(identity, records, fc_store.items(records, sent_as or {}))
+        if fc_store is self._fc_store:
             # By the time the store answers, another flight controller may be connected.
             self.held = held
         return held
@@ -316,19 +316,19 @@ class MissionService:
         if not self._has_asked_store:
             self._has_asked_store = True
             self._pending += yield from find_pending()
-        if self._dialect is None:
+        if self._fc_store is None:
             return False
-        return not self._is_settled or bool(self._pending) or not (yield from self._dialect.is_current())
+        return not self._is_settled or bool(self._pending) or not (yield from self._fc_store.is_current())
 
     def catch_up(self) -> Conversation[MissionChange | None]:
         """Read the list; returns the text for the pilot if it is another one.
 
         After connecting or an interrupted push, the flight controller loads its saved mission if it holds none.
         """
-        dialect, is_first, before = self._dialect, not self._is_settled, self.held
-        if dialect is None:
+        fc_store, is_first, before = self._fc_store, not self._is_settled, self.held
+        if fc_store is None:
             return None
-        is_reloaded = (yield from dialect.reload()) if is_first else False
+        is_reloaded = (yield from fc_store.reload()) if is_first else False
         held = yield from self.read_back()
         if held is NO_LINK:
             return None
@@ -369,18 +369,18 @@ class MissionService:
                 news = MissionChange(text, is_warning=not has_arrived)
         return news
 
-    def _copy_erased(self, dialect: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
+    def _copy_erased(self, fc_store: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
         """Store the missions that the new list will erase; False if that fails."""
-        for mission in dialect.erased_by(records):
-            items = dialect.items(mission, {})
+        for mission in fc_store.erased_by(records):
+            items = fc_store.items(mission, {})
             verdict = Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, mission, items)
             number = yield from save(ArrivedMission(_ERASED_SOURCE, items, verdict))
             if number is None or not (yield from conclude(number, Outcome.CANCELLED, _ERASED)):
                 return False
         return True
 
-    def _refreshed(self, dialect: AnyFcMissionStore, held: HeldMission) -> HeldMission:
-        return replace(held, items=dialect.refreshed(held.items))
+    def _refreshed(self, fc_store: AnyFcMissionStore, held: HeldMission) -> HeldMission:
+        return replace(held, items=fc_store.refreshed(held.items))
 
     def _conclude(
         self, number: int | None, outcome: Outcome, ack: MissionResult, text: str

@@ -31,7 +31,7 @@ class MissionWatch:
 
     def tick(self, now: float) -> None:
         """Check, if no transfer runs."""
-        if self._context.missions.dialect is None:
+        if self._context.missions.fc_store is None:
             self.due = inf
         elif self._context.runner.is_busy:
             self.due = now + self._interval_s
@@ -40,8 +40,8 @@ class MissionWatch:
 
     @property
     def _interval_s(self) -> float:
-        dialect = self._context.missions.dialect
-        return inf if dialect is None else dialect.watch_s
+        fc_store = self._context.missions.fc_store
+        return inf if fc_store is None else fc_store.watch_s
 
     def _looked(self, is_outdated: bool | LinkLost, now: float) -> None:
         if is_outdated is True:

@@ -41,8 +41,8 @@ class Parameters:
 
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered with the value then in force, as the protocol requires."""
-        dialect = self._missions.dialect
-        if name != WP_RADIUS or dialect is None or dialect.wp_radius_cm is None:
+        fc_store = self._missions.fc_store
+        if name != WP_RADIUS or fc_store is None or fc_store.wp_radius_cm is None:
             if name == WP_RADIUS:
                 self._ground.say(Severity.ERROR, f"{WP_RADIUS} cannot be set on this flight controller now", station)
             self._send(station, name)
@@ -53,7 +53,7 @@ class Parameters:
             return
         # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
         wanted_cm = round(value)
-        if wanted_cm == dialect.wp_radius_cm:
+        if wanted_cm == fc_store.wp_radius_cm:
             # An equal value is not written: that would erase and rewrite the board's whole configuration.
             self._send(station, name)
             return
@@ -61,7 +61,7 @@ class Parameters:
             # A change is pending; a station that requested another value repeats its request.
             return
         if self._missions.armed_refusal() is not None:
-            self._ground.say(Severity.ERROR, _stays(dialect.wp_radius_cm, PushFailure.ARMED), station)
+            self._ground.say(Severity.ERROR, _stays(fc_store.wp_radius_cm, PushFailure.ARMED), station)
             self._send(station, name)
             return
         if not self._ground.allows(station, Cost.FLASH):
@@ -74,17 +74,17 @@ class Parameters:
             if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
                 self._ground.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer", station)
             elif failure is not None:
-                self._ground.say(Severity.ERROR, _stays(dialect.wp_radius_cm, failure), station)
+                self._ground.say(Severity.ERROR, _stays(fc_store.wp_radius_cm, failure), station)
             self._send(station, name)
 
         self._is_setting = True
-        self._runner.start(dialect.set_wp_radius(wanted_cm), done, now)
+        self._runner.start(fc_store.set_wp_radius(wanted_cm), done, now)
 
     def _values(self) -> dict[str, float]:
         values = {SYSID: float(self._sysid)}
-        dialect = self._missions.dialect
-        if dialect is not None and dialect.wp_radius_cm is not None:
-            values[WP_RADIUS] = float(dialect.wp_radius_cm)
+        fc_store = self._missions.fc_store
+        if fc_store is not None and fc_store.wp_radius_cm is not None:
+            values[WP_RADIUS] = float(fc_store.wp_radius_cm)
         return values
 
     def _send(self, station: Station, name: str) -> None:

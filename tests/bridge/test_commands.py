@@ -346,7 +346,7 @@ def test_a_board_that_limits_flash_wear_keeps_its_radius_and_the_pilot_hears_why
     world, station = radius_world()
     for radius_cm in range(301, 301 + 64):
         ended: list[object] = []
-        change = world.bridge.missions.dialect.set_wp_radius(radius_cm)  # type: ignore[union-attr]
+        change = world.bridge.missions.fc_store.set_wp_radius(radius_cm)  # type: ignore[union-attr]
         world.bridge.runner.start(change, lambda failure, _, ended=ended: ended.append(failure), world.now)  # type: ignore[misc]
         world.wait_until(lambda _, ended=ended: bool(ended), 5)  # type: ignore[misc]
         assert ended == [None]
@@ -397,6 +397,6 @@ def test_a_late_answer_to_one_value_is_not_taken_for_another() -> None:
         world.run(3)
         told = values(station.said())[-1][1]
         assert told == values(answers((world, station), m.MAVLink_param_request_list_message(1, 1)))[1][1]
-        info = world.bridge.missions.dialect
+        info = world.bridge.missions.fc_store
         assert info is not None
         assert world.naze._firmware._board.wp_radius_cm == info.wp_radius_cm == told

@@ -100,7 +100,7 @@ MAKERS: dict[str, Callable[[], Craft]] = {
 }
 
 
-def test_every_dialect_is_here() -> None:
+def test_every_mission_store_is_here() -> None:
     assert MAKERS.keys() == {profile.name for profile in PROFILES if profile.open_store is not None}
 
 
