@@ -48,7 +48,10 @@ _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(_HOST, _PYTHONS, tmp_path_factory.mktemp("package"))
+    # dpkg-deb's own choice would take more time than all the rest.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DPKG_DEB_COMPRESSOR_LEVEL", "0")
+        return build(_HOST, _PYTHONS, tmp_path_factory.mktemp("package"))
 
 
 @pytest.fixture
