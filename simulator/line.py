@@ -2,10 +2,13 @@
 """Line effects on bytes: a UART at another speed, and noise."""
 
 import random
+from functools import lru_cache
 
 _FRAME_BITS = 10
 
 
+# A search for the speed sends the same few frames again and again.
+@lru_cache(maxsize=1024)
 def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
     """The bytes that a receiver at `read_baud` gets from `data` sent back to back at `sent_baud`.
 

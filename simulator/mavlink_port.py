@@ -57,10 +57,8 @@ class MavlinkSchedule:
 
     def next_due(self, only_heartbeat: bool) -> float:
         """The time of the next message."""
-        ahead = 1
-        while self._message(self._slot + ahead, only_heartbeat) is None:
-            ahead += 1
-        return self._time + ahead * SLOT_SECONDS
+        divisors = [message.value[0] for message in ((Stream.HEARTBEAT,) if only_heartbeat else Stream)]
+        return self._time + SLOT_SECONDS * min(divisor - self._slot % divisor for divisor in divisors)
 
     def take_due(self, now: float, only_heartbeat: bool) -> list[Stream]:
         """The messages due by `now`."""

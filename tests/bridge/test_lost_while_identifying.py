@@ -2,6 +2,7 @@
 """Boards that fall silent, restart, arm or change their speed at any moment of identification are found again."""
 
 import random
+from functools import cache
 
 import pytest
 
@@ -16,16 +17,23 @@ SPEEDS = [115200, 57600, 38400, 19200, 9600]
 MOMENTS = 12
 
 
+def begun(baud: int, protocol: TelemetryProtocol) -> World:
+    """A world in which identification has just begun."""
+    world = World(SimOptions(baud=baud, tele_prot=protocol))
+    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 20)
+    return world
+
+
+@cache
+def identification_s(baud: int, protocol: TelemetryProtocol) -> float:
+    return begun(baud, protocol).wait_until(lambda w: not w.bridge.session.is_searching, 20)
+
+
 def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryProtocol.MSP) -> World:
     """A world somewhere in the middle of identification."""
-    world = World(SimOptions(baud=baud, tele_prot=protocol), seed=seed)
-    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 20)
+    world = begun(baud, protocol)
     if seed:
-        began = world.now
-        rest = World(SimOptions(baud=baud, tele_prot=protocol), seed=seed)
-        rest.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 20)
-        rest.wait_until(lambda w: not w.bridge.session.is_searching, 20)
-        world.run((rest.now - began) * random.Random(seed).random())
+        world.run(identification_s(baud, protocol) * random.Random(seed).random())
     assert isinstance(world.bridge.session.state, Identifying)
     return world
 
