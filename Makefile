@@ -26,8 +26,8 @@
 
 PYTHON ?= python3
 UV ?= uv
-# Most tests wait for programs, so two cores can run four at once.
-JOBS ?= 4
+# Most tests wait for programs, so two cores can run five at once.
+JOBS ?= 5
 VENV := .venv
 BIN := $(VENV)/bin
 

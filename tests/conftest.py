@@ -14,8 +14,26 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
 
-#: These wait for other programs. They start first, or one of them would run alone at the end (make test).
-_LONG = ("tests/service/test_debian_package", "tests/web", "tests/fleet", "tests/e2e", "tests/cli", "tests/attack")
+#: The longest files, and those that wait for other programs. They start first, or one of them would run alone at the
+#: end (make test).
+_LONG = (
+    "tests/service/test_debian_package",
+    "tests/e2e/test_soak",
+    "tests/e2e/test_mission_planner",
+    "tests/e2e/test_mavproxy",
+    "tests/e2e/test_board_faults",
+    "tests/e2e/test_bad_start",
+    "tests/fleet/test_fleet_faults",
+    "tests/cli/test_direct_boards",
+    "tests/conformance",
+    "tests/web",
+    "tests/fleet",
+    "tests/e2e",
+    "tests/attack",
+    "tests/cli",
+    "tests/links",
+    "tests/firmware",
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -25,9 +25,8 @@ from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 from protocols.mission_item import Command
 from tests.support.benches import Bench
 from tests.support.plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
-from tests.support.programs import until
+from tests.support.programs import PATIENCE, until
 
-_PATIENCE_S = 20.0
 T = TypeVar("T")
 
 
@@ -36,7 +35,7 @@ async def vehicle_at(port: int) -> AsyncIterator[Any]:
     """Connect MAVSDK; the vehicle that it finds."""
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
         await mavsdk.add_any_connection(f"udpout://127.0.0.1:{port}")
-        system = await mavsdk.first_autopilot(timeout_s=_PATIENCE_S)
+        system = await mavsdk.first_autopilot(timeout_s=PATIENCE)
         assert system is not None
         yield system
 
@@ -169,7 +168,7 @@ async def test_clearing(shared: Bench) -> None:
 async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     """MAVSDK joins the pieces of a STATUSTEXT, as QGroundControl does."""
     texts: list[str] = []
-    async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(_PATIENCE_S):
+    async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(PATIENCE):
         upload = asyncio.ensure_future(MissionRawAsync(vehicle).upload_mission(raw_items(mixed_plan(20))))
         async for text in TelemetryAsync(vehicle).subscribe_status_text():
             texts.append(" ".join(text.text.split()))

@@ -22,7 +22,7 @@ from service.settings.addresses import parse_fc, parse_gcs
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import judge, plain_plan, records_of
-from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until
+from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until, until_async
 from tests.support.programs import Daemon as DaemonProgram
 
 _LONG = plain_plan(146)
@@ -79,12 +79,8 @@ def test_ready_without_a_flight_controller_and_the_link_in_the_status(start: Sta
 
 async def more_food(systemd: Systemd, before: int) -> int:
     """Return how often the watchdog was fed, once that is more than before."""
-    for _ in range(int(PATIENCE / 0.02)):
-        fed = systemd.listen().count("WATCHDOG=1")
-        if fed > before:
-            return fed
-        await asyncio.sleep(0.02)
-    raise AssertionError(f"fed {before} times, and no more")
+    await until_async(lambda: systemd.listen().count("WATCHDOG=1") > before, "food")
+    return systemd.listen().count("WATCHDOG=1")
 
 
 async def test_the_watchdog_is_fed_by_the_loop_that_owns_the_links(systemd: Systemd, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ TRAPS = ("hazard_runs", "tx_overflows", "cli_entered")
 TELE_PROTS = (2, 0, 3, 1)
 
 
-@pytest.mark.timeout(60 * MINUTES + 180)
+@pytest.mark.timeout(60 * MINUTES + 600)
 def test_soak(start: Starter, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     port = tmp_path / "naze-by-id"
     udp_port, tcp_port = free_port(), free_port(SOCK_STREAM)

@@ -10,8 +10,7 @@ import termios
 from service.links.fc_device import device_opener
 from service.links.fc_port import FcPort
 from service.settings.addresses import TcpFc
-
-PATIENCE_S = 20.0
+from tests.support.programs import PATIENCE
 
 
 def unacknowledged(connection: socket.socket) -> int:
@@ -32,13 +31,13 @@ async def test_what_was_read_is_acknowledged_before_the_next_byte_is_awaited() -
             lambda _: None,
         )
         task = loop.create_task(port.run())
-        board, _ = await asyncio.wait_for(loop.sock_accept(listener), PATIENCE_S)
+        board, _ = await asyncio.wait_for(loop.sock_accept(listener), PATIENCE)
         with board:
             left = []
             # Linux acknowledges late only to an end that it knows to answer.
             for _ in range(30):
                 board.send(b"$")
-                left.append(await asyncio.wait_for(heard.get(), PATIENCE_S))
+                left.append(await asyncio.wait_for(heard.get(), PATIENCE))
                 port.write(b"?")
                 board.setblocking(True)
                 assert board.recv(1) == b"?"

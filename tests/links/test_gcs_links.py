@@ -3,7 +3,7 @@
 
 import asyncio
 import socket
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 
 import pytest
@@ -16,6 +16,7 @@ from service.links import tcp_link, udp_link
 from service.links.fc_device import device_opener
 from service.links.gcs_links import GcsLink, open_link
 from service.settings.addresses import AddressError, GcsAddress, TcpFc, parse_fc, parse_gcs, split_gcs
+from tests.support.programs import PATIENCE, free_port, until_async
 
 FRAME = bytes.fromhex("fe09000101000000000002030000030346f1")
 
@@ -79,22 +80,8 @@ def links() -> Iterator[Links]:
     links.close()
 
 
-def free_port(kind: socket.SocketKind, host: str = "127.0.0.1") -> int:
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind) as probe:
-        probe.bind((host, 0))
-        return int(probe.getsockname()[1])
-
-
-async def until(condition: Callable[[], object], what: str, seconds: float = 20.0) -> None:
-    for _ in range(int(seconds / 0.005)):
-        if condition():
-            return
-        await asyncio.sleep(0.005)
-    raise AssertionError(f"{what} did not come")
-
-
 async def received(end: socket.socket, size: int = 4096) -> bytes:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE):
         return await asyncio.get_running_loop().sock_recv(end, size)
 
 
@@ -105,7 +92,7 @@ async def test_udpin_answers_where_it_was_spoken_to_from(links: Links, host: str
     clients = [links.udp(host) for _ in range(2)]
     for client in clients:
         client.sendto(FRAME, (host, port))
-    await until(lambda: len(links.ears.heard) == 2, "both datagrams")
+    await until_async(lambda: len(links.ears.heard) == 2, "both datagrams")
     for (peer, data), client in zip(links.ears.heard, clients, strict=True):
         assert data == FRAME
         link.send(peer, str(peer).encode())
@@ -117,12 +104,12 @@ async def test_tcpin_serves_each_client(links: Links, host: str) -> None:
     port = free_port(socket.SOCK_STREAM, host)
     link = links.open(f"tcpin:{f'[{host}]' if ':' in host else host}:{port}")
     client = links.tcp(port, host)
-    await until(lambda: links.ears.default_peers, "the client")
+    await until_async(lambda: links.ears.default_peers, "the client")
     (peer,) = links.ears.default_peers
     link.send(peer, FRAME)
     assert await received(client) == FRAME
     client.close()
-    await until(lambda: links.ears.gone == [peer], "its end")
+    await until_async(lambda: links.ears.gone == [peer], "its end")
     assert links.ears.default_peers == {}
 
 
@@ -165,7 +152,7 @@ async def test_a_real_name_is_looked_up(links: Links) -> None:
     client = links.udp()
     port = client.getsockname()[1]
     link = links.open(f"udpout:localhost:{port}")
-    await until(lambda: links.ears.default_peers, "the address")
+    await until_async(lambda: links.ears.default_peers, "the address")
     (peer,) = links.ears.default_peers
     assert peer.key == ("127.0.0.1", port)
     link.send(peer, FRAME)
@@ -196,9 +183,9 @@ async def test_a_client_too_many_takes_the_place_of_another(links: Links) -> Non
     port = free_port(socket.SOCK_STREAM)
     links.open(f"tcpin:127.0.0.1:{port}")
     clients = [links.tcp(port) for _ in range(tcp_link._MAX_CLIENTS)]
-    await until(lambda: len(links.ears.default_peers) == len(clients), "all clients")
+    await until_async(lambda: len(links.ears.default_peers) == len(clients), "all clients")
     links.tcp(port)
-    await until(lambda: links.ears.gone, "the end of another")
+    await until_async(lambda: links.ears.gone, "the end of another")
     assert len(links.ears.default_peers) == len(clients)
     # The half that came first stays: the oldest of the others has made room.
     assert await received(clients[len(clients) // 2]) == b""
@@ -209,7 +196,7 @@ async def test_a_client_that_reads_nothing_is_disconnected(links: Links, monkeyp
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
     links.tcp(port)
-    await until(lambda: links.ears.default_peers, "the client")
+    await until_async(lambda: links.ears.default_peers, "the client")
     (peer,) = links.ears.default_peers
 
     def sends_on() -> bool:
@@ -217,7 +204,7 @@ async def test_a_client_that_reads_nothing_is_disconnected(links: Links, monkeyp
             link.send(peer, FRAME * 10)
         return bool(links.ears.gone)
 
-    await until(sends_on, "the end")
+    await until_async(sends_on, "the end")
     assert links.ears.default_peers == {}
 
 
@@ -226,13 +213,13 @@ async def test_who_does_not_read_answers_is_disconnected_after_all_were_sent_to(
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
     links.tcp(port)
-    await until(lambda: links.ears.default_peers, "the client")
+    await until_async(lambda: links.ears.default_peers, "the client")
     (peer,) = links.ears.default_peers
     ack = FrameWriter(1, 1).frame(pack(m.MAVLink_mission_ack_message(255, 190, 1, 0)), 2)
     for _ in range(200000):
         link.send(peer, ack)
         assert not links.ears.gone
-    await until(lambda: links.ears.gone == [peer], "the end")
+    await until_async(lambda: links.ears.gone == [peer], "the end")
 
 
 @pytest.mark.parametrize(

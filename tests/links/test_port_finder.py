@@ -6,7 +6,7 @@ import json
 import os
 import re
 import tty
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
@@ -20,8 +20,8 @@ from service.settings.addresses import AutoFc
 from simulator.naze import SimulatedNaze
 from simulator.pty_link import PtyLink
 from tests.support.faulty_machine import FaultyMachine
+from tests.support.programs import until_async
 
-PATIENCE_S = 40.0
 NMEA = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"
 CP2102 = ("10c4", "ea60", "Silicon Labs", "CP2102 USB to UART Bridge Controller")
 
@@ -62,14 +62,6 @@ def pi(tmp_path: Path) -> Pi:
     return Pi(tmp_path / "root")
 
 
-async def until(condition: Callable[[], object], what: str) -> None:
-    for _ in range(int(PATIENCE_S / 0.02)):
-        if condition():
-            return
-        await asyncio.sleep(0.02)
-    raise AssertionError(f"{what} did not come")
-
-
 @asynccontextmanager
 async def running(pi: Pi, state_dir: Path) -> AsyncIterator[tuple[Daemon, MissionJobs]]:
     daemon = Daemon(Settings(AutoFc(), state_dir=state_dir), pi)
@@ -104,21 +96,21 @@ async def test_the_flight_controller_is_found_behind_a_gps_receiver(pi: Pi, tmp_
 
     talking = asyncio.create_task(gps())
     async with running(pi, state) as (daemon, jobs):
-        await until(lambda: daemon.bridge.session.controller, "the flight controller")
+        await until_async(lambda: daemon.bridge.session.controller, "the flight controller")
         status = jobs.status()
         assert status["port"] == "/dev/ttyUSB1"
         assert status["ports_passed_over"] == ["/dev/ttyUSB0: a GPS receiver (NMEA) was heard there"]
         assert pi.sent_to("ttyUSB0") == b""
-        await until((state / "ports.json").exists, "the memory")
+        await until_async((state / "ports.json").exists, "the memory")
     talking.cancel()
     kept = json.loads((state / "ports.json").read_text())
     assert kept["flight_controller"] == "usb 1-2 10c4:ea60"
     # After a restart it is the first port to be tried, and a GPS receiver that is silent now is still none.
     async with running(pi, state) as (daemon, jobs):
-        await until(lambda: daemon.bridge.session.controller, "the flight controller")
+        await until_async(lambda: daemon.bridge.session.controller, "the flight controller")
         assert jobs.status()["ports_passed_over"] == []
         naze.unplug()
-        await until(lambda: jobs.status()["ports_passed_over"], "the other port's turn")
+        await until_async(lambda: jobs.status()["ports_passed_over"], "the other port's turn")
         assert pi.sent_to("ttyUSB0") == b""
 
 
@@ -128,7 +120,7 @@ async def test_a_silent_port_is_left_for_the_next_one(pi: Pi, tmp_path: Path, mo
     pi.usb("ttyACM0", "1-1.4", ("0483", "5740", "STMicroelectronics", "STM32 Virtual ComPort"))
     plug_naze(pi, "ttyACM0")
     async with running(pi, tmp_path) as (daemon, jobs):
-        await until(lambda: daemon.bridge.session.controller, "the flight controller")
+        await until_async(lambda: daemon.bridge.session.controller, "the flight controller")
         assert jobs.status()["port"] == "/dev/ttyACM0"
         assert jobs.status()["ports_passed_over"] == ["/dev/ttyAMA0: no flight controller answers"]
         # Only whole requests that ask who is there.
@@ -146,7 +138,7 @@ async def test_a_port_that_another_program_uses_is_not_opened(pi: Pi, tmp_path: 
     pi.runs(77, "/usr/sbin/gpsd", "-n", "/dev/serial0")
     pi.runs(78, "/usr/bin/mavproxy.py", "--master=/dev/ttyUSB0,57600")
     async with running(pi, tmp_path) as (daemon, jobs):
-        await until(lambda: daemon.fc_trouble, "the reason")
+        await until_async(lambda: daemon.fc_trouble, "the reason")
         assert "gpsd (pid 77) uses it" in daemon.fc_trouble
         assert "mavproxy.py (pid 78) uses it" in daemon.fc_trouble
         assert jobs.status()["port"] is None

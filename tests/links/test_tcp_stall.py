@@ -17,6 +17,7 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.links import tcp_link
 from service.links.tcp_link import TcpLink
 from service.settings.addresses import GcsAddress
+from tests.support.programs import free_port
 
 
 class Listener:
@@ -41,11 +42,6 @@ class Listener:
 
     def remove_default_peer(self, peer: Peer) -> None:
         self.peers.remove(peer)
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 async def connected(listener: Listener, link: TcpLink, port: int) -> tuple[socket.socket, Peer]:
@@ -75,7 +71,7 @@ async def read(client: socket.socket, quiet_s: float = 0.3) -> list[MavlinkFrame
 
 
 async def test_a_stalled_client_loses_old_telemetry_and_nothing_else() -> None:
-    listener, port = Listener(), free_port()
+    listener, port = Listener(), free_port(socket.SOCK_STREAM)
     link = TcpLink(GcsAddress("tcpin", "127.0.0.1", port), listener)
     stalled, stalled_peer = await connected(listener, link, port)
     reading, reading_peer = await connected(listener, link, port)
@@ -106,7 +102,7 @@ async def test_a_stalled_client_loses_old_telemetry_and_nothing_else() -> None:
 async def test_without_a_descriptor_left_it_does_not_spin(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp_link, "_REST_S", 0.05)
     loop = asyncio.get_running_loop()
-    listener, port = Listener(), free_port()
+    listener, port = Listener(), free_port(socket.SOCK_STREAM)
     link = TcpLink(GcsAddress("tcpin", "127.0.0.1", port), listener)
     client = socket.socket()
     client.setblocking(False)

@@ -18,9 +18,6 @@ import pytest
 from deb.build import PYTHONS, build, fetch
 from tests.support.bare_root import BareRoot
 
-#: pip and dpkg take a minute, several on a busy machine.
-pytestmark = pytest.mark.timeout(600)
-
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _MISSION = _REPOSITORY / "examples" / "naze-field.waypoints"
 _SCHEMA = "storage/schema/0001_missions.sql"

@@ -17,6 +17,7 @@ from service.links.signing_state import FILE_NAME, SigningState
 from service.settings import Settings
 from service.settings.addresses import GcsAddress, SimulatedFc
 from service.settings.write_access import WriteAccess
+from tests.support.programs import until_async
 
 KEY = key_from_passphrase("a passphrase")
 NOON = 1_795_262_400.0
@@ -64,11 +65,7 @@ def our_timestamp(state: SigningState) -> int:
 
 
 async def until_written(pi: Pi, least: int) -> None:
-    for _ in range(1000):
-        if pi.path.exists() and pi.stored()["timestamp"] >= least:
-            return
-        await asyncio.sleep(0.01)
-    raise AssertionError("it was not written")
+    await until_async(lambda: pi.path.exists() and pi.stored()["timestamp"] >= least, "what is to be written")
 
 
 async def test_a_stop_and_a_start_without_a_clock(tmp_path: Path) -> None:

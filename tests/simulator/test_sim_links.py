@@ -21,10 +21,11 @@ from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encod
 from simulator.naze import SimulatedNaze
 from simulator.pipe_link import SimLink
 from tests.support.naze_bench import mission
-from tests.support.programs import control
+from tests.support.programs import PATIENCE, control, until
 
 IDENT = request(100)
-PATIENCE = 10.0
+#: Silence that lasts so long is no answer to come.
+SILENCE_S = 1.0
 
 
 async def ask_socket(far: socket.socket, frame: bytes) -> MspFrame:
@@ -105,21 +106,14 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
             simulator.end(signal.SIGKILL)
 
 
-def ask(port: serial.Serial, frame: bytes) -> MspFrame | None:
-    """Ask once; None after a second of real time."""
-    parser, deadline = MspParser(), time.monotonic() + 1.0
+def ask(port: serial.Serial, frame: bytes, seconds: float = PATIENCE) -> MspFrame | None:
+    """Ask once; None after so many seconds of real time."""
+    parser, deadline = MspParser(), time.monotonic() + seconds
     port.write(frame)
     while time.monotonic() < deadline:
         if frames := parser.feed(port.read(4096)):
             return frames[0]
     return None
-
-
-def until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_the_port_answers_at_the_boards_speed_only(start: Callable[..., Simulator]) -> None:
@@ -128,10 +122,10 @@ def test_the_port_answers_at_the_boards_speed_only(start: Callable[..., Simulato
     with simulator.open(57600) as port:
         assert ask(port, IDENT) is not None
         port.baudrate = 115200
-        assert ask(port, IDENT) is None
+        assert ask(port, IDENT, SILENCE_S) is None
         port.baudrate = 57600
         # What was heard at the wrong speed may have begun a frame; the receiver forgets it.
-        until(lambda: ask(port, IDENT) is not None)
+        until(lambda: ask(port, IDENT, SILENCE_S), "an answer")
 
 
 def test_the_speed_changes_with_arming(start: Callable[..., Simulator]) -> None:
@@ -139,10 +133,10 @@ def test_the_speed_changes_with_arming(start: Callable[..., Simulator]) -> None:
     with simulator.open() as port:
         assert ask(port, IDENT) is not None
         assert simulator.control("armed 1") == "ok"
-        until(lambda: simulator.stats()["baud"] == 57600)
+        until(lambda: simulator.stats()["baud"] == 57600, "the speed of an armed board")
         port.baudrate = 57600
         port.reset_input_buffer()
-        until(lambda: b"\xfe\x1c" in port.read(200))
+        until(lambda: b"\xfe\x1c" in port.read(200), "an attitude")
 
 
 def test_unplugging_ends_the_port_and_plugging_brings_it_back(start: Callable[..., Simulator]) -> None:
@@ -152,7 +146,7 @@ def test_unplugging_ends_the_port_and_plugging_brings_it_back(start: Callable[..
     assert simulator.control("unplug") == "ok"
     assert not os.path.lexists(simulator.link)
     with pytest.raises(serial.SerialException):
-        until(lambda: ask(port, IDENT) is None and False)
+        until(lambda: ask(port, IDENT, SILENCE_S) is None and False, "the end of the port")
     port.close()
     assert simulator.control("plug") == "ok"
     with simulator.open() as again:
@@ -178,11 +172,11 @@ def test_control_switches_faults_and_power(start: Callable[..., Simulator]) -> N
     simulator = start()
     with simulator.open() as port:
         assert simulator.control("hang 1") == "ok"
-        assert ask(port, IDENT) is None
+        assert ask(port, IDENT, SILENCE_S) is None
         assert simulator.control("hang 0") == "ok"
         assert ask(port, IDENT) is not None
         assert simulator.control("power off") == "ok"
-        assert ask(port, IDENT) is None
+        assert ask(port, IDENT, SILENCE_S) is None
         assert simulator.stats()["power"] == "OFF"
     assert simulator.control("bit_error_rate much") == "error: bit_error_rate takes a number, not 'much'"
     assert simulator.control("sing") == "error: unknown line 'sing'"

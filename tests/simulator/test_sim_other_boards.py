@@ -5,10 +5,8 @@ import json
 import signal
 import socket
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypeVar
 
 import pytest
 import serial
@@ -16,18 +14,7 @@ import serial
 from protocols.msp.frame import request
 from simulator.nav_waypoint import FLAG_LAST, Action
 from tests.support.msp_bench import Frame, take_apart, waypoint
-from tests.support.programs import NAZE_BRIDGE, REPOSITORY, control, free_port
-
-PATIENCE = 20.0
-T = TypeVar("T")
-
-
-def until(condition: Callable[[], T | None]) -> T:
-    deadline = time.monotonic() + PATIENCE
-    while not (found := condition()):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    return found
+from tests.support.programs import NAZE_BRIDGE, PATIENCE, REPOSITORY, control, free_port, run_naze_bridge, until
 
 
 class Simulator:
@@ -146,7 +133,7 @@ def test_a_crash_takes_the_port_away_until_the_power_was_switched(start: Callabl
     assert [simulator.line("power off"), simulator.line("power on")] == ["ok", "ok"]
     # Until it has booted nothing is heard.
     with simulator.client() as client:
-        assert until(lambda: client.ask(20, timeout=0.5)) == (">", 20, bytes((0, 120, 0, 0)))
+        assert until(lambda: client.ask(20, timeout=0.5), "an answer") == (">", 20, bytes((0, 120, 0, 0)))
 
 
 def test_the_eeprom_is_kept_in_a_file(start: Callable[..., Simulator], tmp_path: Path) -> None:
@@ -165,7 +152,7 @@ def test_the_eeprom_is_kept_in_a_file(start: Callable[..., Simulator], tmp_path:
 def test_the_truth_of_a_flight(start: Callable[..., Simulator]) -> None:
     simulator = start("--kind", "inav")
     assert simulator.line("armed 1") == "ok"
-    until(lambda: json.loads(simulator.line("truth"))["flight"]["height_m"] > 0.1)
+    until(lambda: json.loads(simulator.line("truth"))["flight"]["height_m"] > 0.1, "the take-off")
     assert json.loads(simulator.line("truth"))["armed"] is True
 
 
@@ -180,9 +167,7 @@ def test_the_truth_of_a_flight(start: Callable[..., Simulator]) -> None:
     ],
 )
 def test_bad_options_are_one_sentence(options: tuple[str, ...], says: str) -> None:
-    ended = subprocess.run(
-        [*NAZE_BRIDGE, "sim", *options], cwd=REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=False
-    )
+    ended = run_naze_bridge("sim", *options)
     assert ended.returncode != 0
     assert says in ended.stderr
     assert "Traceback" not in ended.stderr

@@ -19,9 +19,9 @@ from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import MissionResult
 from tests.support.plan import PlanRow
+from tests.support.programs import PATIENCE
 
 SYSID, COMPID = 255, 190
-_PATIENCE_S = 20.0
 _DATAGRAM_SIZE = 2048
 _INT_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
 #: Stream and rate, as it asks for them at the first heartbeat.
@@ -190,7 +190,7 @@ class MissionPlanner:
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
         """Listen until something is so."""
-        deadline = time.monotonic() + _PATIENCE_S
+        deadline = time.monotonic() + PATIENCE
         while not condition():
             assert self._receive(deadline), f"{what} did not come, but {self.texts}, {self.acks()}"
 
@@ -199,7 +199,7 @@ class MissionPlanner:
     def meet(self) -> None:
         """Wait for two heartbeats of an autopilot's component 1: nothing is addressed to anybody before."""
         seen = 0
-        for message in self._packets(_PATIENCE_S / self._pace):
+        for message in self._packets(PATIENCE / self._pace):
             if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1 and message.type != 6:
                 seen += 1
                 self.vehicle = message.get_srcSystem(), message.get_srcComponent()
@@ -262,7 +262,7 @@ class MissionPlanner:
 
     def _request_parameters(self) -> None:
         """The list every 4 s, forever if none comes; then the gaps, by index."""
-        deadline = time.monotonic() + _PATIENCE_S
+        deadline = time.monotonic() + PATIENCE
         while not self._parameter_count:
             assert time.monotonic() < deadline, "it would ask for parameters for ever"
             self.send(messages.MAVLink_param_request_list_message(*self._target))

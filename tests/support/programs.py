@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon and the simulated Naze as programs of their own, as a user starts them."""
 
+import asyncio
 import json
 import signal
 import socket
@@ -41,10 +42,19 @@ def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | N
         time.sleep(0.02)
 
 
-def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
-    """A port of 127.0.0.1 that is free at this moment."""
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
+async def until_async(condition: Callable[[], T | None], what: str) -> T:
+    """The same in an event loop, which runs meanwhile."""
+    deadline = time.monotonic() + PATIENCE
+    while not (found := condition()):
+        assert time.monotonic() < deadline, f"{what} did not come"
+        await asyncio.sleep(0.01)
+    return found
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = "127.0.0.1") -> int:
+    """A port of `host` that is free at this moment."""
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind) as probe:
+        probe.bind((host, 0))
         port: int = probe.getsockname()[1]
         return port
 
