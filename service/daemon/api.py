@@ -28,7 +28,8 @@ from service.machine.package import version
 from service.recording.store_worker import as_dicts
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission, StoreError
 
-_MAX_LINE = 1 << 20
+#: asyncio buffers twice as much for each client; a list of 146 items has 40 kB.
+_MAX_LINE = 1 << 18
 #: Further clients are disconnected.
 _MAX_CLIENTS = 16
 #: The timeout for receiving a request, and for sending its reply.
@@ -279,7 +280,7 @@ async def _read_line(reader: asyncio.StreamReader) -> bytes:
     try:
         return await reader.readline()
     except ValueError:
-        raise ValueError(f"it is longer than {_MAX_LINE >> 20} MB, and no mission is") from None
+        raise ValueError(f"it is longer than {_MAX_LINE >> 10} kB, and no mission is") from None
 
 
 def _request(line: bytes) -> Json:

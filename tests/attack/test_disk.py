@@ -6,7 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from protocols.mavlink.frame import MavlinkSplitter
@@ -158,12 +158,12 @@ def test_connections_that_ask_nothing(start: Starter) -> None:
     assert comes(lambda: bench.daemon.status() is not None)
 
 
-def test_a_source_of_a_megabyte_is_cut(start: Starter) -> None:
+def test_a_long_source_is_cut(start: Starter) -> None:
     bench = start.bench()
     with Watch(bench.daemon) as witness:
         until(lambda: len(witness.gaps_s) >= 1, "a heartbeat")
         for _ in range(5):
-            bench.daemon.ask({"do": "push", "source": "y" * 900_000, "items": []})
+            bench.daemon.ask({"do": "push", "source": "y" * 250_000, "items": []})
         until(lambda: len(witness.gaps_s) >= 4, "heartbeats")
     assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] < 60
 
@@ -185,6 +185,24 @@ def test_answers_that_nobody_reads(start: Starter) -> None:
                 continue
         until(lambda: len(witness.gaps_s) >= 5, "heartbeats")
         assert _memory_kb(bench.daemon.process.pid) - before < 30_000
+    assert comes(lambda: bench.daemon.status() is not None)
+
+
+def test_lines_without_end(start: Starter) -> None:
+    """Sixteen clients sent as much as the daemon buffers of a line: 90 MB."""
+    bench = start.bench()
+    before = _memory_kb(bench.daemon.process.pid)
+    chunk = b"x" * (1 << 16)
+    with Watch(bench.daemon) as witness, ExitStack() as clients:
+        for _ in range(16):
+            client = clients.enter_context(socket.socket(socket.AF_UNIX))
+            client.connect(str(bench.daemon.state_dir / "control.sock"))
+            client.settimeout(0.1)
+            with suppress(OSError):
+                for _ in range(64):
+                    client.sendall(chunk)
+        until(lambda: len(witness.gaps_s) >= 2, "heartbeats")
+        assert _memory_kb(bench.daemon.process.pid) - before < 20_000
     assert comes(lambda: bench.daemon.status() is not None)
 
 
