@@ -38,6 +38,7 @@ class NoDaemonError(ControlError):
 def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], None] = lambda _: None) -> Json:
     """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
     path = find_socket(state_dir)
+    line = to_json(request).encode() + b"\n"  # now: the daemon waits only 5 s for it
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
             connection.connect(str(path))
@@ -49,7 +50,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
             raise NoDaemonError(f"no daemon answers on {path}: {remedy}") from error
         with suppress(ConnectionError):
             # A refusal may arrive in the middle of a long request: read it.
-            connection.sendall(to_json(request).encode() + b"\n")
+            connection.sendall(line)
         with suppress(ConnectionError):
             for answer in _lines(connection):
                 if "progress" in answer:
