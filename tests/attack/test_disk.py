@@ -10,7 +10,6 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mission_item import MissionResult
 from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
@@ -61,27 +60,6 @@ def test_what_is_refused_is_not_recorded(start: Starter, stack: ExitStack, tmp_p
     assert bench.daemon.end() == 0
     recorded = b"".join(path.read_bytes() for path in logs(bench.daemon.state_dir))
     assert 77 not in {frame.sysid for frame in MavlinkSplitter().feed(recorded)}
-
-
-def test_lists_without_end(start: Starter, stack: ExitStack) -> None:
-    """39 GB a day of rejected lists: few of one sender are stored."""
-    bench = start.bench()
-    stranger = stack.enter_context(udp_station(bench.daemon.address, sysid=77))
-
-    def reject() -> None:
-        plan = plain_plan(3)
-        stranger.announce(3)
-        stranger.wait_for("MISSION_REQUEST", "MISSION_ACK")
-        stranger.give([plan[0]], 0)
-        stranger.send(m.MAVLink_mission_item_int_message(1, 1, 1, 3, 22, 0, 1, 0, 0, 0, 0, 2**31 - 1, 0, 9.0))
-        stranger.send(m.MAVLink_mission_ack_message(1, 1, 15))
-
-    with Watch(bench.daemon) as witness, Attack(reject, per_s=100) as attack:
-        assert comes(lambda: attack.count > 60)
-        until(lambda: len(witness.gaps_s) >= 3, "heartbeats")
-    assert len(bench.daemon.missions()) <= 25
-    with udp_station(bench.daemon.address) as pilot:
-        until(lambda: pilot.upload(plain_plan(20)) is MissionResult.ACCEPTED, "the pilot's upload")
 
 
 def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path: Path) -> None:
@@ -184,7 +162,7 @@ def test_answers_that_nobody_reads(start: Starter) -> None:
             except OSError:
                 continue
         until(lambda: len(witness.gaps_s) >= 5, "heartbeats")
-        assert _memory_kb(bench.daemon.process.pid) - before < 30_000
+        assert _memory_kb(bench.daemon.process.pid) - before < 10_000
     assert comes(lambda: bench.daemon.status() is not None)
 
 

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The limits on a ground station's requests over a long time, in simulated time."""
 
+from bridge.gcs.budget import Budgets
+from bridge.gcs.cost import LIMITS, Cost
+from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import messages as m
 from tests.support.world import GroundStation, World
 
@@ -28,3 +31,19 @@ def test_flash_writes() -> None:
         world.after(number / 2, lambda: station.send(save))
     world.run(100)
     assert 30 < sum(data.count(_SAVE) for _, _, data in world.written) <= 30 + 100 / 20 + 1
+
+
+def test_newcomers_share_a_limit_by_host_and_in_all() -> None:
+    pilot = Peer("udp", ("10.0.0.1", 14550))
+    budgets = Budgets(lambda peer: peer == pilot)
+    for cost in (Cost.ARRIVAL, Cost.BOARD, Cost.FLASH, Cost.STORED, Cost.TEXT):
+        limit = LIMITS[cost]
+        spent = 0
+        for host in range(2, 12):
+            ports = (Peer("udp", (f"10.0.0.{host}", port)) for port in range(int(limit.each.burst) + 5))
+            of_host = sum(budgets.allows(cost, peer, 0.0) for peer in ports)
+            assert of_host <= limit.each.burst
+            spent += of_host
+        assert spent == int(limit.total.burst)
+    writes = [budgets.allows(Cost.FLASH, pilot, 0.0) for _ in range(100)]
+    assert sum(writes) == LIMITS[Cost.FLASH].each.burst
