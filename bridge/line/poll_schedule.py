@@ -2,9 +2,9 @@
 """The schedule of telemetry polls. Sans-IO.
 
 Each poll has a requested interval: the fastest that a ground station asked for or the bridge itself needs. The line
-may stretch it: requests and replies together get a share of its bytes (missions and commands have the rest), and lost
-replies slow all polls down until they arrive again. A poll is repeated only after its reply has arrived or timed out,
-so a long round trip slows the fast ones down by itself.
+may stretch it: requests and replies together get a share of its bytes, or of the board's time if that is scarcer
+(missions and commands have the rest), and lost replies slow all polls down until they arrive again. A poll is repeated
+only after its reply has arrived or timed out, so a long round trip slows the fast ones down by itself.
 """
 
 from collections.abc import Mapping, Sequence
