@@ -148,11 +148,12 @@ class Autosense:
         if self.found:
             return
         if now >= visit.ends:
-            if visit.heartbeat is not None:
+            if visit.frsky.values_in_a_row >= _FRSKY_EVIDENCE:
+                # A Harakiri that has heard nothing sends its heartbeat as well.
+                self._conclude(Spoken.FRSKY, f"{visit.frsky.values_in_a_row} FrSky values in a row")
+            elif visit.heartbeat is not None:
                 sender = f"system {visit.heartbeat.sysid} component {visit.heartbeat.compid}"
                 self._conclude(Spoken.MAVLINK, f"heard {sender}, no answer to {visit.probes} MSP probes")
-            elif visit.frsky.values_in_a_row >= _FRSKY_EVIDENCE:
-                self._conclude(Spoken.FRSKY, f"{visit.frsky.values_in_a_row} FrSky values in a row")
             else:
                 self.speed = next(self._order)
                 self.phase = Phase.LISTEN

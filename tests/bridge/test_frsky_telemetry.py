@@ -57,7 +57,9 @@ def test_a_jump_is_not_believed(damaged: FrskyReport) -> None:
 class SwitchedReceiver(SimulatedNaze):
     """A wire to its receiver that can be cut."""
 
-    is_deaf = False
+    def __init__(self, options: SimOptions, faults: Faults, *, is_deaf: bool = False) -> None:
+        super().__init__(options, faults)
+        self.is_deaf = is_deaf
 
     def receive(self, data: bytes, now: float) -> None:
         if not self.is_deaf:
@@ -74,3 +76,20 @@ def test_msp_is_used_again_as_soon_as_it_is_answered() -> None:
     board.is_deaf = False
     world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.speed == 9600, 8)
     world.assert_line_was_clean()
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.3, 0.6, 0.9])
+def test_a_board_that_never_hears_us_sends_heartbeats_between_its_values(after_s: float) -> None:
+    faults = Faults()
+    world = World(
+        faults=faults, peer=SwitchedReceiver(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults, is_deaf=True)
+    )
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
+    world.run(after_s)
+    faults.armed = True
+    world.wait_until(lambda w: w.kind is not harakiri.MAVLINK, 8)
+    world.wait_until(lambda w: w.bridge.session.controller is not None, 20)
+    assert world.kind is harakiri.FRSKY
+    world.run(20)
+    assert world.kind is harakiri.FRSKY
+    assert world.bridge.session.vehicle.fresh(GlobalPosition, world.now) is not None
