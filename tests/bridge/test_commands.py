@@ -111,7 +111,7 @@ def test_all_command_numbers_are_acknowledged(flying: tuple[World, GroundStation
     [
         (400, "transmitter"),  # arm, disarm
         (176, "transmitter"),  # set mode
-        (246, "not rebooted"),
+        (246, "cannot be rebooted"),
         (300, "transmitter"),  # mission start
         (22, "transmitter"),
         (21, "transmitter"),
