@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, MspLink
@@ -138,6 +138,7 @@ def test_over_a_slow_line_a_question_waits_for_its_answer(delay_s: float) -> Non
     beside_missions=st.booleans(),
     turn_s=st.sampled_from([0.0, 0.01]),
 )
+@example(wishes=dict.fromkeys([poll.command for poll in POLLS], 0.02), baud=115200, beside_missions=False, turn_s=0.01)
 @settings(max_examples=60, deadline=None)
 def test_any_requests_fit_the_line_and_the_board(
     wishes: Mapping[Msp, float], baud: int | None, beside_missions: bool, turn_s: float
