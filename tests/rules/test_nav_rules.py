@@ -518,3 +518,12 @@ def test_what_a_changed_leg_loses_is_reported(record: NavRecord, lost: str) -> N
     assert [(finding.news, finding.text()) for finding in verdict.findings] == expected
     assert verdict.records[1].alt_cm == 4000
     assert (verdict.records[1].p3 >> 1, verdict.records[1].flag) == (0, 0)
+
+
+@pytest.mark.parametrize(("p3", "copy"), [(0, "a copy"), (2, "a copy without its user actions (2)")])
+def test_what_the_copy_of_an_erased_mission_lacks_is_reported(p3: int, copy: str) -> None:
+    leg = NavRecord(A.WAYPOINT, LAT, LON, 2000, p3=p3)
+    other = (leg, replace(leg, flag=LAST))
+    home, *legs = items_from_records([NavRecord(A.WAYPOINT, LAT, LON, 3000)] * 119, home_item((LAT, LON)))
+    (finding,) = check_list([home, *legs], NavRules(inav_profile(), others=(other,))).findings
+    assert finding.text() == f"Mission of 2 records does not fit next to it: erased, {copy} is kept on the Pi"

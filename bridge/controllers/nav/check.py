@@ -287,7 +287,9 @@ class NavCheck(ListCheck):
             why = f"Lost from the old list, which items cannot show: {lost}"
             self._findings.append(Finding(None, "count", len(self._rules.former), len(records), why, news=News.WARNING))
         for mission in erased(self._rules.others, self._profile.capacity - len(records)):
-            why = f"Mission of {len(mission)} records does not fit next to it: erased, a copy is kept on the Pi"
+            _, unshown = keep_unshown((), mission)
+            copy = f"a copy without its {unshown}" if unshown else "a copy"
+            why = f"Mission of {len(mission)} records does not fit next to it: erased, {copy} is kept on the Pi"
             self._findings.append(Finding(None, "count", len(mission), 0, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as)
