@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon and the image as two programs, in real time: the power fails, or the board resets, during an upload."""
+"""The daemon and the image as two programs, in real time: the power fails during an upload."""
 
 import json
 import os
@@ -14,15 +14,14 @@ import pytest
 
 from tests.support.benches import Starter
 from tests.support.plan import judge, plain_plan, records_of
-from tests.support.programs import Daemon, comes, control
+from tests.support.programs import comes, control
 from tests.support.real_bench import Figure
 
-_OLD, _NEW = plain_plan(20), plain_plan(146, start=40)
+#: Short enough to be written within the daemon's time limit by a board at a tenth of its speed, on a slow computer.
+_OLD, _NEW = plain_plan(20), plain_plan(30, start=40)
 #: In the middle of the new list's records: eight half-words each.
-_OPERATION = 600
-#: A computer that is too slow for the emulator gets a slow board.
+_OPERATION = 120
 _PATIENCE_S = 300.0
-_KEPT, _ARRIVED = "The mission did not arrive: old mission kept, write it again", "The mission did arrive: 146 records"
 
 
 class RealProgram:
@@ -57,35 +56,21 @@ def program(tmp_path: Path, flash: bytes) -> Iterator[RealProgram]:
         yield RealProgram(Starter(tmp_path, stack), flash)
 
 
-@pytest.mark.parametrize("interruption", ["power cut", "reset"])
-def test_the_last_word_about_an_interrupted_upload_is_true(
-    program: RealProgram, figure: Figure, interruption: str
-) -> None:
+def test_an_upload_that_a_power_cut_interrupts_is_settled(program: RealProgram, figure: Figure) -> None:
     daemon = program.daemon
     daemon.push(_OLD)
-    enough = program.stats["flash_programs"] + _OPERATION
-    if interruption == "power cut":
-        program.line(f"power_cut_at_flash_operation {_OPERATION}")
+    program.line(f"power_cut_at_flash_operation {_OPERATION}")
     with ThreadPoolExecutor() as pool:
         pushed = pool.submit(daemon.push, _NEW)
-        if interruption == "power cut":
-            assert comes(lambda: program.stats["power"] == "OFF", _PATIENCE_S)
-            program.line("power on")
-        else:
-            assert comes(lambda: program.stats["flash_programs"] >= enough, _PATIENCE_S)
-            program.line("reset")
+        assert comes(lambda: program.stats["power"] == "OFF", _PATIENCE_S)
+        program.line("power on")
         began = time.monotonic()
-        pushed.exception()  # which says that nobody knows yet
-    assert comes(lambda: latest(daemon)["outcome"] in ("FAILED", "VERIFIED"), _PATIENCE_S)
-    seconds, found, records = time.monotonic() - began, latest(daemon), program.stats["records"]
-    has_arrived = records == records_of(judge(_NEW))
-    assert has_arrived or records == records_of(judge(_OLD))
-    assert found["detail"] == (_ARRIVED if has_arrived else _KEPT)
-    figure(f"the daemon, {interruption} in mid upload: '{found['detail']}'", f"after {seconds:.1f} s")
+        assert pushed.exception()
+    assert comes(lambda: daemon.missions()[0]["outcome"] == "FAILED", _PATIENCE_S), daemon.printed
+    last_word = daemon.missions()[0]["detail"]
+    figure(f"the daemon, power cut in mid upload: '{last_word}'", f"after {time.monotonic() - began:.1f} s")
+    assert last_word == "The mission did not arrive: old mission kept, write it again"
+    assert program.stats["records"] == records_of(judge(_OLD))
     program.wait_ready()
     daemon.push(_NEW)
     assert program.stats["records"] == records_of(judge(_NEW))
-
-
-def latest(daemon: Daemon) -> dict[str, Any]:
-    return daemon.missions()[0]
