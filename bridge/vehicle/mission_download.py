@@ -2,6 +2,7 @@
 """A ground station reads the mission: the vehicle's side of MAVLink's download (docs/mission-rules.md, "Read-back")."""
 
 from dataclasses import dataclass, replace
+from math import inf
 
 from bridge.gcs.cost import Cost
 from bridge.gcs.station import Severity, Station
@@ -21,6 +22,8 @@ _MAX_READERS = 16
 _READING_S = 20.0
 #: Requests that wait for the list to be read; further ones are dropped, and repeated by their senders.
 _MAX_QUESTIONS = 32
+#: Mission Planner repeats a request after 2.5 s. A position comes within that time, unless there is no GPS.
+_POSITION_WAIT_S = 2.0
 _ARMED = Refusal(MissionResult.DENIED, "Armed: disarm to read the mission")
 
 
@@ -52,6 +55,7 @@ class MissionDownloads:
         self._snapshots: dict[Station, _Snapshot] = {}
         self._questions: dict[_Question, None] = {}
         self._is_reading = False
+        self._homeless_since = inf
 
     def request_list(self, station: Station, mission_type: int, now: float) -> None:
         """MISSION_REQUEST_LIST."""
@@ -71,7 +75,7 @@ class MissionDownloads:
         snapshot = self._snapshots.get(station)
         if self._vehicle.armed:
             if seq == 0:
-                self._send_item(station, self._present_home(), as_int=as_int)
+                self._send_home(question, now)
             else:
                 self._refuse(station, _ARMED)
         elif snapshot is not None and now < snapshot.until:
@@ -87,6 +91,7 @@ class MissionDownloads:
     def forget_all(self) -> None:
         """The flight controller has changed."""
         self._snapshots.clear()
+        self._homeless_since = inf
 
     def _ask(self, question: _Question, now: float) -> None:
         """Read the list once for all waiting requests, so that a flood of them cannot fill the queue."""
@@ -109,7 +114,7 @@ class MissionDownloads:
             if isinstance(held, Refusal):
                 # Mission Planner requests item 0 on arming, which may have just changed the protocol.
                 if question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
-                    self._send_item(question.station, self._present_home(), as_int=question.as_int)
+                    self._send_home(question, now)
                 elif question.seq != 0 or self._vehicle.armed is not None:
                     self._refuse(question.station, held)
                 # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
@@ -138,6 +143,14 @@ class MissionDownloads:
 
     def _send_item(self, station: Station, item: MissionItem, *, as_int: bool) -> None:
         self._ground.to(station, item_message(item, station.sysid, station.compid, as_int=as_int))
+
+    def _send_home(self, question: _Question, now: float) -> None:
+        """Item 0 while armed. Until a position is heard the first request waits for its repetition."""
+        if self._missions.home_item() is None and self._vehicle.home_or_position() is None:
+            self._homeless_since = min(self._homeless_since, now)
+            if now < self._homeless_since + _POSITION_WAIT_S:
+                return
+        self._send_item(question.station, self._present_home(), as_int=question.as_int)
 
     def _present_home(self) -> MissionItem:
         """Item 0 as last read, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
