@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
 from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m, sign
 from tests.support.benches import Bench, Starter
@@ -37,13 +38,13 @@ def guarded(start: Starter, key_file: Path) -> Bench:
     return bench
 
 
-def crowd(bench: Bench, stack: ExitStack, count: int = CROWD) -> Attack:
-    """Strangers from several machines that each say hello now and then, seven a second in all and more."""
-    strangers = [Stranger(bench.daemon.address, f"127.0.1.{1 + number % 9}") for number in range(count)]
+def crowd(bench: Bench, stack: ExitStack, *spoken: Message, per_s: float = 30) -> Attack:
+    """Strangers from several machines that each say hello, or something else, now and then."""
+    strangers = [Stranger(bench.daemon.address, f"127.0.1.{1 + number % 9}") for number in range(CROWD)]
     for stranger in strangers:
         stack.callback(stranger.close)
     turns = itertools.cycle(strangers)
-    return Attack(lambda: next(turns).send(HELLO), per_s=30)
+    return Attack(lambda: next(turns).send(*spoken or (HELLO,)), per_s=per_s)
 
 
 def hears_heartbeats(station: PlainStation, count: int) -> bool:
@@ -57,11 +58,13 @@ def hears_heartbeats(station: PlainStation, count: int) -> bool:
 
 
 def test_a_crowd_locks_no_newcomer_out_of_an_open_link(start: Starter, stack: ExitStack) -> None:
+    """Nor from writing: a hundred lists a second are announced, ten times what all newcomers together may."""
     bench = start.bench()
-    with crowd(bench, stack) as attack:
+    with crowd(bench, stack, HELLO, m.MAVLink_mission_count_message(1, 1, 9), per_s=100) as attack:
         assert comes(lambda: attack.count > 2 * CROWD)
         with udp_station(bench.daemon.address) as pilot:
-            assert hears_heartbeats(pilot, 4)
+            for _ in range(5):
+                assert hears_heartbeats(pilot, 1)
             assert_uploads(pilot, bench.board, plain_plan(30))
 
 
