@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Floods: each requests so much that the pilot, the board or its flash would suffer."""
 
-import json
 import socket
 from contextlib import ExitStack, suppress
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,30 +15,9 @@ from tests.support.plan import plain_plan
 from tests.support.programs import comes, free_port, until
 
 
-class Line:
-    """The bytes that the daemon wrote to the board, from its recording."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def most_requests(self, seconds: float) -> int:
-        """The number of requests in the busiest period of that length."""
-        times = [at for at, data in self._lines() for _ in range(data.count(b"$M<"))]
-        return max(len([at for at in times if began <= at < began + seconds]) for began in times)
-
-    def _lines(self) -> list[tuple[float, bytes]]:
-        lines = [json.loads(line) for line in self._path.read_text().splitlines() if line.endswith("}")]
-        return [(line["t"], bytes.fromhex(line["write"])) for line in lines if "write" in line]
-
-
 @pytest.fixture
-def line(tmp_path: Path) -> Line:
-    return Line(tmp_path / "naze.uart")
-
-
-@pytest.fixture
-def bench(start: Starter, tmp_path: Path) -> Bench:
-    return start.bench(daemon_options=("--record-uart", str(tmp_path / "naze.uart")))
+def bench(start: Starter) -> Bench:
+    return start.bench()
 
 
 def command(number: int, p1: float = 0.0, p2: float = 0.0) -> Message:
@@ -59,29 +36,6 @@ def test_texts(bench: Bench, stack: ExitStack) -> None:
             assert comes(lambda: attack.count > 600)
             assert_uploads(pilot, bench.board, plain_plan(20))
         assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4
-
-
-def test_questions_to_an_armed_board(bench: Bench, line: Line, stack: ExitStack) -> None:
-    """MISSION_CLEAR_ALL while armed made the board answer eight times as much as it does for the telemetry."""
-    stranger = Stranger(bench.daemon.address)
-    stack.callback(stranger.close)
-    bench.board.set("armed 1")
-    until(lambda: bench.daemon.ask({"do": "status"})["armed"], "the armed state")
-    asked = (
-        m.MAVLink_mission_clear_all_message(1, 1),
-        m.MAVLink_mission_request_int_message(1, 1, 0),
-        m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300, 9),
-        command(241, 0, 1),
-        command(245, 1),
-    )
-    with Watch(bench.daemon) as witness:
-        until(lambda: len(witness.gaps_s) >= 2, "heartbeats")
-        with Attack(lambda: stranger.send(*asked), per_s=100):
-            beats = len(witness.gaps_s)
-            until(lambda: len(witness.gaps_s) >= beats + 4, "four seconds of attack")
-    assert bench.daemon.end() == 0
-    # It was 342 a second, and is 44 without an attack; finding the board takes more in its first second.
-    assert line.most_requests(4.0) <= 4 * 100
 
 
 def test_floods_of_tcp_and_of_the_page_and_of_the_control_socket(start: Starter) -> None:

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The limits on a ground station's requests over a long time, in simulated time."""
 
+from collections import Counter
+
 from bridge.gcs.budget import Budgets
 from bridge.gcs.cost import LIMITS, Cost
 from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import messages as m
+from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, World
 
 _SAVE = b"$M<\x00\xfa"
@@ -47,3 +50,38 @@ def test_newcomers_share_a_limit_by_host_and_in_all() -> None:
         assert spent == int(limit.total.burst)
     writes = [budgets.allows(Cost.FLASH, pilot, 0.0) for _ in range(100)]
     assert sum(writes) == LIMITS[Cost.FLASH].each.burst
+
+
+def test_an_armed_board_is_asked_nothing_for_strangers() -> None:
+    """MISSION_CLEAR_ALL while armed made it answer eight times as much as it does for the telemetry."""
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    stranger = GroundStation(world)
+    stranger.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.faults.armed = True
+    world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), 5)
+    asked = (
+        m.MAVLink_mission_clear_all_message(1, 1),
+        m.MAVLink_mission_count_message(1, 1, 9),
+        m.MAVLink_mission_request_int_message(1, 1, 0),
+        m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300, 9),
+        m.MAVLink_command_long_message(1, 1, 241, 0, 0, 1, 0, 0, 0, 0, 0),
+        m.MAVLink_command_long_message(1, 1, 245, 0, 1, 0, 0, 0, 0, 0, 0),
+    )
+
+    def requests(seconds: float) -> Counter[int]:
+        before = len(world.written)
+        world.run(seconds)
+        return Counter(frame.command for _, _, data in world.written[before:] for frame in MspParser().feed(data))
+
+    def ask_all() -> None:
+        for message in asked:
+            stranger.send(message)
+
+    world.run(3)
+    usual = requests(4)
+    for number in range(400):
+        world.after(number / 100, ask_all)
+    attacked = requests(4)
+    assert set(attacked) == set(usual)
+    assert attacked.total() <= usual.total() + 5
