@@ -29,10 +29,9 @@ from bridge.model.events import EventLog, Incidents
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import FlightState
 from bridge.vehicle.commands import CommandService
-from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.link_announcer import LinkAnnouncer
 from bridge.vehicle.local_missions import LocalMissions
-from bridge.vehicle.message_router import MessageRouter
+from bridge.vehicle.message_router import Incoming, MessageRouter
 from bridge.vehicle.mission_context import MissionContext
 from bridge.vehicle.mission_download import MissionDownloads
 from bridge.vehicle.mission_upload import MissionUploads
