@@ -19,6 +19,7 @@ from tests.support.zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, end
 
 MISSION = (Path(__file__).parents[2] / "examples" / "naze-field.waypoints").read_bytes()
 SCHEMAS = {key.suffix: key.schema for key in KEYS}
+COMPACT = {key.suffix for key in KEYS if key.is_compact}
 
 
 def validator(name: str) -> Draft202012Validator:
@@ -39,7 +40,8 @@ def check_all(reader: Reader, encoding: str) -> set[str]:
     for sample in reader.samples:
         suffix = str(sample.key_expr).removeprefix(key("@").removesuffix("@"))
         found.add(suffix)
-        assert str(sample.encoding) == f"application/{encoding};naze-bridge/v{VERSION}/{SCHEMAS[suffix]}"
+        kind = "cbor" if suffix in COMPACT else encoding
+        assert str(sample.encoding) == f"application/{kind};naze-bridge/v{VERSION}/{SCHEMAS[suffix]}"
         check(suffix, body(sample))
     return found
 
