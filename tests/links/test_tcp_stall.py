@@ -17,7 +17,7 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.links import tcp_link
 from service.links.tcp_link import TcpLink
 from service.settings.addresses import GcsAddress
-from tests.support.programs import free_port
+from tests.support.programs import PATIENCE, free_port
 
 
 class Listener:
@@ -54,18 +54,22 @@ async def connected(listener: Listener, link: TcpLink, port: int) -> tuple[socke
     return client, listener.peers[-1]
 
 
-async def read(client: socket.socket, quiet_s: float = 0.3) -> list[MavlinkFrame]:
-    """Read until nothing comes any more; all of it must be whole frames."""
-    loop, data = asyncio.get_running_loop(), b""
-    while True:
-        try:
-            piece = await asyncio.wait_for(loop.sock_recv(client, 65536), quiet_s)
-        except TimeoutError:
-            break
-        if not piece:
-            break
-        data += piece
-    frames = MavlinkSplitter().feed(data)
+def number_of(frame: MavlinkFrame) -> int | None:
+    """The number of an attitude."""
+    is_attitude = frame.msgid == m.MAVLINK_MSG_ID_ATTITUDE
+    return int.from_bytes(frame.payload[:4], "little") if is_attitude else None
+
+
+async def read_to(client: socket.socket, last: int) -> list[MavlinkFrame]:
+    """Read until the attitude of that number comes; all that comes must be whole frames."""
+    loop, splitter, data = asyncio.get_running_loop(), MavlinkSplitter(), b""
+    frames: list[MavlinkFrame] = []
+    async with asyncio.timeout(PATIENCE):
+        while not frames or number_of(frames[-1]) != last:
+            piece = await loop.sock_recv(client, 65536)
+            assert piece
+            data += piece
+            frames += splitter.feed(piece)
     assert b"".join(frame.raw for frame in frames) == data
     return frames
 
@@ -85,12 +89,12 @@ async def test_a_stalled_client_loses_old_telemetry_and_nothing_else() -> None:
         if number % 500 == 0:
             ack = writer.frame(pack(m.MAVLink_mission_request_message(255, 190, number // 500, 0)), 2)
             link.send(stalled_peer, ack)
-            heard += await read(reading, 0.02)
-    heard += await read(reading)
+            heard += await read_to(reading, number)
+    heard += await read_to(reading, count - 1)
     assert len(heard) == count
-    late = await read(stalled)
+    late = await read_to(stalled, count - 1)
     assert [f.payload[0] for f in late if f.msgid == m.MAVLINK_MSG_ID_MISSION_REQUEST] == list(range(count // 500))
-    attitudes = [int.from_bytes(f.payload[:4], "little") for f in late if f.msgid == m.MAVLINK_MSG_ID_ATTITUDE]
+    attitudes = [shown for frame in late if (shown := number_of(frame)) is not None]
     assert attitudes == sorted(attitudes)
     assert attitudes[-1] == count - 1
     assert len(attitudes) < count / 2
