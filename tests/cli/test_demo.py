@@ -33,7 +33,8 @@ def demo(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
     monkeypatch.setenv("TMPDIR", str(folder))
     with ExitStack() as stack:
         program = Program(tmp_path / "printed", "demo", "--port", str(free_port()))
-        stack.callback(program.end, signal.SIGKILL)
+        # Not SIGKILL, which would leave its daemon behind.
+        stack.callback(program.end)
         until(
             lambda: "keeps running" in program.printed or not program.is_alive,
             "the end of the demonstration",
