@@ -35,7 +35,7 @@ class BridgeConfig:
 
     @property
     def signers(self) -> dict[str, Signer]:
-        """How to sign on the links that need it."""
+        """The signers of the links that need one."""
         return {
             name: partial(access.signing.signature, link_id=access.link_id)
             for name, access in self.links.items()

@@ -92,7 +92,7 @@ class MspFirmware(ABC):
 
     @abstractmethod
     def _state(self) -> FlightState:
-        """The flight's present state."""
+        """The flight's current state."""
 
     @abstractmethod
     def _flags(self) -> int:

@@ -88,7 +88,7 @@ def visit_order(
 
 @dataclass(slots=True)
 class _Visit:
-    """What was heard at one speed, and the ends of the phase and of the visit."""
+    """The data heard at one speed, and the end times of the phase and the visit."""
 
     phase_ends: float
     ends: float

@@ -308,7 +308,7 @@ class MissionService:
 
     @property
     def is_settled(self) -> bool:
-        """False until the present flight controller's list was read, and after an interrupted push."""
+        """False until the current flight controller's list was read, and after an interrupted push."""
         return self._is_settled
 
     def is_outdated(self) -> Conversation[bool]:

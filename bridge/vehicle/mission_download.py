@@ -127,7 +127,7 @@ class MissionDownloads:
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...]) -> None:
         if question.seq is None:
-            # DroneKit takes home from a download, and waits for ever without one: so an empty list has home if known.
+            # DroneKit takes home from a download, and waits forever without one: so an empty list has home if known.
             self._send_count(question.station, len(items) or int(self._vehicle.home_or_position() is not None))
         elif question.seq < len(items):
             self._send_item(question.station, items[question.seq], as_int=question.as_int)

@@ -414,7 +414,7 @@ class MissionUploads:
             self._ground.say_to_others(severity, f"{delivery.change}, by {station.peer}", station)
 
     def _refuse(self, upload: _Upload, state: UploadState, refusal: Refusal, now: float) -> None:
-        """Report the reason for the end of an upload; the received items are stored all the same."""
+        """Report the reason for the end of an upload; the received items are still stored."""
         if items := state.received:
             finding = Finding(None, "list", len(items), None, refusal.text)
             verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What commands print: tables that end where their text ends, strict JSON, and the sentence of a failure."""
+"""The output of commands: tables without trailing blanks, strict JSON, and one sentence on failure."""
 
 import re
 from typing import TYPE_CHECKING, NoReturn

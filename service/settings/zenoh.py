@@ -29,7 +29,7 @@ class PayloadEncoding(Enum):
 
 
 class ZenohProfile(Enum):
-    """How much data a vehicle's link may use."""
+    """The data volume of a vehicle's link."""
 
     FULL = "full"
     METERED = "metered"

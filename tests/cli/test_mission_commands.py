@@ -140,7 +140,7 @@ def test_json_says_null_where_nothing_was_given(daemon: Daemon, tmp_path: Path) 
     number = delivery["mission"]
     shown = strict(ask(daemon, "missions", "show", str(number), "--json").stdout)
     assert shown["received"]["items"] == delivery["sent"]
-    # And what was not given then is not given again.
+    # Values that were not given are still not given.
     again = strict(ask(daemon, "missions", "restore", str(number), "--json").stdout)
     assert again["sent"] == delivery["sent"]
     assert strict(ask(daemon, "missions", "diff", str(number), str(again["mission"]), "--json").stdout)["equal"]

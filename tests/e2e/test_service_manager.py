@@ -78,7 +78,7 @@ def test_ready_without_a_flight_controller_and_the_link_in_the_status(start: Sta
 
 
 async def more_food(systemd: Systemd, before: int) -> int:
-    """Return how often the watchdog was fed, once that is more than before."""
+    """Return the watchdog's feed count once it has grown."""
     await until_async(lambda: systemd.listen().count("WATCHDOG=1") > before, "food")
     return systemd.listen().count("WATCHDOG=1")
 
@@ -169,7 +169,7 @@ def test_a_push_that_is_nearly_done_is_done(start: Starter) -> None:
 
 @pytest.mark.parametrize("trouble", ["slow", "deaf"])
 def test_a_push_that_would_take_long_is_given_up(start: Starter, trouble: str) -> None:
-    """The old list stays, who sent the new one is told, the store knows, and systemd waits for no more than 2 s."""
+    """The old list stays, the sender is told, the outcome is stored, and systemd waits for at most 2 s."""
     bench = start.bench("--baud", "9600") if trouble == "slow" else start.bench()
     bench.daemon.push(plain_plan(5))
     old = bench.board.records()

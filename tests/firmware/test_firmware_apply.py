@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""firmware/apply on a tree of our own making: in, out again, and what it refuses."""
+"""firmware/apply on a made-up tree: applying, removing, and refusals."""
 
 import hashlib
 import re

@@ -56,7 +56,7 @@ class Line:
         os.close(self._terminal)
 
     def take(self, size: int = 65536) -> bytes:
-        """Return what came over the wire, so many bytes at most."""
+        """Return at most this many bytes from the wire."""
         try:
             return os.read(self.wire, size)
         except BlockingIOError:
@@ -69,7 +69,7 @@ class Line:
         return [int.from_bytes(frame.payload[:4].ljust(4, b"\0"), "little") for frame in frames]
 
     async def has_come(self, count: int) -> None:
-        """Wait until so many frames have come since the beginning."""
+        """Wait until this many frames have arrived in total."""
         await until_async(lambda: len(MavlinkSplitter().feed(bytes(self.heard))) == count, "what was sent")
         self.numbers()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept and what is dropped for a TCP client that does not read."""
+"""Frames kept and dropped for a TCP client that does not read."""
 
 from collections.abc import Sequence
 

@@ -24,7 +24,7 @@ TEXT = b"\xfe\x09\xfd\x1c\x00\x00" * 8
 
 
 def telemetry(sender: str, count: int, seed: int) -> list[bytes]:
-    """Return what an autopilot sends, packed by pymavlink, no two frames alike."""
+    """Return an autopilot's frames, packed by pymavlink, no two alike."""
     chance = Random(seed)
     mavlink = mavlink_2.MAVLink(None, srcSystem=1, srcComponent=1)
     mavlink.signing.secret_key = bytes(range(32))
@@ -52,7 +52,7 @@ def some_message(number: int, chance: Random) -> Message:
 
 
 def split(pieces: Sequence[bytes], chance: Random) -> list[bytes]:
-    """Feed what is on the line in reads of any size, and take silence for its end."""
+    """Feed the line's bytes in reads of any size, then silence."""
     data = b"".join(pieces)
     splitter = MavlinkSplitter()
     found: list[MavlinkFrame] = []
@@ -65,7 +65,7 @@ def split(pieces: Sequence[bytes], chance: Random) -> list[bytes]:
 
 
 def without_signature(frame: bytes) -> bytes:
-    """Only who has its key can judge a signature."""
+    """Only the key's owner can check a signature."""
     return frame[:-SIGNATURE_SIZE] if frame[0] == 0xFD and frame[2] & 1 else frame
 
 
@@ -153,7 +153,7 @@ def test_silence_gives_out_what_a_cut_frame_was_hiding() -> None:
 
 
 def test_bytes_are_missing_in_a_signature() -> None:
-    """No one without the key can tell; but what comes behind it must not be lost."""
+    """It cannot be noticed without the key, but the following frame must not be lost."""
     before, cut, after = telemetry(SIGNED, 3, 4)
     for missing in range(1, SIGNATURE_SIZE + 1):
         found = split([before, cut[:-missing], after], Random(missing))

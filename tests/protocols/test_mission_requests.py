@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mission extension's requests: no hazard byte, whatever they carry, and the board reads what was meant."""
+"""The mission extension's requests: never a hazard byte, and the board decodes them correctly."""
 
 from collections.abc import Sequence
 

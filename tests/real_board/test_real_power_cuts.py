@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Power goes in the middle of an upload's flash operations: afterwards the old list or the new one is there, whole."""
+"""Power cuts during an upload's flash operations: afterwards the complete old or new list is stored."""
 
 import os
 from collections import Counter

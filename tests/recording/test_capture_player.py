@@ -36,7 +36,7 @@ def closed(at: float) -> UartEvent:
 
 
 class Listener:
-    """Asks a player that began at an odd time, and notes what comes when."""
+    """Sends requests to a player that began at an odd time, and records the replies with their times."""
 
     def __init__(self, events: Sequence[UartEvent], tempo: float = 1.0) -> None:
         self.player = CapturePlayer(events, tempo)
@@ -49,7 +49,7 @@ class Listener:
         self.player.receive(data, 1000.0 + at)
 
     def listen(self, until: float) -> list[tuple[float, bytes]]:
-        """Return what has come since the last time."""
+        """Return the data received since the last call."""
         self.heard = []
         while (wakeup := self.player.next_wakeup(1000.0 + self._now) - 1000.0) <= until:
             self._now = max(wakeup, self._now + 1e-6)

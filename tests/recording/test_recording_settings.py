@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is recorded, as the configuration file says it."""
+"""The recording settings."""
 
 from pathlib import Path
 

@@ -75,7 +75,7 @@ def test_a_signing_key_is_never_logged() -> None:
 
 @given(st.data())
 def test_records_around_damage_are_read(data: st.DataObject) -> None:
-    """Whatever bytes are lost or changed, each record that is whole is read, and nothing else."""
+    """With any bytes lost or changed, exactly the intact records are read."""
     codec = sender()
     records = [tlog_record(bytes(message.pack(codec)), NOON_US + 1000 * n) for n, message in enumerate(some_messages())]
     garbage = data.draw(st.lists(st.binary(max_size=40), min_size=len(records) + 1, max_size=len(records) + 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture file: what is written is read again; one that was torn, cut or appended to, as far as it goes."""
+"""Capture files read back as written; truncated, cut or extended ones as far as possible."""
 
 import os
 from pathlib import Path

@@ -432,7 +432,7 @@ def test_what_is_read_and_written_again_is_the_same_without_a_finding(
         read = tuple(through_the_wire(shown) for shown in read)
     again = check_list(read, rules)
     assert again.result is Result.ACCEPTED
-    # What is dangerous as it stands is said every time.
+    # A dangerous item is reported every time.
     assert [finding for finding in again.findings if finding.was != finding.becomes] == []
     assert again.records == verdict.records
     if remembered and not as_float:

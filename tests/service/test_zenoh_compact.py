@@ -20,7 +20,7 @@ NUMBERS = st.none() | st.floats(allow_nan=False) | st.integers(-(2**63), 2**63) 
 
 
 def payloads(schema: dict[str, Any]) -> st.SearchStrategy[Any]:
-    """Payloads with the fields of a schema, whatever is in them."""
+    """Payloads with a schema's fields and arbitrary values."""
     inner = compact.object_schema(schema)
     if "properties" in inner:
         fields = st.fixed_dictionaries({}, optional={key: payloads(each) for key, each in inner["properties"].items()})

@@ -93,7 +93,7 @@ def test_a_metered_link_carries_changes(
 
 
 def test_every_field_that_counts_exists() -> None:
-    """A field that was renamed would count no more."""
+    """A renamed field would no longer count."""
     for group in Group:
         sample = getattr(vehicle_groups, group.value.capitalize())(**({"state": "MSP"} if group is Group.LINK else {}))
         rates = SampleRates(ZenohProfile.METERED, {})

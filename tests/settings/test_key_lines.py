@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The line of each key, found in one pass whatever the file holds."""
+"""The line of each key, found in one pass for any file."""
 
 import tomllib
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The emulated flash: keys, the rules of NOR, a core that stands still, and power that goes in the middle."""
+"""The emulated flash: keys, the rules of NOR, a stalled core, and power cuts during an operation."""
 
 import pytest
 

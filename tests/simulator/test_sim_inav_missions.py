@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated INAV has every trap of docs/inav.md; what is asserted here was seen on INAV's own simulator, too."""
+"""The simulated INAV has every trap of docs/inav.md, as observed on INAV's own simulator."""
 
 from dataclasses import replace
 

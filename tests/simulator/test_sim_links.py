@@ -107,7 +107,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
 
 
 def ask(port: serial.Serial, frame: bytes, seconds: float = PATIENCE) -> MspFrame | None:
-    """Ask once; None after so many seconds of real time."""
+    """Ask once; None after this many seconds of real time."""
     parser, deadline = MspParser(), time.monotonic() + seconds
     port.write(frame)
     while time.monotonic() < deadline:

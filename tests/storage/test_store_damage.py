@@ -108,7 +108,7 @@ def test_pages_overwritten_with_other_pages(path: Path, sound: Path) -> None:
 def test_flipped_bits_are_noticed_or_harmless(
     sound: Path, tmp_path_factory: pytest.TempPathFactory, flips: list[tuple[int, int]]
 ) -> None:
-    """Whatever rots: the store opens or says why not, and a mission comes back as it was or not at all."""
+    """With any damage the store opens or gives the reason, and a mission reads back unchanged or not at all."""
     path = tmp_path_factory.mktemp("flip") / "missions.db"
     rotten = bytearray(sound.read_bytes())
     for at, bits in flips:  # half of them hit the file's header

@@ -42,7 +42,7 @@ class Stranger:
                 continue
 
     def heard(self) -> list[Any]:
-        """What has come so far."""
+        """The datagrams received so far."""
         found: list[Any] = []
         self._socket.setblocking(False)
         while True:

@@ -30,7 +30,7 @@ class BareRoot:
         self._directory = directory
 
     def __enter__(self) -> Self:
-        # Who is not root is it in a user namespace.
+        # Other users become root in a user namespace.
         maps = () if os.geteuid() == 0 else ("--map-root-user",)
         command = ("unshare", "--mount", "--net", "--pid", "--fork", "--kill-child", *maps, "sh", "-c", _MAKE)
         self._process = subprocess.Popen([*command, self._directory], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -51,7 +51,7 @@ class BareRoot:
         self.run(f"cat > {path}", stdin=source.read_bytes())
 
     def run(self, script: str, status: int = 0, stdin: bytes = b"") -> str:
-        """Run a shell script; return what it printed."""
+        """Run a shell script; return its output."""
         command = (*self._inside, "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/root", "sh", "-c", script)
         ended = subprocess.run(command, input=stdin, capture_output=True, timeout=_PATIENCE_S, check=False)
         printed = ended.stdout.decode() + ended.stderr.decode()

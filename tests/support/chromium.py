@@ -31,7 +31,7 @@ class Browser:
         self.wait_for_looks(1)
 
     def wait_for_looks(self, more: int) -> None:
-        """Wait until the page has asked for the state so many times more."""
+        """Wait until the page has requested the state this many more times."""
         wanted = self._looks() + more
         until(lambda: self._looks() >= wanted, "another look of the page at the daemon")
 
@@ -85,7 +85,7 @@ class Browser:
         return entries
 
     def picture(self, path: Path) -> None:
-        """Save what is seen."""
+        """Save a picture of the page."""
         assert self.driver.save_screenshot(str(path))
 
 

@@ -41,7 +41,7 @@ class QuietLine:
         """Take bytes from the bridge."""
 
     def advance(self, now: float) -> bytes:
-        """Return what the bridge reads."""
+        """Return the bytes for the bridge."""
         data = bytes(self.outgoing)
         self.outgoing.clear()
         return data

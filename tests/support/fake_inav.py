@@ -34,7 +34,7 @@ class FakeInav(MspFake):
         self._frames = MspParser()
 
     def power_off(self, now: float) -> None:
-        """It forgets what was not saved, and here what was, too: LOAD is the pilot's."""
+        """RAM is lost; here the saved list is not loaded either: LOAD is the pilot's."""
         self.records, self.is_valid = [], False
 
     def receive(self, data: bytes, now: float) -> None:
@@ -49,7 +49,7 @@ class FakeInav(MspFake):
                 self.outgoing += MspFrame(direction, frame.command, answer or b"").encode()
 
     def answer(self, frame: MspFrame) -> bytes | None:
-        """Do what is asked; None: an error."""
+        """Handle a request; None: an error."""
         match frame.command:
             case 101:
                 return bytes(6) + int(self.armed).to_bytes(4, "little") + b"\0"
@@ -115,7 +115,7 @@ class FakeMultiwii(FakeInav):
 
     @property
     def flown(self) -> list[bytes]:
-        """What it would fly: the records up to the last one."""
+        """The list that it would fly: the records up to the last one."""
         flown: list[bytes] = []
         for number in range(1, self.capacity + 1):
             if number not in self.places:

@@ -49,7 +49,7 @@ class FaultyMachine(Host):
             self.path(f"/proc/{pid}/fd/7").symlink_to(has_open)
 
     def sockets(self, udp: str = "", tcp: str = "") -> None:
-        """Set what is open on the network, as the kernel's lines tell it."""
+        """Set the open sockets, in the format of /proc/net."""
         self.write("/proc/net/udp", _HEADER + udp)
         self.write("/proc/net/tcp", _HEADER + tcp)
 

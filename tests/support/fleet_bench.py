@@ -56,7 +56,7 @@ class Fleet:
         return run_naze_bridge("fleet", *arguments, "--connect", self.router.endpoint, **options)
 
     def listed(self) -> dict[str, Vehicle]:
-        """Return what `fleet list` tells of each vehicle, by name."""
+        """The output of `fleet list` for each vehicle, by name."""
         listed = self.ask("list", "--json")
         assert listed.returncode == 0, listed
         return {vehicle["name"]: vehicle for vehicle in json.loads(listed.stdout)["vehicles"]}
@@ -71,7 +71,7 @@ class Fleet:
         until(ready, f"{names} in the fleet")
 
     def pushed(self, *arguments: str | Path, code: int) -> dict[str, Vehicle]:
-        """Return what became of a push, by vehicle."""
+        """The result of a push, by vehicle."""
         ended = self.ask("push", *arguments, "--json")
         assert ended.returncode == code, ended
         return {vehicle["vehicle"]: vehicle for vehicle in json.loads(ended.stdout)["vehicles"]}

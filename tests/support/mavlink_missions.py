@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Harakiri's own MAVLink upload does beside the mission extension: for the model and for the image."""
+"""Harakiri's own MAVLink upload alongside the mission extension: tests for the model and the image."""
 
 from collections.abc import Callable
 

@@ -54,7 +54,7 @@ class MavProxy:
         self._process.wait(PATIENCE)
 
     def type(self, line: str) -> None:
-        """Type a line; from here on only what is printed later counts."""
+        """Type a line; only later output counts from now on."""
         assert self._process.stdin is not None
         self._seen = len(self._printed())
         self._process.stdin.write(f"{line}\n")
@@ -95,7 +95,7 @@ class MavProxy:
         return items
 
     def _answer(self, part: str, seconds: float) -> str:
-        """Return what was printed since the last line that was typed, as soon as `part` is in it."""
+        """Return the output since the last typed line, as soon as it contains `part`."""
         comes(lambda: part in self._printed()[self._seen :], seconds)
         return self._printed()[self._seen :]
 

@@ -43,7 +43,7 @@ class MspBench:
         self.board.receive(data, self.now)
 
     def run(self, seconds: float) -> bytes:
-        """Let time pass as a link would; return what was heard meanwhile."""
+        """Let time pass as a link would; return the received bytes."""
         end, before = self.now + seconds, len(self.heard)
         while self.now < end:
             self._step(end)

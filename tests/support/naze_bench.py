@@ -39,7 +39,7 @@ class WireBench:
         self._board.receive(data, self.now)
 
     def run(self, seconds: float) -> bytes:
-        """Let time pass as a link would; return what was heard meanwhile."""
+        """Let time pass as a link would; return the received bytes."""
         end = self.now + seconds
         before = len(self.heard)
         while self.now < end:

@@ -53,7 +53,7 @@ class PlanRow:
 
 
 def single(value: float) -> float:
-    """Return what is left of a number in a 32-bit float."""
+    """Return a number rounded to a 32-bit float."""
     number: float = struct.unpack("<f", struct.pack("<f", value))[0]
     return number
 

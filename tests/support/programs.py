@@ -33,7 +33,7 @@ def until(condition: Callable[[], T | None], what: str) -> T:
 
 
 def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | None:
-    """Return what is there within so many seconds; what is not true is not there."""
+    """Return the value as soon as it is true; its last value after a timeout."""
     deadline = time.monotonic() + seconds
     while True:
         found = condition()
@@ -210,12 +210,12 @@ class Daemon(Program):
         assert self.is_alive, self.printed
 
     def missions(self) -> list[dict[str, Any]]:
-        """Return what came in, newest first."""
+        """The received missions, newest first."""
         missions: list[dict[str, Any]] = self.ask({"do": "missions", "limit": 100})["missions"]
         return missions
 
     def held(self) -> dict[str, Any]:
-        """Return what the flight controller holds, read by the daemon."""
+        """The flight controller's mission, read by the daemon."""
         return self.ask({"do": "pull"})
 
     def push(self, plan: Sequence[PlanRow]) -> None:

@@ -71,12 +71,12 @@ class RealBench(WireBench):
         raise AssertionError("the firmware refuses it")
 
     def enter_cli(self) -> bytes:
-        """Type three returns; what is printed."""
+        """Type three returns; return the output."""
         self.send(b"\r\r\r")
         return self.run(0.5)
 
     def type_line(self, line: str) -> str:
-        """Type a line into the CLI; what is printed within a second."""
+        """Type a line into the CLI; return the output within a second."""
         self.send(line.encode() + b"\r")
         return self.run(1.0).decode("latin-1")
 

@@ -48,7 +48,7 @@ class Stalls(threading.Thread):
                 self._stalls.append((before, after))
 
     def seconds(self, since: float, until: float) -> float:
-        """Return how much of that time was stalled."""
+        """Return the stalled share of that time."""
         return sum(max(0.0, min(after, until) - max(before, since)) for before, after in self._stalls if after > since)
 
     def end(self) -> None:
@@ -376,10 +376,10 @@ class Meter:
         self._folder = Path("/proc") / str(pid)
 
     def memory_kb(self) -> int:
-        """Return what is resident."""
+        """The resident memory."""
         lines = (self._folder / "status").read_text().splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
 
     def descriptors(self) -> list[str]:
-        """Return what is open."""
+        """The number of open descriptors."""
         return sorted(os.readlink(entry) for entry in (self._folder / "fd").iterdir())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon that serves its status page, beside a simulated board."""
+"""A daemon with a status page and a simulated board."""
 
 import json
 import socket

@@ -140,7 +140,7 @@ class World:
         self.store = MemoryStore()
         self.log_event: list[Event] = []
         self.stations: dict[Peer, GroundStation] = {}
-        #: What goes over the wire to the flight controller, as the bridge wrote it: time, speed, bytes.
+        #: The bytes that the bridge wrote to the flight controller, with time and speed.
         self.written: list[tuple[float, int | None, bytes]] = []
         self._events: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
@@ -157,7 +157,7 @@ class World:
     # What tests do.
 
     def plug(self) -> None:
-        """The port is there."""
+        """Open the port."""
         self._plugged = True
         self.bridge.session.opened(self.now)
         self._flush()
@@ -197,13 +197,13 @@ class World:
         return True
 
     def wait_until(self, done: "Callable[[World], bool]", seconds: float) -> float:
-        """The same, but it must happen; return how long it took."""
+        """The same, but fails on timeout; return the time it took."""
         began = self.now
         assert self.run_until(done, seconds), f"not within {seconds} s, state {self.bridge.session.state}"
         return self.now - began
 
     def wait_ready(self, seconds: float = 20.0) -> float:
-        """Wait until the flight controller is found, and what it holds is read."""
+        """Wait until the flight controller is found and its list is read."""
         return self.wait_until(lambda world: world.is_found and not world.bridge.runner.is_busy, seconds)
 
     def hear(self, data: bytes) -> None:
@@ -368,7 +368,7 @@ class GroundStation:
         self._through_the_air(lambda: self.world.spoken_by(self, data))
 
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
-        """Sign what is sent from now on."""
+        """Sign all messages sent from now on."""
         signing = self._mavlink.signing
         signing.secret_key, signing.timestamp, signing.link_id, signing.sign_outgoing = key, timestamp, link_id, True
 
@@ -382,13 +382,13 @@ class GroundStation:
         self._through_the_air(lambda: self._arrived(frame))
 
     def take(self, *types: str) -> list[Message]:
-        """Return what was heard of these message types, and forget it all."""
+        """Return the received messages of these types, and clear all received ones."""
         found = self.said(*types)
         self.heard.clear()
         return found
 
     def said(self, *types: str) -> list[Message]:
-        """Return what was heard of these message types."""
+        """Return the received messages of these types."""
         return [message for _, message in self.heard if not types or message.get_type() in types]
 
     def is_meant(self, message: Message) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon in zenoh, and a session of the test's own beside it."""
+"""A daemon in zenoh, and the test's own session."""
 
 import json
 import socket

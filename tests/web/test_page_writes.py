@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing a mission from the page: the result appears beside the button that was pressed, and nothing else does."""
+"""Writing a mission from the page: only the result of the pressed button appears next to it."""
 
 from pathlib import Path
 

@@ -197,7 +197,7 @@ def test_without_the_setting_there_is_no_page(start: Starter) -> None:
 
 
 def test_a_page_that_cannot_be_served_holds_up_nothing(start: Starter) -> None:
-    """An access point's address that comes up late, or a port that somebody has: the bridge is there anyway."""
+    """A late access point address or an occupied port does not affect the bridge."""
     with socket.socket() as owner:
         owner.bind(("127.0.0.1", 0))
         owner.listen()

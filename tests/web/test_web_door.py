@@ -95,7 +95,7 @@ class _Giver(asyncio.Protocol):
 
 
 class _NoticedDoor(Door):
-    """Tells when everyone who came has left."""
+    """Reports when all connections are closed."""
 
     def __init__(self) -> None:
         super().__init__(lifetime_s=0.2)
@@ -110,7 +110,7 @@ class _NoticedDoor(Door):
 
 
 async def _is_cut_off(serve: type[asyncio.Protocol]) -> None:
-    """Connect and do nothing; return when the door knows of no one."""
+    """Connect and do nothing; return when no connection is counted."""
     door = _NoticedDoor()
     server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, serve), "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]

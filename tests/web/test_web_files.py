@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission files and telemetry logs over HTTP: what they answer, and what strangers get."""
+"""Mission files and telemetry logs over HTTP, with and without the token."""
 
 from http.client import HTTPConnection
 

@@ -177,7 +177,7 @@ def test_without_a_mission_and_without_a_position(tmp_path: Path) -> None:
 
 
 def test_the_pictures_in_the_docs(tmp_path: Path) -> None:
-    """They are taken by what is tested here, and are what the docs show."""
+    """The docs show pictures taken by this test."""
     take_pictures(tmp_path)
     taken = sorted(path.name for path in tmp_path.iterdir())
     assert taken == sorted(path.name for path in PICTURES.glob("*.png"))

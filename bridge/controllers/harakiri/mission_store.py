@@ -220,7 +220,7 @@ class HarakiriMissions(HarakiriStore):
         total = len(records)
         acked = sent = self._confirmed(records, begun)
         in_flight: list[int] = []  # first record of each unanswered chunk
-        stale = 0  # chunks sent after a lost one, which will be answered all the same
+        stale = 0  # chunks sent after a lost one, which will still be answered
         committing = False
         most = self.info.chunk_records
         vain = 0

@@ -130,7 +130,7 @@ class State(ABC):
 
 
 class Closed(State):
-    """There is no port."""
+    """The port is closed."""
 
     name = "no port"
 

@@ -46,7 +46,7 @@ class Mavlink(State):
         return self._line.next_deadline()
 
     def take_output(self) -> list[bytes]:
-        """What the line itself sends."""
+        """The line's own frames."""
         return self._line.take_output()
 
     def _take(self, frames: list[MavlinkFrame], now: float) -> Event | None:

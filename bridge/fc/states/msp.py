@@ -82,7 +82,7 @@ class MspLine(State):
         return requests
 
     def unanswered(self) -> PendingReplies:
-        """What the link still waits for."""
+        """The link's pending replies."""
         pending = PendingReplies()
         for sent_at, size in self.link.unanswered():
             pending.add(self.speed, size, sent_at)

@@ -49,7 +49,7 @@ def check_candidates(host: Host) -> list[SerialFc]:
 
 
 def check_no_port(host: Host) -> Checked:
-    """The problem that there is no port at all."""
+    """The problem if there is no port."""
     remedy = "plug the flight controller into USB, or name its port: fc in the settings"
     return problem("port", "there is no serial port for a flight controller", remedy)
 

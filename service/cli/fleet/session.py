@@ -41,7 +41,7 @@ class FleetError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class FleetAddress:
-    """How to reach the fleet. Of several endpoints the first one that answers is used.
+    """The fleet's address. Of several endpoints the first to answer is used.
 
     `config_file`: a zenoh configuration to start from, for TLS, passwords and the like.
     """
