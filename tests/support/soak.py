@@ -10,6 +10,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,7 +62,7 @@ class Witness(threading.Thread):
 
     def __init__(self, address: tuple[str, int], stalls: Stalls, pid: int) -> None:
         super().__init__(daemon=True)
-        self._scheduling = Path(f"/proc/{pid}/schedstat")
+        self._threads = Path(f"/proc/{pid}/task")
         self._queued_s = 0.0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
@@ -113,11 +114,15 @@ class Witness(threading.Thread):
                 self._beat_at, self._queued_s = at, queued_s
 
     def _queued(self) -> float:
-        """How long the daemon has waited for a processor since its start, in seconds (proc_pid_schedstat)."""
-        try:
-            return int(self._scheduling.read_text().split()[1]) / 1e9
-        except OSError:  # it has ended
-            return self._queued_s
+        """How long the daemon's threads have waited for a processor, in seconds (proc_pid_schedstat).
+
+        Of all threads: one that waits may hold the interpreter's lock.
+        """
+        waited_s = 0.0
+        for thread in self._threads.glob("*/schedstat"):
+            with suppress(OSError, IndexError):  # it has ended
+                waited_s += int(thread.read_text().split()[1]) / 1e9
+        return waited_s or self._queued_s
 
 
 class Weather(threading.Thread):
