@@ -280,7 +280,8 @@ async def _read_line(reader: asyncio.StreamReader) -> bytes:
     try:
         return await reader.readline()
     except ValueError:
-        raise ValueError(f"it is longer than {_MAX_LINE >> 10} kB, and no mission is") from None
+        limit = f"a request is limited to {_MAX_LINE >> 10} kB"
+        raise ControlError(f"{limit}: no flight controller stores such a long mission") from None
 
 
 def _request(line: bytes) -> Json:

@@ -121,9 +121,12 @@ def test_a_person_at_a_terminal_is_asked_before_the_mission_is_erased(
 
 
 def test_a_list_that_is_too_long_is_refused_without_its_rows(daemon: Daemon, tmp_path: Path) -> None:
-    refused = ask(daemon, "push", write_plan(tmp_path / "long", plain_plan(5000)))
+    refused = ask(daemon, "push", write_plan(tmp_path / "long", plain_plan(1000)))
     assert refused.returncode == 1
-    assert refused.stdout == "NO_SPACE: Mission rejected: 5000 items, but only 146 fit\n"
+    assert refused.stdout == "NO_SPACE: Mission rejected: 1000 items, but only 146 fit\n"
+    refused = ask(daemon, "push", write_plan(tmp_path / "longer", plain_plan(5000)))
+    assert refused.returncode == 1
+    assert "no flight controller stores such a long mission" in refused.stderr
 
 
 def test_an_unreadable_file_ends_with_2(daemon: Daemon, tmp_path: Path) -> None:
