@@ -51,10 +51,9 @@ _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: wr
 _REMINDERS_S = (2.0, 4.0)
 #: The limit of uploads at a time. Of more, the one with the slowest progress ends.
 _MOST_UPLOADS = 64
-#: After this long with lists arriving, or without progress of any, an upload does not wait for its turn: a slow or
-#: silent ground station would lock out the others. A pause ends that.
+#: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
+#: out the others. A pause ends that.
 _ALONE_S = 4.0
-_STALL_S = 1.0
 _PAUSE_S = 3.0
 #: Nor does it if more than this many are running or waiting.
 _MOST_IN_TURN = 4
@@ -231,7 +230,7 @@ class MissionUploads:
         if is_free and (Complete in states or (waiting and not arriving)):
             return 0.0
         times = [self._may_ask_at] if Asking in states and not self._is_asking else []
-        times += [self._turn_due()] if is_free and waiting and arriving else []
+        times += [self._arriving_since + _ALONE_S] if is_free and waiting and arriving else []
         times += [upload.state.next_tick() for upload in self._uploads] + [due for due, _, _ in self._reminders]
         return min(times, default=inf)
 
@@ -269,12 +268,9 @@ class MissionUploads:
 
     def _must_wait(self, now: float) -> bool:
         """True if the list of another upload is arriving as it should."""
-        return now < self._turn_due() and len(self._uploads) <= _MOST_IN_TURN
-
-    def _turn_due(self) -> float:
-        """When the uploads that wait for their turn continue, if no list makes progress before that."""
-        progress = max((upload.state.since for upload in self._in(Asking, Receiving, Complete)), default=-inf)
-        return min(self._arriving_since + _ALONE_S, progress + _STALL_S)
+        if not self._in(Asking, Receiving, Complete):
+            return False
+        return now < self._arriving_since + _ALONE_S and len(self._uploads) <= _MOST_IN_TURN
 
     def _handle(self, upload: _Upload, event: Event, now: float) -> None:
         """Change the state by the table."""

