@@ -17,6 +17,7 @@ settings.load_profile("unhurried")
 #: The longest files, and those that wait for other programs. They start first, or one of them would run alone at the
 #: end (make test).
 _LONG = (
+    "tests/firmware/test_firmware_core",
     "tests/service/test_debian_package",
     "tests/e2e/test_soak",
     "tests/e2e/test_mission_planner",

@@ -10,10 +10,6 @@ import pytest
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 
-# A busy machine takes its time for 220,000 power cuts under sanitizers.
-pytestmark = pytest.mark.timeout(600)
-
-
 def make(*arguments: str) -> str:
     """Run make in firmware/ and return what it printed; skip the test if the tools for it are not on this machine."""
     run = subprocess.run(["make", "-s", "-C", FIRMWARE, "APT=no", *arguments], capture_output=True, text=True)
