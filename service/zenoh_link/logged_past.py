@@ -88,7 +88,8 @@ def _logs(folder: Path) -> list[_Log]:
     for entry in os.scandir(folder):
         begun_s = _begun_s(entry.name) if is_log_name(entry.name) else None
         if begun_s is not None:
-            found.append(_Log(begun_s, entry.stat().st_mtime, Path(entry.path)))
+            with suppress(FileNotFoundError):  # as in read_logged_past
+                found.append(_Log(begun_s, entry.stat().st_mtime, Path(entry.path)))
     found.sort(key=lambda log: log.begun_s)
     follows = [later.begun_s - log.ended_s < _SAME_RUN_S for log, later in pairwise(found)]
     return [replace(log, is_continued=same) for log, same in zip(found, (False, *follows), strict=False)]

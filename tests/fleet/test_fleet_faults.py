@@ -236,7 +236,7 @@ def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
     assert "Traceback" not in terminal.text
 
 
-def test_a_router_that_hangs_is_not_a_empty_fleet(fleet: Fleet) -> None:
+def test_a_router_that_hangs_is_not_an_empty_fleet(fleet: Fleet) -> None:
     """The session is open, and the router then says nothing more."""
     router = fleet.router.process
     config = zenoh.Config()
@@ -245,8 +245,15 @@ def test_a_router_that_hangs_is_not_a_empty_fleet(fleet: Fleet) -> None:
     with zenoh.open(config) as session:
         router.send_signal(signal.SIGSTOP)
         try:
+            until(lambda: _is_stopped(router.pid), "the stopped router")
             with pytest.raises(FleetError, match="the router did not list the vehicles within 2 s"):
                 roll_call(session, "fleet")
         finally:
             router.send_signal(signal.SIGCONT)
     fleet.wait("kite", "snail")
+
+
+def _is_stopped(pid: int) -> bool:
+    """A signal reaches one thread after the other, and the last one may still answer."""
+    stats = [stat.read_text() for stat in Path(f"/proc/{pid}/task").glob("*/stat")]
+    return all(stat.rpartition(")")[2].split()[0] == "T" for stat in stats)
