@@ -5,9 +5,12 @@ import ast
 from collections import Counter
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+from tests.support.forked import PRELOADED
 
 REPOSITORY = Path(__file__).parents[1]
 #: The packages that each one may import besides itself.
@@ -98,3 +101,8 @@ def test_class_names_are_unique() -> None:
 @pytest.mark.parametrize("package", ["protocols", "bridge"])
 def test_no_clock_and_no_ports(package: str) -> None:
     assert [(file, name) for file, name in imports(REPOSITORY / package) if name.split(".")[0] in IMPURE] == []
+
+
+@pytest.mark.parametrize("module", PRELOADED)
+def test_preloaded_modules_exist(module: str) -> None:
+    assert find_spec(module) is not None

@@ -13,20 +13,21 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-_IMPORTED = (
+#: A module that does not exist is ignored.
+PRELOADED = (
     "service.cli.check",
     "service.cli.daemon_client",
     "service.cli.demo",
     "service.cli.direct_bridge",
+    "service.cli.doctor.command",
+    "service.cli.doctor.examination",
+    "service.cli.fleet.command",
     "service.cli.mission_commands",
     "service.cli.mission_table",
     "service.cli.serve",
+    "service.cli.setup.command",
     "service.cli.status",
     "service.cli.stored_missions",
-    "service.doctor.command",
-    "service.doctor.examination",
-    "service.fleet.command",
-    "service.setup.command",
     "service.web.server",
     "service.zenoh_link.node",
     "rich.console",
@@ -37,7 +38,7 @@ _IMPORTED = (
 )
 
 _context = multiprocessing.get_context("forkserver")
-_context.set_forkserver_preload(list(_IMPORTED))
+_context.set_forkserver_preload(list(PRELOADED))
 
 
 class Forked:
