@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Readings of the vehicle from Harakiri's FrSky telemetry, which has no checksum and few values.
 
-Climb and velocity follow from successive reports. A report that jumps is taken for damaged. Harakiri goes on sending
-its last position after its GPS has lost its fix, and does not say so: a position counts only while it moves.
+Climb and velocity follow from successive reports. A report that jumps counts as damaged. After its GPS has lost
+its fix, Harakiri keeps sending the last position without saying so: a position counts only while it moves.
 """
 
 from bridge.model.ground_track import north_east_m
@@ -27,7 +27,7 @@ _FASTEST_M_S, _FASTEST_CLIMB_M_S = 100.0, 50.0
 
 
 class FrskyTelemetry:
-    """Fills a vehicle. What FrSky does not carry keeps its last reading, which becomes stale."""
+    """Fills a vehicle. Values that FrSky does not carry keep their last reading, which becomes stale."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle

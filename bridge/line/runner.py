@@ -35,7 +35,7 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class Task(Generic[T]):
-    """A conversation that was started. `began_at` is None while it waits for its turn; `ends_at` is set by a Limit."""
+    """A conversation that was started. `began_at`: None while it waits for its turn. `ends_at`: set by TimeLimit."""
 
     conversation: Conversation[T]
     on_done: Callable[[T | LinkLost, float], None]
