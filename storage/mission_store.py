@@ -69,7 +69,8 @@ class ReceivedMission:
 class MissionSummary:
     """One line of a list of missions. Times are unix seconds; concluded_at is None while PENDING.
 
-    A line that was damaged on the disk has the outcome DAMAGED, and no other values than its number.
+    finding_count leaves out filled-in defaults. A line that was damaged on the disk has the outcome DAMAGED, and no
+    other values than its number.
     """
 
     number: int
@@ -142,7 +143,7 @@ class MissionStore:
                     _text(received.verdict),
                     _text(received.ack),
                     len(received.items),
-                    len(received.findings),
+                    sum(finding.get("news") != "none" for finding in received.findings),
                     received.record_count,
                     received.checksum,
                     PENDING,

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from bridge.model.finding import DROPPED, Finding, News
+from bridge.model.finding import DROPPED, Finding, News, without_defaults
 from bridge.model.verdict import Verdict
 
 _MOST_LINES = 10
@@ -33,11 +33,10 @@ def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:
     """The lines after the summary: warnings first, at most ten."""
     first: dict[Finding, Finding] = {}
     counts: Counter[Finding] = Counter()
-    for finding in findings:
-        if finding.news is not News.NONE:
-            kind = replace(finding, seq=min(finding.seq or 0, 1))
-            first.setdefault(kind, finding)
-            counts[kind] += 1
+    for finding in without_defaults(findings):
+        kind = replace(finding, seq=min(finding.seq or 0, 1))
+        first.setdefault(kind, finding)
+        counts[kind] += 1
     lines = [(finding.news, finding.text(counts[kind])) for kind, finding in first.items()]
     lines.sort(key=lambda line: line[0] is not News.WARNING)
     if len(lines) > _MOST_LINES:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A finding: one change, drop or rejection by the mission rules, and its text for the pilot."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -99,6 +99,11 @@ class Finding:
         if self.field in ("lat_e7", "lon_e7"):
             return f"{value / 1e7:.7f}" if value else "0"
         return f"{value:g}"
+
+
+def without_defaults(findings: Iterable[Finding]) -> list[Finding]:
+    """The findings that are news to the pilot: filled-in defaults are not."""
+    return [finding for finding in findings if finding.news != News.NONE]
 
 
 @dataclass(frozen=True, slots=True)

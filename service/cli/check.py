@@ -13,7 +13,7 @@ from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
 from bridge.missions.list_check import MAX_LAT_E7, MAX_LON_E7, MissionRules, check_list
-from bridge.model.finding import DROPPED
+from bridge.model.finding import DROPPED, without_defaults
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7
@@ -132,7 +132,7 @@ def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, s
         print_json({"file": name, **verdict_data(verdict)})
     else:
         _print_verdict(name, sent, verdict)
-    rejected = verdict.result is Result.REJECTED or (strict and bool(verdict.findings))
+    rejected = verdict.result is Result.REJECTED or (strict and bool(without_defaults(verdict.findings)))
     if rejected:
         return ExitCode.REJECTED
     return ExitCode.CLEARED if verdict.result is Result.CLEARED else ExitCode.ACCEPTED
@@ -151,6 +151,6 @@ def _summary(sent: int, verdict: Verdict[Any]) -> str:
         why = verdict.findings[-1].text() if verdict.findings else "Mission erased: one item of zeros"
         return f"MAV_MISSION_{verdict.ack.name}, {why}"
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
-    changed = len(verdict.findings) - dropped
+    changed = len(without_defaults(verdict.findings)) - dropped
     stored = f"{len(verdict.items)} of {sent} items stored, {dropped} dropped, values changed: {changed}"
     return f"{stored}; {identify(verdict.records)}"

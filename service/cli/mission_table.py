@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import DROPPED, Finding, News
+from bridge.model.finding import DROPPED, Finding, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 from service.control.mission_data import Json, mission_items
@@ -26,7 +26,7 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
     and are printed below the table with their reasons, except filled-in defaults.
     """
-    reasons = Text("".join(f"\n{finding.text()}" for finding in findings if finding.news != News.NONE))
+    reasons = Text("".join(f"\n{finding.text()}" for finding in without_defaults(findings)))
     table = _empty_table(reasons)
     dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
     left = iter(stored)

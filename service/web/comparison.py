@@ -5,7 +5,7 @@ import difflib
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from bridge.model.finding import DROPPED, REJECTED, Finding
+from bridge.model.finding import DROPPED, REJECTED, Finding, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 from service.control.mission_data import Json, mission_items
@@ -30,7 +30,7 @@ def stored_mission(mission: Json) -> Json:
         "outcome": mission["outcome"],
         "detail": mission["detail"],
         "checksum": received["checksum"],
-        "findings": [finding.text() for finding in findings[:MAX_ROWS]],
+        "findings": [finding.text() for finding in without_defaults(findings)[:MAX_ROWS]],
         "rows": sent_and_stored(sent[:MAX_ROWS], stored, findings),
         "rows_left_out": max(len(sent) - MAX_ROWS, 0),
         "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],
@@ -43,7 +43,7 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
     stored = mission_items(verdict["items"])
     return {
         "verdict": verdict["result"],
-        "findings": [finding.text() for finding in findings],
+        "findings": [finding.text() for finding in without_defaults(findings)],
         "rows": sent_and_stored(items, stored, findings),
         "rows_left_out": 0,
         "items": [shown(item) for item in (stored or items)],
@@ -53,10 +53,14 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
 def sent_and_stored(
     sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]
 ) -> list[Json]:
-    """One row per item sent. `stored`: empty for a list that was rejected or cleared."""
+    """One row per item sent. `stored`: empty for a list that was rejected or cleared.
+
+    A row with no change but filled-in defaults is "same"; its `changes` still hold their reasons.
+    """
     dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}
     rejected = {finding.seq: finding.why for finding in findings if finding.becomes == REJECTED}
     reasons = {(finding.seq, finding.field): finding.why for finding in findings}
+    changed = {finding.seq for finding in without_defaults(findings)}
     left = iter(stored)
     rows = []
     for seq, item in enumerate(sent):  # findings use the place in the list, not the item's seq
@@ -66,7 +70,7 @@ def sent_and_stored(
             rows.append(_row("rejected", item, None, {"command": rejected[seq]}))
         elif (held := next(left, None)) is not None:
             changes = {name: why for name in _VALUES if (why := reasons.get((seq, name)))}
-            rows.append(_row("changed" if changes else "same", item, held, changes))
+            rows.append(_row("changed" if seq in changed else "same", item, held, changes))
         else:
             rows.append(_row("same", item, None, {}))
     return rows

@@ -11,8 +11,8 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
-from service.control.mission_data import to_json
-from service.web.comparison import MAX_ROWS, difference, sent_and_stored, stored_mission
+from service.control.mission_data import to_json, verdict_data
+from service.web.comparison import MAX_ROWS, checked_mission, difference, sent_and_stored, stored_mission
 
 RULES = HarakiriRules(capacity=146, wp_radius_cm=200)
 numbers = st.one_of(st.sampled_from([0.0, 1.0, 0.5, 2.0, 15.0, 300.0, math.nan, math.inf]), st.floats(width=32))
@@ -49,7 +49,7 @@ def test_what_differs_has_a_reason(sent: list[MissionItem]) -> None:
     assert [item["seq"] for item in stored] == list(range(len(verdict.items)))
     for row in rows:
         assert (row["right"] is None) == (row["kind"] == "dropped")
-        assert bool(row["changes"]) == (row["kind"] != "same")
+        assert row["changes"] or row["kind"] == "same"
         assert all(row["changes"].values())
         for name in COMPARED if row["right"] else ():
             same = (row["left"][name] or 0) == (row["right"][name] or 0)
@@ -64,6 +64,18 @@ def test_a_difference_holds_both_lists_in_their_order(first: list[MissionItem], 
         assert [row[side]["command"] for row in rows if row[side]] == [item.command for item in whole]
     to_json(rows)
     assert {row["kind"] for row in difference(first, first)} == {"same"}
+
+
+def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
+    sent = [
+        replace(HOME, p2=0.0),
+        replace(HOME, seq=1, frame=3, p2=0.0, alt_m=20.0),
+        replace(HOME, seq=2, frame=3, p1=3.0),
+    ]
+    shown = checked_mission(sent, verdict_data(check_list(sent, RULES)))
+    assert [row["kind"] for row in shown["rows"]] == ["same", "same", "changed"]
+    assert [list(row["changes"]) for row in shown["rows"]] == [["p2"], ["p2"], ["p1"]]
+    assert len(shown["findings"]) == 1
 
 
 def test_an_item_more_is_one_row_more() -> None:

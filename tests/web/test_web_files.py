@@ -34,7 +34,7 @@ def test_a_check_changes_nothing(web: WebBench) -> None:
     assert answer.status == 200
     assert answer.data["verdict"] == "ACCEPTED"
     kinds = [row["kind"] for row in answer.data["rows"]]
-    assert (kinds.count("changed"), kinds.count("dropped"), len(kinds)) == (7, 1, 14)
+    assert (kinds.count("changed"), kinds.count("dropped"), len(kinds)) == (6, 1, 14)
     assert (web.board.records(), web.daemon.missions()) == (held, missions)
 
 

@@ -55,7 +55,7 @@ async function checked(file) {
     const isRejected = list.verdict === "REJECTED";
     const verdict = make("p", { class: isRejected ? "bad" : "good" }, verdictText(file.name, list));
     const write = isRejected ? [] : [writeForm(`Write ${file.name} to the flight controller`, (token) => tell(`/api/write?${query}`, token, body))];
-    return [verdict, ...comparison(list, "It will be stored as it is in the file."), container, make("h3", {}, "Altitude profile"), make("div", { id: "file-profile" }), ...write];
+    return [verdict, ...comparison(list), container, make("h3", {}, "Altitude profile"), make("div", { id: "file-profile" }), ...write];
   } catch (error) {
     return [make("p", { class: "bad" }, error.message)];
   }
