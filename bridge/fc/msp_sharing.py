@@ -10,20 +10,37 @@ from dataclasses import replace
 
 from bridge.fc.session import FcSession
 from bridge.line.conversation import Conversation, LinkLost, receive, send
-from bridge.line.msp_link import MAX_OUTSTANDING_BYTES
 from bridge.line.runner import Runner
-from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, request
+from protocols.msp.frame import MAX_REPLY, Direction, MspFrame, request
 from protocols.msp.hazards import is_clean
 
-#: Never forwarded: SET_RAW_RC and SET_MOTOR move the craft, REBOOT and SET_PASSTHROUGH disconnect everyone.
-_NEVER = {68: "REBOOT", 200: "SET_RAW_RC", 214: "SET_MOTOR", 245: "SET_PASSTHROUGH"}
-#: Without a payload a request only reads, except for these: calibrations, RESET_CONF, EEPROM_WRITE.
-_ACTIONS = frozenset((205, 206, 208, 250))
-#: With a payload it is a change, except for these: WP, DATAFLASH_READ, COMMON_SETTING, COMMON_SETTING_INFO,
-#: COMMON_PG_LIST.
-_QUESTIONS_WITH_PAYLOAD = frozenset((118, 71, 0x1003, 0x1007, 0x1008))
-#: The size of the reply is unknown: it gets the whole ring of a Harakiri.
-_REPLY_PAYLOAD = MAX_OUTSTANDING_BYTES - FRAME_OVERHEAD
+#: Never forwarded: commands that move the craft or stand in for its transmitter and sensors, that cut off its receiver,
+#: or that disconnect everyone. V2_FRAME is a v2 frame inside a v1 frame, which would hide one of them.
+_NEVER = {
+    68: "REBOOT",
+    200: "SET_RAW_RC",
+    214: "SET_MOTOR",
+    245: "SET_PASSTHROUGH",
+    255: "V2_FRAME",
+    0x201F: "SIMULATOR",
+    **dict.fromkeys(range(0x2033, 0x2038), "a firmware update"),
+    0x2230: "SET_AUX_RC",
+    0x3000: "BIND",
+    0x3001: "BIND",
+}
+#: Without a payload a request only reads, except for these: DATAFLASH_ERASE, calibrations, RESET_CONF, RESET_CURR_PID,
+#: BIND (240 and 241 on MultiWii), EEPROM_WRITE, OPFLOW_CALIBRATION.
+_ACTIONS = frozenset((72, 205, 206, 208, 219, 240, 241, 250, 0x2032))
+_DATAFLASH_READ = 71
+#: With a payload it is a change, except for these, which say what to read: OSD_CHAR_READ, WP, VTXTABLE_BAND,
+#: VTXTABLE_POWERLEVEL, SETTING, SETTING_INFO, PG_LIST, TIMER_OUTPUT_MODE, OSD_LAYOUTS, SAFEHOME,
+#: LOGIC_CONDITIONS_SINGLE, FW_APPROACH, CUSTOM_OSD_ELEMENT, GEOZONE, GEOZONE_VERTEX.
+_QUESTIONS_WITH_PAYLOAD = frozenset(
+    {_DATAFLASH_READ, 86, 118, 137, 138, 0x1003, 0x1007, 0x1008}
+    | {0x200E, 0x2012, 0x2038, 0x203B, 0x204A, 0x2101, 0x2210, 0x2212}
+)
+#: The size of the reply is unknown: it gets the line, and the whole ring of a Harakiri, to itself.
+_REPLY_PAYLOAD = 1024
 #: Programs wait for a reply before they ask again; more than this is a flood.
 _MAX_PENDING = 16
 
@@ -79,7 +96,8 @@ def is_change(frame: MspFrame) -> bool:
 
 def _carry(frame: MspFrame) -> Conversation[MspFrame | None]:
     # Low commands as v1, which every flight controller speaks; the client gets its own version back.
-    yield from send(request(frame.command, frame.payload), frame.command, _REPLY_PAYLOAD, exclusive=is_change(frame))
+    size = MAX_REPLY if frame.command == _DATAFLASH_READ else _REPLY_PAYLOAD
+    yield from send(request(frame.command, frame.payload), frame.command, size, exclusive=is_change(frame))
     reply = yield from receive(frame.command)
     return None if reply is None else replace(reply, is_v2=frame.is_v2)
 

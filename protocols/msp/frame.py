@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MSP frames in both versions.
 
-v1, spoken by all: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c). v2, for INAV's commands
+v1, spoken by all: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c). A reply of 255 bytes or
+more has the size 255, and its size in 16 bits after the command ("jumbo", INAV's msp_serial.c). v2, for INAV's commands
 above 255: `$X` direction flag command size payload crc, command and size 16 bits little-endian, DVB-S2's CRC of 8 bits.
 """
 
@@ -14,12 +15,15 @@ from operator import xor
 _START = b"$"
 _V1, _V2 = ord("M"), ord("X")
 _V2_HEADER = struct.Struct("<BHH")
-_V1_OVERHEAD, _V2_OVERHEAD = 6, 9
+_V1_OVERHEAD, _JUMBO_OVERHEAD, _V2_OVERHEAD = 6, 8, 9
 #: Bytes of a v1 frame without its payload.
 FRAME_OVERHEAD = _V1_OVERHEAD
 _HIGHEST_V1_COMMAND = 0xFF
-#: A v2 header with a larger size is noise: no requested reply is half as long.
-_MAX_PAYLOAD = 255
+#: The size of a jumbo frame's payload, where v1 has one byte for it.
+_JUMBO = 0xFF
+_MAX_REQUEST = 255
+#: INAV's largest reply, a block of its data flash. A header with a larger size is noise.
+MAX_REPLY = 4096 + 16
 
 
 class Direction(Enum):
@@ -35,7 +39,7 @@ _DIRECTIONS = {direction.value: direction for direction in Direction}
 
 @dataclass(slots=True)  # not frozen, as in protocols.mavlink.frame
 class MspFrame:
-    """One frame. `payload` has at most 255 bytes; a `command` above 255 makes it a v2 frame, `is_v2` any other."""
+    """One frame. `payload`: at most 255 bytes in a request, else MAX_REPLY. A `command` above 255 makes it v2."""
 
     direction: Direction
     command: int
@@ -48,7 +52,11 @@ class MspFrame:
         if self.is_v2 or self.command > _HIGHEST_V1_COMMAND:
             body = _V2_HEADER.pack(0, self.command, len(self.payload)) + self.payload
             return b"$X" + direction + body + bytes((_crc8(body),))
-        body = bytes((len(self.payload), self.command)) + self.payload
+        size = len(self.payload)
+        if size >= _JUMBO and self.direction is not Direction.REQUEST:
+            body = bytes((_JUMBO, self.command)) + size.to_bytes(2, "little") + self.payload
+        else:
+            body = bytes((size, self.command)) + self.payload
         return b"$M" + direction + body + bytes((reduce(xor, body),))
 
 
@@ -122,12 +130,19 @@ def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | No
         return start
     if size < _V1_OVERHEAD - 1:
         return None
+    is_request = buffer[start + 2] == Direction.REQUEST.value
     if buffer[start + 1] == _V1:
-        return start + _V1_OVERHEAD + buffer[start + 3]
+        if buffer[start + 3] < _JUMBO or is_request:
+            return start + _V1_OVERHEAD + buffer[start + 3]
+        if size < _JUMBO_OVERHEAD - 1:
+            return None
+        payload_size = int.from_bytes(buffer[start + 5 : start + 7], "little")
+        return start + _JUMBO_OVERHEAD + payload_size if _JUMBO <= payload_size <= MAX_REPLY else start
     if size < _V2_OVERHEAD - 1:
         return None
     flag, command, payload_size = _V2_HEADER.unpack_from(buffer, start + 3)
-    if flag or (command <= _HIGHEST_V1_COMMAND and not takes_low_v2) or payload_size > _MAX_PAYLOAD:
+    largest = _MAX_REQUEST if is_request else MAX_REPLY
+    if flag or (command <= _HIGHEST_V1_COMMAND and not takes_low_v2) or payload_size > largest:
         return start
     return start + _V2_OVERHEAD + int(payload_size)
 
@@ -136,7 +151,8 @@ def _decode(frame: bytearray) -> MspFrame | None:
     """Decode a complete frame; None if its checksum is wrong."""
     direction, body = _DIRECTIONS[frame[2]], frame[3:-1]
     if frame[1] == _V1:
-        return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(body[2:]))
+        is_jumbo = frame[3] == _JUMBO and direction is not Direction.REQUEST
+        return None if reduce(xor, frame[3:]) else MspFrame(direction, frame[4], bytes(body[4 if is_jumbo else 2 :]))
     if _crc8(body) != frame[-1]:
         return None
     return MspFrame(direction, int.from_bytes(body[1:3], "little"), bytes(body[_V2_HEADER.size :]), is_v2=True)

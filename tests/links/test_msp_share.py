@@ -21,6 +21,7 @@ from tests.support.programs import PATIENCE, free_port
 #: As configurators do: the bridge, too, gives up a reply that comes late.
 _ASKED_AGAIN_S = 2.0
 IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250
+DATAFLASH_ERASE, V2_FRAME, SET_AUX_RC = 72, 255, 0x2230
 
 
 class Program:
@@ -90,7 +91,10 @@ async def test_questions_are_answered_alongside_telemetry(is_v2: bool) -> None:
         (False, SET_PID, bytes(30), "set write = true"),
         (False, EEPROM_WRITE, b"", "set write = true"),
         (True, SET_MOTOR, bytes(16), "SET_MOTOR is never forwarded"),
+        (False, DATAFLASH_ERASE, b"", "set write = true"),
         (True, REBOOT, b"", "REBOOT is never forwarded"),
+        (True, SET_AUX_RC, bytes(3), "SET_AUX_RC is never forwarded"),
+        (True, V2_FRAME, bytes(9), "V2_FRAME is never forwarded"),
         (True, SET_PID, b"\x0d\x0d\x0d" + bytes(27), "could open this flight controller's command line"),
     ],
 )

@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from protocols.msp.frame import Direction, MspFrame, MspParser, request
+from protocols.msp.frame import MAX_REPLY, Direction, MspFrame, MspParser, request
 
 MEGABYTE = 1 << 20
 
@@ -76,6 +76,21 @@ def test_a_v2_frame_is_the_bytes_of_inav() -> None:
     assert MspParser().feed(bytes.fromhex("24583e000310010001f7")) == [MspFrame(Direction.REPLY, 0x1003, b"\x01")]
 
 
+@given(frames, st.sampled_from([254, 255, 256, 1000, MAX_REPLY]))
+def test_a_long_reply_is_found_between_others(frame: MspFrame, size: int) -> None:
+    for command in (116, 0x2020):
+        long = MspFrame(Direction.REPLY, command, bytes(range(251)) * 17, is_v2=False)
+        long.payload = long.payload[:size]
+        assert MspParser().feed(frame.encode() + long.encode() + frame.encode()) == [frame, long, frame]
+    assert MspFrame(Direction.REPLY, 116, bytes(255)).encode()[:7] == b"$M>\xff\x74\xff\0"  # as INAV's msp_serial.c
+
+
+def test_a_request_of_255_bytes_is_no_jumbo_frame() -> None:
+    chunk = MspFrame(Direction.REQUEST, 192, bytes(255))
+    assert len(chunk.encode()) == 6 + 255
+    assert MspParser().feed(chunk.encode()) == [chunk]
+
+
 @given(frames, st.data())
 def test_a_flipped_bit_in_what_the_checksum_covers_is_seen(frame: MspFrame, data: st.DataObject) -> None:
     damaged = bytearray(frame.encode())
@@ -108,6 +123,6 @@ def test_a_megabyte_of_anything_costs_a_bounded_amount_of_work() -> None:
         parser = MspParser()
         for start in range(0, len(data), 4096):
             parser.feed(data[start : start + 4096])
-            assert len(parser._buffer) < 9 + 255
+            assert len(parser._buffer) < 9 + MAX_REPLY
         parser.reset()
         assert parser._buffer == b""
