@@ -40,7 +40,9 @@ class CommandQueries:
 
     async def _upload(self, question: Question) -> None:
         items = await _items(question)
-        _end(question, await self._jobs.push(items, "zenoh upload", _teller(question, len(items))))
+        progress = _teller(question, len(items))
+        # A file of which nothing can be stored must not erase the missions of a fleet.
+        _end(question, await self._jobs.push(items, "zenoh upload", progress, may_erase=False))
 
     async def _check(self, question: Question) -> None:
         _tell(question, {"result": await self._jobs.check(await _items(question))})

@@ -39,11 +39,21 @@ def test_a_trial_tells_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path
     tried = fleet.ask("push", file, "--all", "--dry-run")
     assert tried.returncode == 0, tried
     assert tried.stdout.endswith("3 of 3 vehicles would accept the mission; nothing was written\n")
-    assert tried.stdout.count("WP 4: ") == 3
+    assert tried.stdout.count("WP 4: DO_CHANGE_SPEED dropped") == 1
     assert [fleet.daemons[name].held() for name in NAMES] == before
     bad = fleet.ask("push", plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]), "--all", "--dry-run")
     assert bad.returncode == 1
-    assert "rejected: LAND must be last" in " ".join(bad.stdout.split())
+    assert bad.stdout.count("Rejected, WP 1: LAND must be last") == 3
+
+
+def test_a_file_without_a_storable_item_erases_nothing(fleet: Fleet, tmp_path: Path) -> None:
+    fleet.pushed(plan_file(tmp_path, plain_plan(4)), "--vehicle", "kite", code=0)
+    nothing = plan_file(tmp_path, [HOME, PlanRow(178, p2=5.0)])
+    tried = fleet.ask("push", nothing, "--vehicle", "kite", "--dry-run")
+    assert (tried.returncode, "no item of it can be stored" in tried.stdout) == (1, True), tried
+    pushed = fleet.pushed(nothing, "--vehicle", "kite", code=1)
+    assert "would erase the current mission" in pushed["kite"]["error"]
+    assert fleet.daemons["kite"].held()["count"] == 4
 
 
 def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None:
@@ -55,6 +65,7 @@ def test_a_mission_is_verified_by_checksum(fleet: Fleet, tmp_path: Path) -> None
     assert {name: each["is_held"] for name, each in vehicles.items()} == {"kite": True, "owl": True, "swift": False}
     checked = json.loads(run_naze_bridge("check", file, "--json").stdout)
     assert checked["checksum"] == vehicles["swift"]["checksum"] == fleet.daemons["kite"].held()["checksum"]
+    assert "holds no mission" in fleet.ask("verify", file, "--vehicle", "swift").stdout
     told = fleet.ask("verify", file, "--vehicle", "kite", "--vehicle", "owl")
     assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "2 of 2 vehicles hold the mission")
 
@@ -80,7 +91,7 @@ def test_vehicles_are_chosen_by_their_state(fleet: Fleet, tmp_path: Path) -> Non
     assert listed("--where", "mission_count=8") == ["owl"]
     assert listed("--where", "name=*i*", "--where", "armed=no") == ["kite", "swift"]
     assert listed("--limit", "2") == ["kite", "owl"]
-    assert fleet.ask("list", "--limit", "2").stdout.endswith("\n1 more vehicles\n")
+    assert fleet.ask("list", "--limit", "2").stdout.endswith("\nand 1 more\n")
     assert "None of 3 vehicles" in fleet.ask("list", "--where", "armed=true").stdout
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(9)), "--all", "--where", "mission_count=8", code=0)
     assert list(pushed) == ["owl"]

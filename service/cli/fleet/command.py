@@ -60,7 +60,7 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
     elif shown:
         print_table(fleet_table(shown))
         if len(shown) < len(found):
-            click.echo(f"{len(found) - len(shown)} more vehicles")
+            click.echo(f"and {len(found) - len(shown)} more")
     elif everyone:
         click.echo(f"None of {len(everyone)} vehicles matches.")
     else:

@@ -23,13 +23,20 @@ from service.cli.fleet.options import (
 from service.cli.fleet.push import FleetPush, push
 from service.cli.fleet.roll_call import alive, chosen, roll_call
 from service.cli.fleet.session import FleetError
-from service.cli.fleet.tables import progress_bars, push_data, push_summary, push_table, trial_table
+from service.cli.fleet.tables import (
+    dry_run_table,
+    progress_bars,
+    push_data,
+    push_summary,
+    push_table,
+    verify_table,
+)
 from service.cli.fleet.trial import Trial, try_mission
 from service.cli.mission_source import mission_bytes
 from service.cli.printing import print_json, print_table
 
 _UNREADABLE = 2
-_GOES_ON = "stopped; transfers in progress continue: `naze-bridge fleet list` shows what each vehicle holds"
+_GOES_ON = "stopped; transfers in progress continue: `naze-bridge fleet verify` shows their results later"
 
 
 @click.command("push")
@@ -63,19 +70,20 @@ def push_mission(
         if dry_run:
             _show_trials(try_mission(session, prefix, meant, mission), as_json)
             return
-        delivery = FleetPush.of(meant, bridges)
+        delivery, is_stopped = FleetPush.of(meant, bridges), False
         try:
-            with progress_bars(delivery, item_count) as show:
+            with progress_bars(item_count) as show:
                 push(session, prefix, delivery, bridges, mission, show, staged=staged)
         except KeyboardInterrupt:
-            print_table(push_table(delivery))
-            click.echo(f"naze-bridge: {_GOES_ON}", err=True)
-            raise SystemExit(INTERRUPTED) from None
+            is_stopped = True
     if as_json:
         print_json(push_data(delivery))
     else:
         print_table(push_table(delivery))
         click.echo(push_summary(delivery))
+    if is_stopped:
+        click.echo(f"naze-bridge: {_GOES_ON}", err=True)
+        raise SystemExit(INTERRUPTED)
     if delivery.failed:
         raise SystemExit(1)
 
@@ -101,7 +109,7 @@ def verify_mission(
     if as_json:
         print_json({"vehicles": [asdict(each) | {"is_held": each.is_held} for each in trials]})
     else:
-        print_table(trial_table(trials, "Holds it", lambda trial: trial.is_held))
+        print_table(verify_table(trials))
         click.echo(f"{held} of {len(trials)} vehicles hold the mission")
     if held < len(trials):
         raise SystemExit(1)
@@ -133,7 +141,7 @@ def _show_trials(trials: list[Trial], as_json: bool) -> None:
     if as_json:
         print_json({"vehicles": [asdict(each) for each in trials], "failed": failed})
     else:
-        print_table(trial_table(trials, "Accepts it", lambda trial: trial.is_taken))
+        print_table(dry_run_table(trials))
         click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would accept the mission; nothing was written")
     if failed:
         raise SystemExit(1)

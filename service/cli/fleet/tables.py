@@ -6,12 +6,13 @@ from contextlib import contextmanager
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn
 from rich.progress import Progress as Bars
 from rich.table import Table
 from rich.text import Text
 
-from service.cli.fleet.payload import part, text, whole
+from bridge.model.finding import News
+from service.cli.fleet.payload import text
 from service.cli.fleet.push import FleetPush, PushState
 from service.cli.fleet.trial import Trial
 from service.cli.fleet.vehicle import FleetVehicle
@@ -97,17 +98,26 @@ def _number(value: float | None, form: str, unit: str = "") -> Text:
 
 
 @contextmanager
-def progress_bars(fleet: FleetPush, item_count: int) -> Iterator[Callable[[FleetPush], None]]:
-    """Show a progress bar per vehicle on standard error, if that is a terminal."""
+def progress_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
+    """Show the count of finished vehicles and a progress bar per transfer on standard error, if that is a terminal."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
     console = Console(stderr=True)
     with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
-        tasks = {name: bars.add_task(name, total=item_count) for name in fleet.vehicles}
+        # First, because only the last lines are cut off if there are more than the terminal has.
+        whole_fleet = bars.add_task("")
+        tasks: dict[str, TaskID] = {}
 
         def show(now: FleetPush) -> None:
-            for name, progress in now.vehicles.items():
-                total = progress.total or item_count
-                bars.update(tasks[name], completed=total if progress.result else progress.records, total=total)
+            count, failed = len(now.vehicles), len(now.failed)
+            title = f"Vehicles, {failed} failed" if failed else "Vehicles"
+            bars.update(whole_fleet, description=title, completed=count - len(now.waiting), total=count)
+            for name in tasks.keys() - now.running:
+                bars.remove_task(tasks.pop(name))
+            for name in now.running:
+                if name not in tasks:
+                    tasks[name] = bars.add_task(name)
+                progress = now.vehicles[name]
+                bars.update(tasks[name], completed=progress.records, total=progress.total or item_count)
 
         yield show
 
@@ -131,32 +141,50 @@ def _result(progress: PushState) -> Text:
     return Text("in progress" if progress.is_begun else "not started", style="yellow")
 
 
-def trial_table(trials: Sequence[Trial], question: str, answer: Callable[[Trial], bool | None]) -> Table:
-    """One row per vehicle: the answer to a question, and each correction below it."""
-    table = _table()
+def dry_run_table(trials: Sequence[Trial]) -> Table:
+    """One row per vehicle, and below them the corrections, once for all vehicles that would hold the same records."""
+    corrections = {
+        trial.checksum: [finding.text() for finding in trial.findings if finding.news is not News.NONE]
+        for trial in trials
+        if trial.is_taken
+    }
+    lines = [line for checksum, said in corrections.items() if said for line in ("", f"Stored as {checksum}:", *said)]
+    return _trial_table(trials, "Accepts it", lambda trial: (trial.is_taken, ""), "\n".join(lines))
+
+
+def verify_table(trials: Sequence[Trial]) -> Table:
+    """One row per vehicle: whether it holds the mission, and if not, what it holds instead."""
+    return _trial_table(trials, "Holds it", lambda trial: (trial.is_held, "" if trial.is_held else _held(trial)))
+
+
+def _held(trial: Trial) -> str:
+    if trial.held_count is None:
+        return "its mission is not known"
+    return f"holds {trial.held_count} records, {trial.held}" if trial.held_count else "holds no mission"
+
+
+def _trial_table(
+    trials: Sequence[Trial], question: str, answer: Callable[[Trial], tuple[bool | None, str]], caption: str = ""
+) -> Table:
+    table = _table(Text(caption))
     table.add_column("Vehicle", overflow="fold")
     table.add_column("Records", justify="right", no_wrap=True)
     table.add_column("Checksum", no_wrap=True)
     table.add_column(question, no_wrap=True)
     table.add_column("Details")
     for trial in trials:
-        said = [trial.error] if trial.error else [_correction(finding) for finding in trial.findings]
+        known, details = answer(trial)
         count = "" if trial.count is None else str(trial.count)
-        table.add_row(Text(trial.vehicle), count, trial.checksum or "", _ANSWERS[answer(trial)], Text("\n".join(said)))
+        row = (Text(trial.vehicle), count, trial.checksum or "", _ANSWERS[known], Text(trial.error or details))
+        table.add_row(*row)
     return table
-
-
-def _correction(finding: object) -> str:
-    data = finding if isinstance(finding, dict) else {}
-    was, becomes = (str(part(data, name)) for name in ("was", "becomes"))
-    return f"WP {whole(data, 'seq')}: {text(data, 'field')} {was} -> {becomes} ({text(data, 'why')})"
 
 
 def push_data(fleet: FleetPush) -> Json:
     """The results as plain data."""
     return {
         "vehicles": [
-            {"vehicle": each.vehicle, "ok": not each.has_failed, "error": each.error, "result": each.result}
+            {"vehicle": each.vehicle, "ok": each.result is not None, "error": each.error, "result": each.result}
             for each in fleet.vehicles.values()
         ],
         "failed": len(fleet.failed),
@@ -166,7 +194,8 @@ def push_data(fleet: FleetPush) -> Json:
 def push_summary(fleet: FleetPush) -> str:
     """The summary, one line."""
     count, failed = len(fleet.vehicles), len(fleet.failed)
-    return f"{count - failed} of {count} vehicles hold the mission, verified" + (f"; {failed} failed" if failed else "")
+    held = sum(each.result is not None for each in fleet.vehicles.values())
+    return f"{held} of {count} vehicles hold the mission, verified" + (f"; {failed} failed" if failed else "")
 
 
 def _words(progress: PushState) -> str:

@@ -3,11 +3,11 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import zenoh
 
-from service.cli.fleet.payload import decode, part, text, whole
+from bridge.model.finding import Finding, News
+from service.cli.fleet.payload import decode, number, part, text, whole
 from service.cli.fleet.session import NO_COMMANDS, ask_each
 from service.zenoh_link.keys import CHECK, MISSION_CURRENT
 
@@ -16,17 +16,18 @@ _TIMEOUT_S = 15.0
 
 @dataclass(slots=True)
 class Trial:
-    """One vehicle's reply. `checksum`: of the records that the mission would become; `held`: of those it holds.
+    """One vehicle's reply. `count` and `checksum`: of the records that the mission would become; `held`: that it holds.
 
-    `error`: why there is no verdict, or why it would reject the mission.
+    `error`: why there is no verdict, or why it would not store the mission.
     """
 
     vehicle: str
     error: str | None = NO_COMMANDS
     count: int | None = None
     checksum: str | None = None
+    held_count: int | None = None
     held: str | None = None
-    findings: tuple[Any, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     @property
     def is_held(self) -> bool | None:
@@ -46,7 +47,7 @@ def try_mission(session: zenoh.Session, prefix: str, names: Iterable[str], missi
         _take(trials[name], reply)
     for name, reply in ask_each(session, prefix, trials, MISSION_CURRENT.suffix, _TIMEOUT_S):
         if reply.ok is not None and (data := decode(reply.ok)) is not None:
-            trials[name].held = text(data, "checksum")
+            trials[name].held_count, trials[name].held = whole(data, "count"), text(data, "checksum")
     return list(trials.values())
 
 
@@ -61,11 +62,21 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
         trial.error = text(data, "error") or "it gives no reason"
         return
     findings = part(result, "findings")
-    trial.findings = tuple(findings) if isinstance(findings, list) else ()
+    trial.findings = tuple(map(_finding, findings)) if isinstance(findings, list) else ()
     trial.count, trial.checksum = whole(result, "count"), text(result, "checksum")
-    trial.error = None if text(result, "result") != "REJECTED" else f"rejected: {_why(trial.findings)}"
+    match text(result, "result"):
+        case "ACCEPTED":
+            trial.error = None
+        case "CLEARED":
+            trial.error = "no item of it can be stored"
+        case _:
+            trial.error = trial.findings[-1].text() if trial.findings else "it gives no reason"
 
 
-def _why(findings: tuple[Any, ...]) -> str:
-    last = findings[-1] if findings and isinstance(findings[-1], dict) else {}
-    return text(last, "why") or "without a reason"
+def _finding(data: object) -> Finding:
+    """Read a finding, of which a vehicle's newer version may have more fields."""
+    found = data if isinstance(data, dict) else {}
+    was, becomes = (text(found, name) or number(found, name) for name in ("was", "becomes"))
+    news = next((each for each in News if each == part(found, "news")), News.NOTICE)
+    field, why = (text(found, name) or "" for name in ("field", "why"))
+    return Finding(whole(found, "seq"), field, was, becomes, why, whole(found, "command"), news)
