@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random actions of two ground stations, the command line, the pilot and the plugs: never a wrong list, never stuck."""
+"""Random actions of two ground stations, the command line, the pilot and the plugs: no wrong list, no deadlock."""
 
 from collections.abc import Sequence
 
@@ -40,7 +40,7 @@ def places(records: Sequence[WpRecord]) -> list[tuple[int, int, int]]:
 
 
 class Conversation(RuleBasedStateMachine):
-    """Every list that is announced has its own number of items, so that its items cannot pass for another's."""
+    """Each announced list has a different number of items, so items of one cannot be taken for another's."""
 
     @initialize(slow_store=st.sampled_from([0.0, 0.05, 1.0]), flash_erase_ms=st.sampled_from([20.0, 100.0, 400.0]))
     def start(self, slow_store: float, flash_erase_ms: float) -> None:
@@ -68,7 +68,7 @@ class Conversation(RuleBasedStateMachine):
         self.stations[station].send(count_message(self.announced[station]))
 
     @rule(station=who, count=st.sampled_from([0, 1, 147, 65535]))
-    def announce_what_is_refused_or_clears(self, station: int, count: int) -> None:
+    def announce_a_refused_count_or_a_clear(self, station: int, count: int) -> None:
         self.stations[station].send(count_message(count))
 
     @rule(station=who, seq=seqs)
@@ -119,7 +119,7 @@ class Conversation(RuleBasedStateMachine):
         self.world.faults.armed = not self.world.faults.armed
 
     @rule()
-    def hang_or_go_on(self) -> None:
+    def hang_or_resume(self) -> None:
         self.world.faults.hang = not self.world.faults.hang
 
     @rule()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finding the flight controller, in simulated time: at every speed, left in mid-frame, booting, power-cycled, armed."""
+"""Finding the flight controller in simulated time: at every speed, mid-frame, booting, power-cycled, armed."""
 
 import random
 from collections.abc import Callable
@@ -40,10 +40,10 @@ def thinks_armed(world: World) -> bool | None:
 
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_found_at_every_speed_in_time(baud: int, extension: bool) -> None:
+def test_found_within_seconds_at_every_speed(baud: int, extension: bool) -> None:
     for seed in range(5):
         world = World(SimOptions(baud=baud), Faults(extension=extension), plugged=False)
-        # Where in its second the board sends its heartbeat.
+        # A random phase of the board's heartbeat.
         world.run(random.Random(seed).random() * 4)
         world.plug()
         assert world.wait_until(verdict, 20) <= (1.5 if baud == SPEEDS[0] else 8)
@@ -59,13 +59,13 @@ def test_found_at_every_speed_in_time(baud: int, extension: bool) -> None:
 
 
 @pytest.mark.parametrize("baud", [baud for baud in ALL_SPEEDS if baud >= 2400])
-def test_known_by_name_in_time(baud: int) -> None:
-    """At 1200 baud the names of the boxes alone take a second, twice."""
+def test_identified_within_8_s(baud: int) -> None:
+    """Not at 1200 baud: there the box names alone take a second, and they are read twice."""
     assert World(SimOptions(baud=baud)).wait_ready() <= 8
 
 
 @pytest.mark.parametrize("extension", [True, False])
-def test_a_parser_left_in_mid_frame_is_brought_back(extension: bool) -> None:
+def test_a_board_left_in_mid_frame_is_found(extension: bool) -> None:
     frame = request(200, bytes(64))
     for length in range(1, len(frame)):
         world = World(faults=Faults(extension=extension), plugged=False)
@@ -77,7 +77,7 @@ def test_a_parser_left_in_mid_frame_is_brought_back(extension: bool) -> None:
 
 
 @pytest.mark.parametrize("extension", [True, False])
-def test_a_parser_that_loses_the_end_of_a_frame_later_is_brought_back(extension: bool) -> None:
+def test_losing_the_end_of_a_frame_later_does_not_lose_the_board(extension: bool) -> None:
     frame = request(200, bytes(64))
     for length in range(1, len(frame), 7):
         world = World(faults=Faults(extension=extension))
@@ -101,12 +101,12 @@ def test_a_board_that_boots_while_the_port_opens(boot_ms: float, extension: bool
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_back_within_3_s_of_the_ports_return(baud: int) -> None:
+def test_found_within_3_s_of_the_ports_return(baud: int) -> None:
     draw = random.Random(baud)
     for _ in range(8):
         world = World(SimOptions(baud=baud))
         world.wait_until(verdict, 10)
-        # Perhaps during identification: then it has no name yet, but its speed is known.
+        # This may be during identification, when only the speed is known.
         world.run(draw.random() * draw.choice((0.2, 4)))
         world.unplug()
         assert isinstance(world.bridge.session.state, Closed)
@@ -121,7 +121,7 @@ def test_back_within_3_s_of_the_ports_return(baud: int) -> None:
 
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_back_within_3_s_of_the_boot_after_a_power_cycle_at_any_moment(baud: int, extension: bool) -> None:
+def test_found_within_3_s_of_booting_after_a_power_cycle_at_any_moment(baud: int, extension: bool) -> None:
     draw = random.Random(baud)
     for _ in range(8):
         boot_s = draw.choice((0.5, 1.0, 2.0, 3.5))
@@ -143,7 +143,7 @@ def test_back_within_3_s_of_the_boot_after_a_power_cycle_at_any_moment(baud: int
         world.assert_line_was_clean()
 
 
-def test_power_and_port_that_come_and_go_at_random_are_survived() -> None:
+def test_random_power_and_port_losses() -> None:
     for seed in range(12):
         world = World(SimOptions(boot_ms=800), seed=seed)
         draw = random.Random(seed)
@@ -167,7 +167,7 @@ def test_power_and_port_that_come_and_go_at_random_are_survived() -> None:
         if not powered:
             world.power_on()
         world.run(0.8)
-        # A board that was lost must first be missed.
+        # Time to notice that the board was lost.
         world.run(2.0)
         world.wait_until(lambda w: w.kind is harakiri.PATCHED, 3)
 
@@ -175,7 +175,7 @@ def test_power_and_port_that_come_and_go_at_random_are_survived() -> None:
 @pytest.mark.parametrize(
     ("protocol", "baud"),
     [
-        # At 9600 baud the board's own MAVLink is more than its line carries.
+        # At 9600 baud the board's own MAVLink telemetry exceeds the line's capacity.
         (TelemetryProtocol.MAVLINK, 115200),
         (TelemetryProtocol.MAVLINK, 57600),
         (TelemetryProtocol.MAVLINK_57600, 115200),
@@ -183,7 +183,7 @@ def test_power_and_port_that_come_and_go_at_random_are_survived() -> None:
         (TelemetryProtocol.MAVLINK_57600, 9600),
     ],
 )
-def test_armed_it_may_turn_to_mavlink_and_back(protocol: TelemetryProtocol, baud: int) -> None:
+def test_switches_to_mavlink_when_armed_and_back(protocol: TelemetryProtocol, baud: int) -> None:
     world = World(SimOptions(baud=baud, tele_prot=protocol))
     world.wait_ready()
     for _ in range(2):
@@ -215,8 +215,8 @@ def test_armed_from_the_start(protocol: TelemetryProtocol) -> None:
     world.assert_line_was_clean()
 
 
-def test_frsky_telemetry_of_an_armed_craft_is_taken_for_nothing() -> None:
-    """It answers MSP anyway, at FrSky's speed and between FrSky's frames."""
+def test_frsky_telemetry_while_armed_is_ignored() -> None:
+    """The board still answers MSP, at FrSky's speed and between FrSky frames."""
     world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     world.wait_ready()
     world.faults.armed = True
@@ -231,7 +231,7 @@ def test_frsky_telemetry_of_an_armed_craft_is_taken_for_nothing() -> None:
 
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("rate", [1e-4, 1e-3])
-def test_bit_errors_delay_the_finding_and_never_change_the_finding(rate: float, extension: bool) -> None:
+def test_bit_errors_delay_identification_but_never_change_it(rate: float, extension: bool) -> None:
     kind = harakiri.PATCHED if extension else harakiri.UNPATCHED
     found = 0
     for seed in range(120):
@@ -250,7 +250,7 @@ def test_bit_errors_delay_the_finding_and_never_change_the_finding(rate: float, 
     assert found >= 110
 
 
-def test_lost_bytes_delay_the_finding_and_never_change_it() -> None:
+def test_lost_bytes_delay_identification_but_never_change_it() -> None:
     for seed in range(60):
         world = World(SimOptions(seed=seed), Faults(lost_byte_rate=3e-3), speeds=(115200,))
         world.wait_until(lambda w: w.kind is not None, 20)
@@ -269,18 +269,18 @@ OTHERS: dict[str, Callable[[], MspFake]] = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_relatives_are_other_flight_controllers(name: str) -> None:
+def test_similar_firmware_is_not_taken_for_harakiri(name: str) -> None:
     fake = OTHERS[name]()
     world = World(peer=fake)
     world.wait_until(lambda w: w.is_found, 3)
     assert world.kind is other.OTHER_MSP
     world.run(10)
     assert world.kind is other.OTHER_MSP
-    # Command numbers that mean something else to them are never sent.
+    # These command numbers may mean something else to other firmware.
     assert not {190, 191, 192, 193, 194, 195, 196} & set(fake.asked)
 
 
-def test_a_relative_that_is_silent_on_what_it_does_not_know_is_not_guessed_at() -> None:
+def test_firmware_that_ignores_unknown_requests_is_not_guessed() -> None:
     world = World(peer=MspFake({100: ident(240, 0), 116: BOXES, 101: bytes(11)}, silent_on_unknown=True))
     world.run(20)
     assert world.kind is None
@@ -297,7 +297,7 @@ def test_the_arm_box_is_found_by_its_name() -> None:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_a_lone_heartbeat_a_second_is_mavlink(version: int) -> None:
+def test_one_heartbeat_a_second_is_recognised_as_mavlink(version: int) -> None:
     world = World(peer=MavlinkOnly(version))
     assert world.wait_until(lambda w: w.is_found, 5) <= 1.5
     assert world.kind is other.OTHER_MAVLINK
@@ -306,8 +306,8 @@ def test_a_lone_heartbeat_a_second_is_mavlink(version: int) -> None:
     assert world.events("fc.lost") == []
 
 
-def test_a_heartbeat_without_content_is_not_a_heartbeat() -> None:
-    """MAVLink 2 leaves zeros out: an empty heartbeat is one byte long."""
+def test_an_empty_heartbeat_is_ignored() -> None:
+    """MAVLink 2 drops trailing zeros: an empty heartbeat is one byte long."""
     world = World(peer=MavlinkOnly())
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)
@@ -326,8 +326,8 @@ def test_an_empty_line_yields_no_flight_controller(peer: Callable[[], QuietLine]
     assert world.events("fc.found") == world.events("fc.in_command_line") == []
 
 
-def test_a_line_that_is_looped_back_is_no_answer() -> None:
-    """A flight controller is unplugged from its adapter and the adapter's wires touch."""
+def test_a_looped_back_line_is_not_an_answer() -> None:
+    """The adapter's RX and TX wires touch after the flight controller was unplugged from it."""
     world = World()
     world.wait_ready()
     world.naze = Loopback()

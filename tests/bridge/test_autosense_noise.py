@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Noise is never mistaken for a flight controller, even if it consists of the bytes that frames begin with.
+"""Noise is never mistaken for a flight controller, even if it consists of frame headers.
 
-The calculated probabilities of a false verdict: an MSP verdict on uniform noise needs two equal answers to IDENT, the
-shortest of which is six given bytes: 2^-48 at each byte, and that again within half a second. A MAVLink verdict needs
-a heartbeat whose magic, length, number, CRC, version, type, autopilot and state fit (2^-59 at each byte), or two
-frames of known messages from one sender with sequence numbers that follow (2^-48 for each pair of places).
+Probability of a false verdict on uniform noise. MSP needs two equal answers to IDENT within half a second;
+the shortest has six fixed bytes: 2^-48 at each position, twice. MAVLink needs a heartbeat with plausible
+magic, length, number, CRC, version, type, autopilot and state (2^-59 at each position), or two frames of
+known messages from one sender with consecutive sequence numbers (2^-48 for each pair of positions).
 """
 
 import random
@@ -17,20 +17,20 @@ from protocols.msp.frame import Direction, MspFrame, request
 
 MEGABYTE = 1 << 20
 UNIFORM = bytes(range(256))
-#: Every alphabet's bytes are drawn with equal chances; what stands in it often is likely.
+#: Bytes are drawn uniformly from each alphabet; a repeated byte is more likely.
 ALPHABETS = {
     "uniform": UNIFORM,
     "half MSP preambles": UNIFORM + b"$M>" * 64 + b"$M!" * 21,
     "half MAVLink 1 magics": UNIFORM + b"\xfe" * 256,
     "half MAVLink 2 magics": UNIFORM + b"\xfd" * 256,
-    "all that begins a frame": UNIFORM + b"$M><!\xfe\xfd\x00\x64" * 28,
+    "every frame header": UNIFORM + b"$M><!\xfe\xfd\x00\x64" * 28,
     "letters": b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ$>!<\r\n 0123456789",
     "two values": b"\x00\xff",
 }
 
 
 def listen(noise: bytes, search: Autosense, chunk: int) -> set[int | None]:
-    """Let a search read noise at line rate; return the speeds that it visited."""
+    """Feed a search noise at line rate; return the speeds that it tried."""
     now = 0.0
     visited = set()
     for start in range(0, len(noise), chunk):
@@ -44,24 +44,24 @@ def listen(noise: bytes, search: Autosense, chunk: int) -> set[int | None]:
 
 
 @pytest.mark.parametrize("name", ALPHABETS)
-def test_megabytes_of_noise_yield_no_verdict(name: str) -> None:
+def test_megabytes_of_noise_give_no_verdict(name: str) -> None:
     draw = random.Random(name)
     noise = bytes(draw.choices(ALPHABETS[name], k=MEGABYTE))
     visited = listen(noise, Autosense(SPEEDS, None, 0.0), 96)
     assert visited == set(SPEEDS)
-    # All of it at the speed at which frames come fastest.
+    # At one speed throughout, the one with the most frames.
     listen(noise[MEGABYTE // 2 :], Autosense((115200,), 115200, 0.0), 512)
 
 
 @pytest.mark.parametrize("preamble", [b"$M>", b"$M!", b"$M<", b"\xfe", b"\xfd", b"\xfe\x09", b"\xfd\x09\x00"])
-def test_noise_in_which_every_few_bytes_begin_a_frame_yields_no_verdict(preamble: bytes) -> None:
+def test_noise_full_of_frame_headers_gives_no_verdict(preamble: bytes) -> None:
     draw = random.Random(preamble)
     noise = b"".join(preamble + draw.randbytes(draw.randrange(1, 14)) for _ in range(60_000))
     listen(noise, Autosense(SPEEDS, None, 0.0), 200)
 
 
-def test_mavlink_that_lost_its_bytes_and_msp_of_others_yield_no_verdict() -> None:
-    """Frames with one damaged byte each, and whole requests of another companion on the same wire."""
+def test_damaged_mavlink_and_foreign_msp_requests_give_no_verdict() -> None:
+    """Each MAVLink frame has one damaged byte; the requests are intact, from another companion on the same wire."""
     draw = random.Random(1)
     mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)
     noise = bytearray()
@@ -75,14 +75,14 @@ def test_mavlink_that_lost_its_bytes_and_msp_of_others_yield_no_verdict() -> Non
     listen(bytes(noise), Autosense(SPEEDS, None, 0.0), 200)
 
 
-def test_one_answer_alone_is_no_evidence() -> None:
+def test_a_single_answer_is_not_enough() -> None:
     search = Autosense((115200,), None, 0.0)
     now, visits = 0.0, 0
     for number in range(500):
         now = search.next_deadline() or now
         if search.phase is Phase.LISTEN:
             visits += 1
-        # A different answer each time.
+        # Each answer differs.
         answer = MspFrame(Direction.REPLY, 100, bytes((211, 3, 0, number % 256, number // 256, 0, 128)))
         search.receive(answer.encode(), now)
         search.tick(now)

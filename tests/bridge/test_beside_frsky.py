@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Harakiri that is armed with tele_prot 1 answers MSP beside its FrSky telemetry, out of one send ring."""
+"""A Harakiri armed with tele_prot 1 answers MSP between FrSky frames; both share one send ring."""
 
 import pytest
 
@@ -11,7 +11,7 @@ from tests.support.world import GroundStation, World
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.031, 0.062, 0.093])
-def test_the_ring_is_not_lapped_while_a_stored_list_is_read(after_s: float) -> None:
+def test_reading_a_stored_list_does_not_overflow_the_send_ring(after_s: float) -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     world.wait_ready()
     station = GroundStation(world)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The limits on a ground station's requests over a long time, in simulated time."""
+"""Long-term limits on a ground station's requests, in simulated time."""
 
 from collections import Counter
 
@@ -13,7 +13,7 @@ from tests.support.world import GroundStation, World
 _SAVE = b"$M<\x00\xfa"
 
 
-def test_texts() -> None:
+def test_texts_are_limited() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     station = GroundStation(world)
@@ -24,8 +24,8 @@ def test_texts() -> None:
     assert 200 < len(station.texts()) <= 200 + 5 * 10 + 5
 
 
-def test_flash_writes() -> None:
-    """A page lasts 10,000."""
+def test_flash_writes_are_limited() -> None:
+    """A flash page endures 10,000 erases."""
     world = World(speeds=(115200,))
     world.wait_ready()
     station = GroundStation(world)
@@ -36,7 +36,7 @@ def test_flash_writes() -> None:
     assert 30 < sum(data.count(_SAVE) for _, _, data in world.written) <= 30 + 100 / 20 + 1
 
 
-def test_newcomers_share_a_limit_by_host_and_in_all() -> None:
+def test_new_peers_share_a_limit_per_host_and_a_total() -> None:
     pilot = Peer("udp", ("10.0.0.1", 14550))
     budgets = Budgets(lambda peer: peer == pilot)
     for cost in (Cost.ARRIVAL, Cost.BOARD, Cost.FLASH, Cost.STORED, Cost.TEXT):
@@ -52,8 +52,8 @@ def test_newcomers_share_a_limit_by_host_and_in_all() -> None:
     assert sum(writes) == LIMITS[Cost.FLASH].each.burst
 
 
-def test_an_armed_board_is_asked_nothing_for_strangers() -> None:
-    """MISSION_CLEAR_ALL while armed made it answer eight times as much as it does for the telemetry."""
+def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:
+    """MISSION_CLEAR_ALL while armed once made it send eight times as much as telemetry does."""
     world = World(speeds=(115200,))
     world.wait_ready()
     stranger = GroundStation(world)

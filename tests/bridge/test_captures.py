@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Recordings of flight controllers' ports (tests/captures), replayed to the bridge in simulated time.
 
-Users' captures are added unchanged. The first test runs on all of them; each problem has its own test.
+Captures from users are added unchanged. The first test runs on every capture; each problem has its own test.
 """
 
 from itertools import pairwise
@@ -68,7 +68,7 @@ def test_the_port_is_lost_and_the_power_cut_as_recorded() -> None:
 
 @pytest.mark.parametrize("when", [0.0, 1.0, 2.0, 9.0])
 def test_a_mission_is_verified_over_the_recorded_line_whenever_it_is_sent(when: float) -> None:
-    """Damaged and lost frames included: what was asked again then is asked again now."""
+    """With the recorded damage and losses: requests repeated then are repeated now."""
     world = world_of("mission-over-a-bad-line.uart")
     world.run(when)
     world.wait_ready()
@@ -78,7 +78,7 @@ def test_a_mission_is_verified_over_the_recorded_line_whenever_it_is_sent(when: 
     assert world.store.outcomes() == [Outcome.VERIFIED]
 
 
-def test_another_mission_than_the_recorded_one_is_not_taken_for_verified() -> None:
+def test_a_mission_other_than_the_recorded_one_is_not_verified() -> None:
     world = world_of("mission-over-a-bad-line.uart")
     world.wait_ready()
     outcome = world.push(read_mission_file(MISSION.read_bytes(), MISSION.name)[:6])
@@ -88,8 +88,8 @@ def test_another_mission_than_the_recorded_one_is_not_taken_for_verified() -> No
 
 @settings(max_examples=15, deadline=None)
 @given(st.sampled_from(NAMES), st.data())
-def test_a_damaged_capture_ends_nothing(name: str, data: st.DataObject) -> None:
-    """Lines lost, doubled and in another order: whatever comes of it on the line, the bridge lives on."""
+def test_a_damaged_capture_does_not_stop_the_bridge(name: str, data: st.DataObject) -> None:
+    """With lines missing and out of order."""
     lines = (CAPTURES / name).read_bytes().splitlines(keepends=True)
     begin = data.draw(st.integers(0, len(lines) - 100))
     part = [line for line in lines[begin : begin + 400] if data.draw(st.integers(0, 9))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A board in its command line: recognised by its echo, reported, never typed at, and found again afterwards."""
+"""A board in its CLI is recognised by its echo and reported; nothing is typed; it is found again afterwards."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,16 +30,16 @@ def is_in_cli(world: World) -> bool:
 
 
 def open_command_line(world: World) -> None:
-    """With a terminal program on the board's other socket: its keys do not go through the bridge."""
+    """From a terminal program on another port of the board, not through the bridge."""
     world.naze.receive(b"#" if world.naze.protocol is None else b"\r\r\r", world.now)
-    # INAV wants silence after its key: the bridge's machine is busy meanwhile.
+    # INAV needs silence after the key, so the bridge pauses as on a busy machine.
     world.now += 0.2
     world.run_until(lambda w: w.naze.counters.cli_entered, 1)
     assert world.naze.counters.cli_entered
 
 
 def type_exit(world: World) -> bytes:
-    """What is echoed."""
+    """Type `exit` and return the echo."""
     world.run(0.1)
     heard: list[bytes] = []
     receive = world.bridge.fc_received
@@ -56,7 +56,7 @@ def type_exit(world: World) -> bytes:
 
 
 def left_in_cli(board: Any) -> World:
-    """The port is opened some time after the board was left in its command line."""
+    """The port is opened a minute after the board was left in its CLI."""
     world = World(peer=board, plugged=False)
     if world.naze.protocol is None:
         world.run(1)
@@ -67,7 +67,7 @@ def left_in_cli(board: Any) -> World:
 
 
 def assert_nothing_was_typed(world: World, since: float) -> None:
-    """No line ended, and each request was taken off the line again."""
+    """No line was ended, and each request was deleted again."""
     written = b"".join(data for at, _, data in world.written if at >= since)
     assert not {0x0D, 0x0A, 0x04, 0x09, 0x0C, ord("?")} & set(written)
 
@@ -129,7 +129,7 @@ def test_unplugging_it_brings_it_back(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", BOARDS)
-def test_one_request_every_three_seconds_for_as_long_as_it_takes(kind: str) -> None:
+def test_one_request_every_three_seconds_without_end(kind: str) -> None:
     world = left_in_cli(BOARDS[kind]())
     world.wait_until(is_in_cli, 2)
     began = world.now
@@ -154,8 +154,8 @@ def test_nothing_is_sent_while_a_person_types() -> None:
     assert is_in_cli(world)
 
 
-def test_a_list_that_looks_like_an_echo_is_none() -> None:
-    """The header of a request in a coordinate, twice in what the board sends: 67.5040548 N."""
+def test_a_list_that_looks_like_an_echo_is_not_taken_for_one() -> None:
+    """The coordinate 67.5040548 N contains a request's header, and the board sends it twice."""
     world = World()
     world.wait_ready()
     at = int.from_bytes(request(100)[:3] + b"(", "little")

@@ -14,7 +14,7 @@ from tests.support.world import GroundStation, World
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
-#: The same refusal is repeated after this time.
+#: The text of a refusal is repeated no sooner.
 _SILENCE_S = 10.1
 #: Unsolicited messages.
 TELEMETRY_TYPES = {"HEARTBEAT", "MISSION_CURRENT", "CURRENT_MODE"} | {
@@ -44,7 +44,7 @@ def integer(command: int, param1: float = 0.0) -> Message:
 
 
 def answers(flying: tuple[World, GroundStation], *sent: Message) -> list[Message]:
-    """Send, and return all that comes back but telemetry."""
+    """Send messages; return the replies without telemetry."""
     world, station = flying
     station.take()
     for message in sent:
@@ -101,7 +101,7 @@ def test_all_command_numbers_are_acknowledged(flying: tuple[World, GroundStation
     world, _ = flying
     heard = []
     for first in range(0, len(numbers), 100):
-        world.run(4.0)  # faster would be a flood
+        world.run(4.0)  # faster would exceed the rate limit
         heard += answers(flying, *(long(number) for number in numbers[first : first + 100]))
     assert [ack[0] for ack in acks(heard)] == numbers
 
@@ -131,12 +131,12 @@ def test_commands_that_act_on_the_aircraft_are_denied_with_a_reason(
     assert len(texts) == 1
     assert words in texts[0].text
     assert texts[0].severity == 3
-    # Nothing but polls went to the flight controller.
+    # The flight controller got only polls.
     assert all(data[4] < 190 for _, _, data in world.written[before:])
     assert not world.naze.armed
 
 
-def test_a_mode_is_refused_with_a_text(flying: tuple[World, GroundStation]) -> None:
+def test_a_mode_change_is_refused_with_a_text(flying: tuple[World, GroundStation]) -> None:
     flying[0].run(_SILENCE_S)
     heard = answers(flying, m.MAVLink_set_mode_message(1, 1, 4))
     assert [message.get_type() for message in heard] == ["STATUSTEXT"]
@@ -176,7 +176,7 @@ def test_the_current_waypoint_cannot_be_set(flying: tuple[World, GroundStation])
     assert ["cannot be set" in message.text for message in heard] == [True]
 
 
-def test_a_command_for_another_is_not_answered(flying: tuple[World, GroundStation]) -> None:
+def test_a_command_for_another_system_is_not_answered(flying: tuple[World, GroundStation]) -> None:
     for system, component in ((2, 1), (1, 100), (255, 0)):
         assert answers(flying, long(400, 1.0, system=system, component=component)) == []
     for system, component in ((0, 0), (1, 0), (0, 1)):
@@ -194,7 +194,7 @@ def test_autopilot_version_has_no_ftp_capability(flying: tuple[World, GroundStat
     assert not can & m.MAV_PROTOCOL_CAPABILITY_FTP
 
 
-def test_a_home_that_is_not_known_is_refused_for_now() -> None:
+def test_requesting_an_unknown_home_is_temporarily_rejected() -> None:
     world = World(powered=False)
     world.run(0.5)
     heard = answers((world, GroundStation(world)), long(410), long(512, 242))
@@ -212,13 +212,13 @@ def test_a_file_request_is_refused_at_once(flying: tuple[World, GroundStation]) 
     (answer,) = answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload)))
     assert (answer.target_system, answer.target_component) == (255, 190)
     assert list(answer.payload[:6]) == [8, 0, 3, 129, 2, 4]
-    # FailErrno: Mission Planner ignores "unknown command" and continues asking for 70 s.
+    # FailErrno: Mission Planner ignores "unknown command" and keeps asking for 70 s.
     assert list(answer.payload[12:14]) == [2, 95]
-    # A refusal is not a request: no one answers it.
+    # A refusal is not a request and gets no reply.
     assert answers(flying, m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(answer.payload))) == []
 
 
-def test_a_ping_is_answered_and_an_answer_is_not(flying: tuple[World, GroundStation]) -> None:
+def test_a_ping_request_is_answered_but_not_a_ping_reply(flying: tuple[World, GroundStation]) -> None:
     (answer,) = answers(flying, m.MAVLink_ping_message(123456789, 42, 0, 0))
     assert (answer.time_usec, answer.seq, answer.target_system, answer.target_component) == (123456789, 42, 255, 190)
     assert answers(flying, m.MAVLink_ping_message(123456789, 42, 1, 1)) == []
@@ -253,7 +253,7 @@ def radius_world() -> tuple[World, GroundStation]:
     return world, GroundStation(world)
 
 
-def test_the_list_is_short_and_complete(flying: tuple[World, GroundStation]) -> None:
+def test_the_parameter_list_is_short_and_complete(flying: tuple[World, GroundStation]) -> None:
     heard = answers(flying, m.MAVLink_param_request_list_message(1, 1))
     assert values(heard) == [("SYSID_THISMAV", 1.0, 0, 2), ("WPNAV_RADIUS", 200.0, 1, 2)]
     assert {message.param_type for message in heard} == {9}
@@ -266,7 +266,7 @@ def test_the_list_is_short_and_complete(flying: tuple[World, GroundStation]) -> 
         (b"", 1, "WPNAV_RADIUS"),
         (b"WPNAV_RADIUS", -1, "WPNAV_RADIUS"),
         (b"SYSID_THISMAV", -1, "SYSID_THISMAV"),
-        (b"WPNAV_RADIUS", 0, "SYSID_THISMAV"),  # the index counts
+        (b"WPNAV_RADIUS", 0, "SYSID_THISMAV"),  # the index takes precedence
         (b"", 2, None),
         (b"", 32767, None),
         (b"NO_SUCH_NAME", -1, None),
@@ -276,7 +276,7 @@ def test_the_list_is_short_and_complete(flying: tuple[World, GroundStation]) -> 
         (b"\xff\xfe", -1, None),
     ],
 )
-def test_one_is_read_by_index_or_by_name(
+def test_a_parameter_is_read_by_index_or_by_name(
     flying: tuple[World, GroundStation], name: bytes, index: int, expected: str | None
 ) -> None:
     heard = answers(flying, m.MAVLink_param_request_read_message(1, 1, name, index))
@@ -291,7 +291,7 @@ def test_the_radius_is_set_on_the_flight_controller() -> None:
     assert values(station.said()) == [("WPNAV_RADIUS", 350.0, 1, 2)]
     assert station.texts() == []
     world.run(2)
-    # It is the firmware that writes it, in its next loop.
+    # The firmware applies it in its next loop.
     assert world.naze.flash_operations > operations
     world.power_off()
     world.power_on()
@@ -300,7 +300,7 @@ def test_the_radius_is_set_on_the_flight_controller() -> None:
 
 
 @pytest.mark.parametrize("value", [200.0, 200.4, 199.99998])
-def test_an_equal_value_is_not_written(value: float) -> None:
+def test_an_unchanged_value_is_not_written(value: float) -> None:
     world, station = radius_world()
     before, operations = len(world.written), world.naze.flash_operations
     heard = answers((world, station), param_set(b"WPNAV_RADIUS", value))
@@ -311,7 +311,7 @@ def test_an_equal_value_is_not_written(value: float) -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, 2001.0, 1e30])
-def test_a_value_out_of_range_changes_nothing_and_says_so(value: float) -> None:
+def test_a_value_out_of_range_is_refused_with_a_text(value: float) -> None:
     world, station = radius_world()
     heard = answers((world, station), param_set(b"WPNAV_RADIUS", value))
     assert values(heard) == [("WPNAV_RADIUS", 200.0, 1, 2)]
@@ -333,7 +333,7 @@ def test_a_parameter_that_cannot_be_set_is_answered_with_its_value() -> None:
     assert answers((world, station), param_set(b"NO_SUCH_NAME", 7.0)) == []
 
 
-def test_armed_the_radius_stays_and_the_pilot_hears_why() -> None:
+def test_setting_the_radius_while_armed_is_refused_with_a_text() -> None:
     world, station = radius_world()
     world.faults.armed = True
     world.run(1)
@@ -342,7 +342,7 @@ def test_armed_the_radius_stays_and_the_pilot_hears_why() -> None:
     assert any("disarm" in text for text in station.texts())
 
 
-def test_a_board_that_limits_flash_wear_keeps_its_radius_and_the_pilot_hears_why() -> None:
+def test_a_radius_refused_for_flash_wear_is_reported() -> None:
     world, station = radius_world()
     for radius_cm in range(301, 301 + 64):
         ended: list[object] = []
@@ -356,7 +356,7 @@ def test_a_board_that_limits_flash_wear_keeps_its_radius_and_the_pilot_hears_why
     assert " ".join(station.texts()) == f"WPNAV_RADIUS stays 364: {PushFailure.WRITES_SPENT.value}"
 
 
-def test_a_board_that_falls_silent_is_said_to_have_set_nothing() -> None:
+def test_setting_the_radius_of_a_silent_board_fails_with_a_text() -> None:
     world, station = radius_world()
     world.faults.hang = True
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
@@ -372,7 +372,7 @@ def test_without_the_extension_there_is_no_radius() -> None:
     assert values(heard) == [("SYSID_THISMAV", 1.0, 0, 1)]
 
 
-def test_a_repeated_or_hammered_set_is_done_once_at_a_time() -> None:
+def test_repeated_sets_are_done_one_at_a_time() -> None:
     world, station = radius_world()
     for number in range(2000):
         station.send(param_set(b"WPNAV_RADIUS", 300.0 + number % 5))
@@ -384,8 +384,8 @@ def test_a_repeated_or_hammered_set_is_done_once_at_a_time() -> None:
     world.assert_line_was_clean()
 
 
-def test_a_late_answer_to_one_value_is_not_taken_for_another() -> None:
-    """The board hangs while the first value is on its way, and answers both when it comes back."""
+def test_a_late_reply_to_the_first_value_is_not_taken_for_the_seconds() -> None:
+    """The board hangs while the first value is on its way and answers both when it resumes."""
     for hang_s in (0.1, 0.2, 0.3, 0.5, 0.8):
         world, station = radius_world()
         world.faults.hang = True

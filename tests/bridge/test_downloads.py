@@ -41,7 +41,7 @@ def holding(options: SimOptions | None = None, flash: bytes = OLD_FLASH) -> tupl
 
 
 def ask(station: GroundStation, message: Message, seconds: float = 0.2) -> list[Message]:
-    """Send a message; return the addressed mission messages in reply."""
+    """Send a message; return the mission messages addressed to the sender in reply."""
     station.take()
     station.send(message)
     station.world.run(seconds)
@@ -72,15 +72,15 @@ def test_the_list_reads_back_as_it_is_stored(as_int: bool) -> None:
     assert len(station.said("MISSION_ITEM", "MISSION_ITEM_INT")) == 20
 
 
-def test_it_is_read_from_the_flight_controller_after_the_bridge_starts() -> None:
-    """What another companion has put there meanwhile is what reads back: a copy answers only while it is the same."""
+def test_a_list_changed_on_the_board_is_read_again() -> None:
+    """The bridge answers from its copy only while the board still holds the same list."""
     world, station = holding()
     assert Download(station).run() != []
     before = reads(world)
     assert Download(station).run() != []
     assert reads(world) == before
     other = waypoints(9, seed=3)
-    # The same board with another list: its flash is changed without the bridge, and it boots again.
+    # The flash is changed without the bridge, and the board reboots.
     world.power_off()
     world.naze._flash._memory[:] = flash_holding(records_of(other))
     world.power_on()
@@ -89,7 +89,7 @@ def test_it_is_read_from_the_flight_controller_after_the_bridge_starts() -> None
     assert [item.lat_e7 for item in items] == [item.lat_e7 for item in other]
 
 
-def test_what_was_uploaded_reads_back_with_the_rules_applied() -> None:
+def test_an_uploaded_list_reads_back_with_the_rules_applied() -> None:
     _, station = holding()
     items = waypoints(5, 8)
     items[2] = replace(items[2], p1=7.0, p2=0.0, alt_m=0.0, frame=0)
@@ -106,7 +106,7 @@ def test_a_region_of_interest_reads_back_as_it_was_sent(remembered: bool) -> Non
         items[seq] = replace(items[seq], command=command, p2=0.0, alt_m=0.0)
     assert Upload(station, items).run() is A.ACCEPTED
     world.store.missions = world.store.missions if remembered else []
-    # Later: the bridge's copy is gone.
+    # Later, without the bridge's copy.
     world.unplug()
     world.plug()
     world.wait_ready()
@@ -121,8 +121,8 @@ def test_an_unknown_record_is_not_shown_as_a_flight_command() -> None:
     assert (item.command, item.p1) == (0, 99.0)
 
 
-def test_an_empty_list_is_a_count_of_none_until_home_is_known() -> None:
-    """Then it is home alone: DroneKit takes home from a download, and waits forever without one."""
+def test_an_empty_list_is_count_0_until_home_is_known() -> None:
+    """After that it is home alone: DroneKit takes home from a download and waits forever without one."""
     world = World(speeds=(115200,))
     world.wait_until(lambda w: w.is_found, 5)
     station = GroundStation(world)
@@ -148,7 +148,7 @@ def test_item_0_of_an_empty_list_is_the_flight_controllers_home(as_int: bool) ->
     assert item.x != 0
 
 
-def test_a_number_past_the_end_is_an_invalid_sequence() -> None:
+def test_a_seq_past_the_end_is_an_invalid_sequence() -> None:
     _, station = holding()
     for seq in (20, 65535):
         (ack,) = ask(station, request_message(seq))
@@ -180,13 +180,13 @@ def test_armed_the_list_is_refused_but_item_0_is_served() -> None:
         (item,) = ask(station, request_message(0, as_int=as_int))
         assert item.seq == 0
     assert item.x == pytest.approx((OLD[0].lat_e7 or 0) / 1e7)
-    # Having read item 0 does not open the rest.
+    # Reading item 0 does not allow reading the rest.
     world.faults.armed = False
     world.run(1)
     assert len(Download(station).run()) == 20
 
 
-def test_item_0_is_served_armed_without_anything_read_before() -> None:
+def test_item_0_is_served_while_armed_without_an_earlier_download() -> None:
     world = World(faults=Faults(armed=True), speeds=(115200,), flash=OLD_FLASH)
     world.wait_ready()
     world.run(1)
@@ -195,7 +195,7 @@ def test_item_0_is_served_armed_without_anything_read_before() -> None:
     assert item.x == OLD[0].lat_e7
 
 
-def test_a_reading_is_a_snapshot_that_no_upload_mixes_with_another_list() -> None:
+def test_a_download_is_a_snapshot_unaffected_by_an_upload() -> None:
     world, reader = holding()
     writer = GroundStation(world, "writer", sysid=250)
     assert ask(reader, list_message())[0].count == 20
@@ -203,13 +203,13 @@ def test_a_reading_is_a_snapshot_that_no_upload_mixes_with_another_list() -> Non
     assert Upload(writer, waypoints(15, 4)).run() is A.ACCEPTED
     read += [ask(reader, request_message(seq))[0].x for seq in range(10, 20)]
     assert read == [item.lat_e7 for item in OLD]
-    # The next reading sees the new one.
+    # The next download returns the new list.
     assert [item.lat_e7 for item in Download(reader).run()] == [item.lat_e7 for item in waypoints(15, 4)]
 
 
 @pytest.mark.parametrize("ends", ["ack", "time", "new flight controller", "own upload"])
-def test_a_snapshot_ends_with_its_reading(ends: str) -> None:
-    """Mission Planner asks for item 0 on arming: long after it has read a list that is not there any more."""
+def test_a_snapshot_ends_with_its_download(ends: str) -> None:
+    """Mission Planner asks for item 0 on arming, long after it read a list that has been replaced since."""
     world, station = holding()
     writer = GroundStation(world, "writer", sysid=250)
     assert ask(station, list_message())[0].count == 20
@@ -239,7 +239,7 @@ def test_two_stations_read_at_once() -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_reading_over_bad_air_is_exact(seed: int) -> None:
+def test_a_download_over_a_bad_radio_link_is_exact(seed: int) -> None:
     world = World(speeds=(115200,), flash=OLD_FLASH, seed=seed)
     world.wait_ready()
     station = GroundStation(world, air=Air(loss=0.1, repeat=0.1, delay_s=0.05, spread_s=0.1))
@@ -249,7 +249,7 @@ def test_a_reading_over_bad_air_is_exact(seed: int) -> None:
     ]
 
 
-def test_a_station_that_hammers_fills_nothing_and_others_are_served() -> None:
+def test_a_station_that_floods_requests_does_not_delay_others() -> None:
     world, station = holding()
     second = GroundStation(world, "second", sysid=250)
     for number in range(4000):
@@ -287,7 +287,7 @@ def test_without_a_link_and_without_a_store_the_reason_is_reported() -> None:
     assert any("stores no missions" in text for text in station.texts())
 
 
-def test_armed_in_mavlink_mode_home_is_served_and_no_more() -> None:
+def test_armed_in_mavlink_mode_only_home_is_served() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.run(6)
     world.faults.armed = True
@@ -306,7 +306,7 @@ def test_armed_in_mavlink_mode_home_is_served_and_no_more() -> None:
 
 
 def armed_before(board: str | TelemetryProtocol) -> World:
-    """A bridge that starts beside a craft that flies already."""
+    """A bridge that starts while the craft is flying."""
     if not isinstance(board, TelemetryProtocol):
         faults = Faults(armed=True, boxes=0)
         return World(peer=make_board(board, faults=faults), faults=faults)
@@ -326,15 +326,15 @@ def test_a_craft_that_is_armed_from_the_start_has_an_item_0(board: str | Telemet
         assert (item.get_type(), item.x != 0) == ("MISSION_ITEM_INT", True)
     world.run(2.3)
     (home_item,) = ask(station, request_message(0))
-    assert home_item.z == pytest.approx(131, abs=1.5)  # where it was launched: it is higher by now
+    assert home_item.z == pytest.approx(131, abs=1.5)  # the launch altitude; the craft is higher by now
     for home in station.said("HOME_POSITION")[-1:]:
         assert (home_item.x, home_item.y, home_item.z) == (home.latitude, home.longitude, home.altitude / 1000)
     assert not any("disarm to change" in text for text in station.texts())
 
 
 @pytest.mark.parametrize("board", TelemetryProtocol)
-def test_item_0_is_not_denied_while_a_craft_that_may_be_armed_is_looked_for(board: TelemetryProtocol) -> None:
-    """Mission Planner repeats its request, and is refused only once the craft is known to be disarmed."""
+def test_item_0_is_not_denied_while_the_craft_may_be_armed(board: TelemetryProtocol) -> None:
+    """Mission Planner repeats its request; it is refused only once the craft is known to be disarmed."""
     world = armed_before(board)
     station = GroundStation(world)
     while not world.bridge.session.vehicle.armed:
@@ -347,7 +347,7 @@ def test_item_0_is_not_denied_while_a_craft_that_may_be_armed_is_looked_for(boar
     assert item.x != 0
 
 
-def test_reading_goes_on_beside_an_upload_by_another() -> None:
+def test_a_download_continues_during_another_stations_upload() -> None:
     world, reader = holding()
     writer = GroundStation(world, "writer", sysid=250, air=Air(delay_s=0.01))
     upload = Upload(writer, waypoints(60, 4))
@@ -356,7 +356,7 @@ def test_reading_goes_on_beside_an_upload_by_another() -> None:
     assert upload.run() is A.ACCEPTED
 
 
-def test_mission_current_counts_what_is_held() -> None:
+def test_mission_current_has_the_number_of_items_held() -> None:
     world, station = holding()
     station.send(count_message(1))
     world.run(1.5)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A client with the habits of DroneKit 2.9: MAVLink 1, float items, and every wait of its `wait_ready`.
 
-It repeats no MISSION_COUNT, reads no MISSION_ACK, and knows home only from a
-download. Given an empty list it would ask for item 0 and wait forever.
+It does not repeat MISSION_COUNT, ignores MISSION_ACK, and gets home only from a download. Given an empty list it
+would ask for item 0 and wait forever.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ _GAP_REQUESTED_AFTER_S = 0.2
 
 
 class DroneKit:
-    """A Vehicle of DroneKit's, and its `commands`."""
+    """DroneKit's Vehicle and its `commands`."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -49,7 +49,7 @@ class DroneKit:
         self._wait(lambda: self._is_loaded)
 
     def upload(self, commands: list[Message]) -> None:
-        """`commands.clear()`, `add` and `upload()`: item 0 stays what was downloaded."""
+        """`commands.clear()`, `add` and `upload()`; item 0 stays as downloaded."""
         self.commands = [self.commands[0], *commands]
         for seq, command in enumerate(self.commands):
             command.seq, command.target_system, command.target_component = seq, 1, 1
@@ -109,7 +109,7 @@ def command(number: int, lat: float, lon: float, height_m: float) -> Message:
     return m.MAVLink_mission_item_message(0, 0, 0, 3, number, 0, 0, 0, 0, 0, 0, lat, lon, height_m)
 
 
-def test_an_empty_board_has_a_home_to_which_a_mission_is_added() -> None:
+def test_a_mission_is_added_to_the_home_of_an_empty_board() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     vehicle = DroneKit(world)
@@ -128,7 +128,7 @@ def test_an_empty_board_has_a_home_to_which_a_mission_is_added() -> None:
     assert (home.lat_e7 // 100, home.lon_e7 // 100) == (FIELD_LAT_E7 // 100, FIELD_LON_E7 // 100)
     vehicle.download()
     assert [item.command for item in vehicle.commands] == [16, *(number for number, *_ in legs)]
-    # Its one MISSION_COUNT comes while the list before is being erased.
+    # Its only MISSION_COUNT arrives while the previous list is being erased.
     vehicle.upload([command(Command.NAV_WAYPOINT, lat, lon + step * 1e-4, 20) for step in range(1, 40)])
     world.run(3)
     assert len(world.stored) == 40

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bug in any state of the line costs a new search, not the flight.
+"""A bug in any state of the line starts a new search.
 
-What the daemon does with an exception (log it, `Bridge.restart`) is in tests/e2e/test_daemon_log.py.
+The daemon's part (log the exception, call `Bridge.restart`) is tested in tests/e2e/test_daemon_log.py.
 """
 
 import pytest
@@ -20,7 +20,7 @@ ARMED_IN = {Mavlink: TelemetryProtocol.MAVLINK, Frsky: TelemetryProtocol.FRSKY_9
 
 
 class BugError(Exception):
-    """One in the bridge itself."""
+    """A bug in the bridge itself."""
 
 
 def world_of(state: type[State]) -> World:

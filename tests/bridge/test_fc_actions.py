@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calibration and storage: executed once, on the ground only, and acknowledged with the result."""
+"""Calibration and storage run once, only on the ground, and are acknowledged with the result."""
 
 import math
 from collections.abc import Callable
@@ -57,7 +57,7 @@ def done(world: World) -> list[int]:
 
 @pytest.mark.parametrize("make", [long, integer])
 @pytest.mark.parametrize(("command", "params", "action"), ALL)
-def test_on_the_ground_it_is_done_once(
+def test_an_action_is_done_once_on_the_ground(
     make: Callable[[int, tuple[float, ...]], Message], command: int, params: tuple[float, ...], action: int
 ) -> None:
     world, station = a_world()
@@ -68,13 +68,13 @@ def test_on_the_ground_it_is_done_once(
     (text,) = station.texts()
     assert text == (ActionResult.DONE if command == STORAGE else ActionResult.FREEZES).value
     world.run(20)
-    # A calibrated board restarts, and is found again.
+    # The board restarts after a calibration and is found again.
     assert world.naze.counters.resets == (action == 205)
     assert action == 206 or world.is_found
     assert done(world) == [action]
 
 
-def test_storing_is_done_before_it_is_acknowledged() -> None:
+def test_storing_is_acknowledged_only_once_done() -> None:
     world, station = a_world(SimOptions(config_write_ms=150.0))
     operations = world.naze.flash_operations
     station.send(long(*SAVE[:2]))
@@ -86,10 +86,10 @@ def test_storing_is_done_before_it_is_acknowledged() -> None:
 
 
 @pytest.mark.parametrize(("command", "params", "action"), ALL)
-def test_armed_nothing_is_done(command: int, params: tuple[float, ...], action: int) -> None:
+def test_nothing_is_done_while_armed(command: int, params: tuple[float, ...], action: int) -> None:
     world, station = a_world()
     world.faults.armed = True
-    # Even if the bridge has not noticed yet that it is armed.
+    # Even before the bridge has noticed that it is armed.
     station.send(long(command, params))
     world.run(0.5)
     assert results(station) == [DENIED]
@@ -98,7 +98,7 @@ def test_armed_nothing_is_done(command: int, params: tuple[float, ...], action: 
 
 
 @pytest.mark.parametrize("tele_prot", [TelemetryProtocol.MAVLINK, TelemetryProtocol.FRSKY_9600])
-def test_where_it_cannot_be_asked_whether_it_is_armed_nothing_is_done(tele_prot: TelemetryProtocol) -> None:
+def test_nothing_is_done_unless_the_arming_state_can_be_read(tele_prot: TelemetryProtocol) -> None:
     world, station = a_world(SimOptions(tele_prot=tele_prot))
     world.faults.armed = True
     for seconds in (0.02, 0.3, 4.0):
@@ -111,30 +111,30 @@ def test_where_it_cannot_be_asked_whether_it_is_armed_nothing_is_done(tele_prot:
     assert done(world) == []
 
 
-def test_without_a_flight_controller_it_is_denied() -> None:
+def test_without_a_flight_controller_an_action_is_denied() -> None:
     world = World(powered=False)
     station = GroundStation(world)
     for command, params, _ in ALL:
         station.send(long(command, params))
         world.run(0.1)
     assert results(station) == [DENIED] * len(ALL)
-    # The same refusal is not said over and over.
+    # The text of the refusal is not repeated.
     assert station.texts() == [ActionResult.NO_LINK.value]
 
 
-def test_a_board_that_falls_silent_has_failed_and_is_not_told_again() -> None:
+def test_an_action_on_a_board_that_falls_silent_fails_and_is_not_repeated() -> None:
     world, station = a_world()
     station.on_message.append(lambda _: None)
     hung: list[float] = []
 
-    def hang_when_told() -> None:
+    def hang_once_told() -> None:
         if not hung and done(world):
             world.faults.hang = True
             hung.append(world.now)
         elif not hung:
-            world.after(0.0005, hang_when_told)
+            world.after(0.0005, hang_once_told)
 
-    hang_when_told()
+    hang_once_told()
     station.send(long(*ACCELEROMETER[:2]))
     world.run(3)
     assert hung
@@ -145,7 +145,7 @@ def test_a_board_that_falls_silent_has_failed_and_is_not_told_again() -> None:
     assert done(world) == [205]
 
 
-def test_lost_bytes_do_it_once_or_not_at_all() -> None:
+def test_despite_lost_bytes_an_action_is_done_at_most_once() -> None:
     for seed in range(12):
         world, station = a_world(SimOptions(seed=seed))
         world.faults.lost_byte_rate = 0.02
@@ -155,7 +155,7 @@ def test_lost_bytes_do_it_once_or_not_at_all() -> None:
         assert results(station) in ([ACCEPTED], [FAILED])
 
 
-def test_an_impatient_pilot_hears_that_it_is_being_done() -> None:
+def test_a_repeated_command_is_answered_in_progress() -> None:
     world, station = a_world()
     for _ in range(3):
         station.send(long(*SAVE[:2]))
@@ -167,7 +167,7 @@ def test_an_impatient_pilot_hears_that_it_is_being_done() -> None:
     assert done(world) == [250]
 
 
-def test_never_alongside_a_mission() -> None:
+def test_no_action_during_a_mission_transfer() -> None:
     world, station = a_world()
     outcome = world.push(waypoints(100))
     station.send(long(*SAVE[:2]))
@@ -179,7 +179,7 @@ def test_never_alongside_a_mission() -> None:
     assert done(world) == []
 
 
-def test_a_mission_waits_for_it_to_end() -> None:
+def test_a_mission_transfer_waits_for_the_action_to_end() -> None:
     world, station = a_world()
     station.send(long(*SAVE[:2]))
     world.run(0.03)
@@ -193,7 +193,7 @@ def test_a_mission_waits_for_it_to_end() -> None:
     assert station.said("MISSION_ACK") == []
 
 
-def test_a_sensor_that_is_not_there_is_not_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("simulator.msp_port._SENSORS", 0b1011)
     world, station = a_world()
     station.send(long(*COMPASS[:2]))
@@ -219,7 +219,7 @@ def test_a_sensor_that_is_not_there_is_not_calibrated(monkeypatch: pytest.Monkey
         (STORAGE, (math.inf, 0, 0, 0, 0, 0, 0)),
     ],
 )
-def test_what_it_cannot_do_is_unsupported(command: int, params: tuple[float, ...]) -> None:
+def test_other_actions_are_unsupported(command: int, params: tuple[float, ...]) -> None:
     world, station = a_world()
     station.send(long(command, params))
     world.run(0.3)
@@ -227,7 +227,7 @@ def test_what_it_cannot_do_is_unsupported(command: int, params: tuple[float, ...
     assert done(world) == []
 
 
-def test_nothing_else_that_can_be_commanded_reaches_the_flight_controller() -> None:
+def test_no_other_command_reaches_the_flight_controller() -> None:
     world, station = a_world()
     for command in (*range(CALIBRATION), *range(246, 700), *range(3000, 3010), *range(42400, 42800)):
         station.send(long(command, (1, 1, 1, 1, 1, 1, 1)))
@@ -237,7 +237,7 @@ def test_nothing_else_that_can_be_commanded_reaches_the_flight_controller() -> N
     assert not world.naze.armed
 
 
-# What is refused is said once.
+# Texts of refusals.
 
 
 def test_every_text_fits_a_statustext() -> None:
@@ -246,7 +246,7 @@ def test_every_text_fits_a_statustext() -> None:
     assert all(text.isascii() for text in texts)
 
 
-def test_a_refusal_is_said_once_in_ten_seconds_to_each_and_always_acknowledged() -> None:
+def test_a_refusals_text_goes_once_in_ten_seconds_to_each_station() -> None:
     world, first = a_world()
     for _ in range(7):
         first.send(long(400, (1, 0, 0, 0, 0, 0, 0)))
@@ -264,7 +264,7 @@ def test_a_refusal_is_said_once_in_ten_seconds_to_each_and_always_acknowledged()
     assert len(first.texts()) == 2
 
 
-def test_seven_readings_while_armed_are_refused_with_one_text() -> None:
+def test_seven_downloads_while_armed_are_refused_with_one_text() -> None:
     """Mission Planner asks for the list seven times, 0.7 s apart."""
     world, station = a_world()
     world.faults.armed = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A flight is logged from arming to disarming, whether or not a ground station listens."""
+"""A flight is logged from arming to disarming, with or without a ground station."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class Log:
         self.frames += frames
 
     def take(self) -> Counter[str]:
-        """How many of each message were logged since the last call."""
+        """Messages logged since the last call, counted by name."""
         found = MavlinkSplitter().feed(b"".join(self.frames))
         self.frames.clear()
         return Counter(m.mavlink_map[frame.msgid].msgname for frame in found if frame.msgid != CURRENT_MODE)
@@ -36,7 +36,7 @@ def logged(protocol: TelemetryProtocol) -> tuple[World, Log]:
 
 
 @pytest.mark.parametrize("protocol", [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK])
-def test_a_flight_without_a_ground_station_is_logged_at_the_rates_of_one(protocol: TelemetryProtocol) -> None:
+def test_a_flight_without_a_ground_station_is_logged_at_full_rates(protocol: TelemetryProtocol) -> None:
     world, log = logged(protocol)
     assert log.take() == {}
     world.faults.armed = True
@@ -54,7 +54,7 @@ def test_a_flight_without_a_ground_station_is_logged_at_the_rates_of_one(protoco
     assert log.take() == {}
 
 
-def test_a_ground_station_that_wants_less_does_not_thin_the_log_out() -> None:
+def test_low_requested_rates_do_not_slow_the_log() -> None:
     world, log = logged(TelemetryProtocol.MSP)
     station = GroundStation(world)
     station.send(m.MAVLink_request_data_stream_message(1, 1, 0, 1, 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An armed Harakiri that sends FrSky telemetry and does not hear the bridge: only certain values are shown."""
+"""An armed Harakiri that sends FrSky telemetry and does not hear the bridge: doubtful values are dropped."""
 
 import pytest
 
@@ -15,7 +15,7 @@ HERE = 453838000, 84733000
 
 
 def hear(*reports: FrskyReport) -> Vehicle:
-    """Let them come once a second."""
+    """Receive one report a second."""
     vehicle = Vehicle()
     telemetry = FrskyTelemetry(vehicle)
     for second, report in enumerate(reports):
@@ -27,7 +27,7 @@ def at(north_e7: int, height_m: float | None = None) -> FrskyReport:
     return FrskyReport(height_m, None, None, (HERE[0] + north_e7, HERE[1]))
 
 
-def test_velocity_and_climb_follow_from_two_reports() -> None:
+def test_velocity_and_climb_are_computed_from_two_reports() -> None:
     assert hear(at(0, 3.0)).last(GlobalPosition) is None
     vehicle = hear(at(0, 3.0), at(500, 4.5))
     position, height = vehicle.last(GlobalPosition), vehicle.last(Height)
@@ -38,14 +38,14 @@ def test_velocity_and_climb_follow_from_two_reports() -> None:
     assert (position.altitude_m, height.height_m, height.climb_m_s) == (None, 4.5, 1.5)
 
 
-def test_a_position_that_stands_still_may_be_one_without_a_fix() -> None:
+def test_a_position_that_no_longer_changes_is_taken_for_a_lost_fix() -> None:
     position = hear(at(0), at(500), at(500), at(500)).last(GlobalPosition)
     assert position is not None
     assert position.heard_at == 1
 
 
 @pytest.mark.parametrize("damaged", [at(10_000_000, 8000.0), at(-600_000_000, 60.0)])
-def test_a_jump_is_not_believed(damaged: FrskyReport) -> None:
+def test_a_jump_is_dropped(damaged: FrskyReport) -> None:
     vehicle = hear(at(0, 2.0), at(300, 3.0), damaged, at(900, 5.0))
     position, height = vehicle.last(GlobalPosition), vehicle.last(Height)
     assert position is not None
@@ -55,7 +55,7 @@ def test_a_jump_is_not_believed(damaged: FrskyReport) -> None:
 
 
 class SwitchedReceiver(SimulatedNaze):
-    """A wire to its receiver that can be cut."""
+    """A board whose RX wire can be cut."""
 
     def __init__(self, options: SimOptions, faults: Faults, *, is_deaf: bool = False) -> None:
         super().__init__(options, faults)
@@ -66,7 +66,7 @@ class SwitchedReceiver(SimulatedNaze):
             super().receive(data, now)
 
 
-def test_msp_is_used_again_as_soon_as_it_is_answered() -> None:
+def test_msp_is_used_again_once_the_board_answers_it() -> None:
     faults = Faults()
     board = SwitchedReceiver(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults)
     world = World(faults=faults, peer=board)
@@ -79,7 +79,7 @@ def test_msp_is_used_again_as_soon_as_it_is_answered() -> None:
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.3, 0.6, 0.9])
-def test_a_board_that_never_hears_us_sends_heartbeats_between_its_values(after_s: float) -> None:
+def test_a_deaf_board_is_recognised_by_its_frsky_telemetry(after_s: float) -> None:
     faults = Faults()
     world = World(
         faults=faults, peer=SwitchedReceiver(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults, is_deaf=True)

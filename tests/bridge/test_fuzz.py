@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Anything over UDP, TCP, the UART and in files: nothing raises.
+"""Arbitrary input over UDP, TCP, the UART and in files: nothing raises.
 
-`make fuzz` draws more of it. The seeds of what failed are kept in .hypothesis/fuzz and drawn first the next time.
+`make fuzz` draws more. Failing seeds are kept in .hypothesis/fuzz and tried first next time.
 """
 
 import os
@@ -28,9 +28,9 @@ from tests.support.world import GroundStation, World
 
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "15"))
-#: In one example, so that what one input leaves behind meets the next.
+#: Inputs per example, so that one input's side effects meet the next.
 AT_ONCE = 200
-#: The bridge acts on so many at a time.
+#: Inputs between two runs of the bridge.
 TOGETHER = 10
 
 
@@ -38,7 +38,7 @@ def _fuzz(test: Callable[..., Any]) -> Callable[..., Any]:
     options = settings(
         max_examples=EXAMPLES,
         database=DirectoryBasedExampleDatabase(".hypothesis/fuzz"),
-        phases=(Phase.explicit, Phase.reuse, Phase.generate),  # a smaller seed is no simpler
+        phases=(Phase.explicit, Phase.reuse, Phase.generate),  # shrinking a seed simplifies nothing
         suppress_health_check=list(HealthCheck),
         deadline=None,
     )
@@ -119,5 +119,5 @@ def mission_files() -> list[bytes]:
 
 @cache
 def captures() -> list[bytes]:
-    """The beginnings: a whole capture takes too long."""
+    """Only the beginnings: whole captures take too long."""
     return [path.read_bytes()[:5000] for path in (REPOSITORY / "tests" / "captures").glob("*.uart")]

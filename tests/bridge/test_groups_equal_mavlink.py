@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever the vehicle is, each published group says the same as the MAVLink messages made from it.
+"""Each published group has the same values as the MAVLink messages made from the same vehicle.
 
-Both are compared as a receiver has them: messages packed into a frame, groups as JSON and as CBOR. A value that is null
-in one is unknown in the other, and what MAVLink leaves out as stale has an age that says so.
+Both are compared as received: messages from a packed frame, groups from JSON and CBOR. A null in a group is unknown
+in MAVLink, and a value that MAVLink omits as stale has an age above the limit.
 """
 
 import math
@@ -106,8 +106,8 @@ HOMES = st.none() | st.tuples(st.integers(1, 850000000), st.integers(1, 17999999
 
 
 @dataclass(frozen=True)
-class Told:
-    """A vehicle as subscribers and as ground stations get it."""
+class Receivers:
+    """A vehicle as seen by subscribers and by ground stations."""
 
     vehicle: Vehicle
     report: VehicleReporter
@@ -119,7 +119,7 @@ class Told:
         return decoded(payloads.encode(key, body), str(payloads.encoding(key)))
 
     def message(self, maker: Maker) -> Any:
-        """As received; None if it is not sent."""
+        """The message as received; None if it is not sent."""
         made = maker(make.Moment(self.vehicle, NOW, boot_ms=1))
         if made is None:
             return None
@@ -127,7 +127,7 @@ class Told:
         return m.MAVLink(None).decode(bytearray(made.pack(codec)))
 
     def is_fresh(self, group: Any) -> bool:
-        """As the schemas have it: "above 1.5 it is stale"."""
+        """By the schemas' definition: "above 1.5 it is stale"."""
         return group["age_s"] is not None and group["age_s"] <= 1.5
 
 
@@ -151,7 +151,7 @@ def test_groups_and_messages(
     if home is not None:
         vehicle.hear_home(*home)
     bridge.report.now = NOW
-    told = Told(vehicle, bridge.report, encoding)
+    told = Receivers(vehicle, bridge.report, encoding)
     attitude_is_true(told)
     position_is_true(told)
     home_is_true(told)
@@ -161,7 +161,7 @@ def test_groups_and_messages(
     status_is_true(told)
 
 
-def attitude_is_true(told: Told) -> None:
+def attitude_is_true(told: Receivers) -> None:
     group, sent = told.group(Group.ATTITUDE), told.message(make.attitude)
     assert (sent is not None) == told.is_fresh(group)
     if sent is None:
@@ -177,7 +177,7 @@ def attitude_is_true(told: Told) -> None:
         assert where.hdg == U16 or near_on_circle(group["heading_deg"], where.hdg / 100, 0.011)
 
 
-def position_is_true(told: Told) -> None:
+def position_is_true(told: Receivers) -> None:
     group, sent = told.group(Group.POSITION), told.message(make.global_position_int)
     raw = told.message(make.gps_raw_int)
     if raw is not None and raw.lat:
@@ -193,7 +193,7 @@ def position_is_true(told: Told) -> None:
     assert told.is_fresh(group)
 
 
-def home_is_true(told: Told) -> None:
+def home_is_true(told: Receivers) -> None:
     group = told.group(Group.POSITION)
     sent = told.message(make.home_position)
     if sent is not None:
@@ -208,7 +208,7 @@ def home_is_true(told: Told) -> None:
         assert not told.is_fresh(group)
 
 
-def gps_is_true(told: Told) -> None:
+def gps_is_true(told: Receivers) -> None:
     group, sent = told.group(Group.GPS), told.message(make.gps_raw_int)
     assert (sent is not None) == told.is_fresh(group)
     if sent is None:
@@ -224,7 +224,7 @@ def gps_is_true(told: Told) -> None:
         assert near_on_circle(group["course_deg"], sent.cog / 100, 0.011)
 
 
-def battery_is_true(told: Told) -> None:
+def battery_is_true(told: Receivers) -> None:
     group, sent = told.group(Group.BATTERY), told.message(make.battery_status)
     assert (sent is not None) == (told.is_fresh(group) and group["voltage_v"] is not None)
     if sent is None:
@@ -236,7 +236,7 @@ def battery_is_true(told: Told) -> None:
     assert group["remaining_percent"] == (None if sent.battery_remaining == -1 else sent.battery_remaining)
 
 
-def rc_is_true(told: Told) -> None:
+def rc_is_true(told: Receivers) -> None:
     group, sent = told.group(Group.RC), told.message(make.rc_channels)
     assert (sent is not None) == told.is_fresh(group)
     if sent is None:
@@ -246,7 +246,7 @@ def rc_is_true(told: Told) -> None:
         assert near(group["rssi_percent"], sent.rssi / 254 * 100, 0.5)
 
 
-def status_is_true(told: Told) -> None:
+def status_is_true(told: Receivers) -> None:
     group, sent = told.group(Group.STATUS), told.message(lambda at: make.heartbeat(at.vehicle, is_lost=False))
     assert bool(group["armed"]) == bool(sent.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
     if group["mode"] is not None:

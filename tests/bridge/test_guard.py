@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Write access per link: with a key, with a list of addresses, and in pass-through."""
+"""Write access per link: by key, by list of addresses, and in pass-through."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -21,12 +21,12 @@ from tests.support.world import Air, GroundStation, World
 
 KEY = key_from_passphrase("a passphrase")
 OTHER_KEY = key_from_passphrase("another passphrase")
-#: When the worlds here begin, in seconds since the Unix epoch.
+#: Start time of the worlds here, in seconds since the Unix epoch.
 NOON = 1_795_262_400.0
 LINK_ID = 3
 COMMAND_ARM = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
 
-#: Messages that change something, from every family, and the protocol's reply to a refusal.
+#: Messages that change something, one of each family, and the reply to a refusal.
 WRITES: Sequence[tuple[Message, str | None]] = (
     (count_message(3), "MISSION_ACK"),
     (item_message(0, waypoints(2)[0]), "MISSION_ACK"),
@@ -116,7 +116,7 @@ def refusals(world: World) -> dict[str, int]:
 
 @pytest.mark.parametrize(("message", "answer"), WRITES, ids=named)
 @pytest.mark.parametrize("version", [1, 2])
-def test_what_changes_something_must_be_signed(message: Message, answer: str | None, version: int) -> None:
+def test_messages_that_change_something_must_be_signed(message: Message, answer: str | None, version: int) -> None:
     world = keyed()
     station = GroundStation(world, version=version)
     station.send(message)
@@ -139,14 +139,14 @@ def test_what_changes_something_must_be_signed(message: Message, answer: str | N
 
 @pytest.mark.parametrize("message", READS, ids=named)
 @pytest.mark.parametrize("version", [1, 2])
-def test_reading_is_free(message: Message, version: int) -> None:
+def test_reading_needs_no_signature(message: Message, version: int) -> None:
     world = keyed()
     GroundStation(world, version=version).send(message)
     world.run(0.5)
     assert refusals(world) == {}
 
 
-def test_every_message_that_is_not_known_to_be_harmless_must_be_signed() -> None:
+def test_every_message_not_known_to_be_harmless_must_be_signed() -> None:
     world = keyed()
     station = GroundStation(world)
     free = {message.get_msgId() for message in READS} - {mavlink.MAVLINK_MSG_ID_COMMAND_LONG} | {
@@ -161,7 +161,7 @@ def test_every_message_that_is_not_known_to_be_harmless_must_be_signed() -> None
     assert sum(refusals(world).values()) == len(CRC_EXTRA) - len(free)
 
 
-def test_a_mission_with_the_key_arrives_and_all_that_is_said_is_signed() -> None:
+def test_a_signed_upload_is_accepted_and_every_reply_is_signed() -> None:
     world = keyed()
     station = signing_station(world)
     items = waypoints(8)
@@ -192,7 +192,7 @@ def test_mavlink_1_and_unheard_peers_get_only_signed_frames() -> None:
         assert all(frame[0] == 0xFD and frame[2] & 1 for frame in station.frames_heard)
 
 
-def test_without_the_key_nothing_arrives() -> None:
+def test_without_the_key_an_upload_is_refused() -> None:
     world = keyed()
     station = GroundStation(world)
     station.sign(OTHER_KEY, ticks(NOON))
@@ -218,7 +218,7 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
         assert station.texts() == ["Refused: not signed"]
 
 
-def test_a_recorded_frame_is_worth_nothing() -> None:
+def test_a_replayed_frame_is_refused() -> None:
     world = keyed()
     station = signing_station(world)
     frame = station.pack(clear_message())
@@ -231,12 +231,12 @@ def test_a_recorded_frame_is_worth_nothing() -> None:
         world.spoken_by(speaker, frame)
     world.run(2)
     assert refusals(world) == {Check.REPLAYED.value: 2}
-    # The copy is refused; the pilot is not told, because the network may have duplicated the frame.
+    # The copy is refused silently, because the network may have duplicated the frame.
     assert [ack.type for ack in thief.said("MISSION_ACK")] == [MissionResult.DENIED]
     assert len(station.said("MISSION_ACK")) == 1
 
 
-def test_reading_makes_older_recordings_worthless_too() -> None:
+def test_after_a_signed_read_older_recordings_are_refused() -> None:
     world = keyed()
     station = signing_station(world)
     lost = station.pack(clear_message())
@@ -276,7 +276,7 @@ def test_an_unsigned_frame_cannot_end_the_pilots_upload() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_an_upload_over_a_network_that_loses_and_doubles(seed: int) -> None:
+def test_a_signed_upload_over_a_network_that_loses_and_duplicates(seed: int) -> None:
     world = World(seed=seed, speeds=(115200,), links={"udp": LinkAccess(signing(), LINK_ID)})
     world.wait_ready()
     station = GroundStation(world, air=Air(loss=0.05, repeat=0.3, delay_s=0.02))
@@ -309,7 +309,7 @@ def test_a_pi_without_a_clock_continues_after_a_reboot() -> None:
     world.spoken_by(station, frame)
     world.run(2)
     stored = ticks(NOON) + TOLERANCE
-    # It starts in 1970, with what was stored last: streams included.
+    # The clock starts in 1970; the stored state, streams included, was loaded.
     after = signing(Clock(0.0), at_least=stored)
     after.streams.update(before.streams)
     rebooted = keyed(after)
@@ -336,7 +336,7 @@ def test_an_unlisted_address_may_only_read() -> None:
     assert all(frame[0] == 0xFE or not frame[2] & 1 for frame in guest.frames_heard)
 
 
-def test_a_key_and_a_list_ask_for_both() -> None:
+def test_with_a_key_and_a_list_both_are_required() -> None:
     access = LinkAccess(signing(), LINK_ID, lambda peer: peer.key == "pilot")
     world = World(speeds=(115200,), links={"udp": access})
     world.wait_ready()
@@ -351,11 +351,11 @@ def test_a_link_without_access_rules_is_open() -> None:
     assert Upload(GroundStation(world), waypoints(3)).run() is MissionResult.ACCEPTED
 
 
-# An autopilot that speaks for itself.
+# An autopilot that speaks MAVLink itself.
 
 
 @pytest.mark.parametrize(("message", "answer"), WRITES, ids=named)
-def test_nothing_unsigned_reaches_an_autopilot_that_speaks_for_itself(message: Message, answer: str | None) -> None:
+def test_unsigned_frames_are_not_passed_to_a_mavlink_autopilot(message: Message, answer: str | None) -> None:
     world, autopilot = passing({"udp": LinkAccess(signing(), LINK_ID)}, sysid=1)
     other = GroundStation(world, "other", sysid=250)
     other.send(READS[0])
@@ -371,7 +371,7 @@ def test_nothing_unsigned_reaches_an_autopilot_that_speaks_for_itself(message: M
         assert len(station.said(answer)) == 1
 
 
-def test_the_refusal_comes_in_the_name_of_the_autopilot() -> None:
+def test_a_refusal_has_the_autopilots_ids() -> None:
     world, _ = passing({"udp": LinkAccess(may_write=lambda _: False)}, sysid=42)
     station = GroundStation(world)
     station.send(mavlink.MAVLink_command_long_message(42, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
@@ -382,7 +382,7 @@ def test_the_refusal_comes_in_the_name_of_the_autopilot() -> None:
     assert refusals(world) == {"this address may only read": 2}
 
 
-def test_signed_frames_reach_the_autopilot_as_they_were_sent() -> None:
+def test_signed_frames_reach_the_autopilot_unchanged() -> None:
     world, autopilot = passing({"udp": LinkAccess(signing(), LINK_ID)})
     station = signing_station(world)
     frames = [station.pack(message) for message, _ in WRITES]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions for a Harakiri that answers only MAVLink, by its own mission messages."""
+"""Missions to a Harakiri that answers only MAVLink, using its own mission messages."""
 
 import re
 import struct
@@ -39,7 +39,7 @@ def mavlink_only(
 
 
 def mixed() -> list[MissionItem]:
-    """One of each that Harakiri knows."""
+    """One item of each kind that Harakiri supports."""
     items = waypoints(10)
     items[1] = replace(items[1], command=Command.NAV_TAKEOFF, lat_e7=0, lon_e7=0, alt_m=10.0)
     items[2] = replace(items[2], command=Command.DO_SET_ROI)
@@ -51,12 +51,12 @@ def mixed() -> list[MissionItem]:
     return items
 
 
-#: The rules where coordinates go through single precision.
+#: The rules for coordinates sent in single precision.
 RULES = HarakiriRules(is_single_precision=True)
 
 
 def holds(world: World, items: list[MissionItem]) -> bool:
-    """True if the board's list reads as the rules make it of these items."""
+    """True if the board's list equals these items after the rules."""
     read = [replace(each, lat_e7=readable_e7(each.lat_e7), lon_e7=readable_e7(each.lon_e7)) for each in world.stored]
     return tuple(read) == check_list(items, RULES).records
 
@@ -66,7 +66,7 @@ def near(one: int | None, other: int | None) -> bool:
 
 
 @pytest.mark.parametrize("items", [waypoints(2), mixed(), waypoints(146)], ids=["2", "mixed", "146"])
-def test_a_list_is_written_read_back_and_accepted(items: list[MissionItem]) -> None:
+def test_a_list_is_written_verified_and_accepted(items: list[MissionItem]) -> None:
     world, station = mavlink_only()
     assert Upload(station, items).run() is A.ACCEPTED
     assert holds(world, items)
@@ -80,7 +80,7 @@ def test_a_list_is_written_read_back_and_accepted(items: list[MissionItem]) -> N
     world.assert_line_was_clean()
 
 
-def test_a_list_that_was_there_is_read() -> None:
+def test_an_earlier_list_is_read() -> None:
     world, station = mavlink_only()
     assert Upload(station, mixed()).run() is A.ACCEPTED
     world.unplug()
@@ -89,7 +89,7 @@ def test_a_list_that_was_there_is_read() -> None:
     world.wait_until(lambda w: w.bridge.session.vehicle.armed is False, 8)
     read = Download(station).run()
     assert read is not None
-    # A region of interest, too, as it was sent: the list is known again.
+    # The region of interest, too, is returned as sent: the list is recognised.
     assert [item.command for item in read] == [item.command for item in mixed()]
 
 
@@ -113,7 +113,7 @@ def test_armed_is_denied() -> None:
 
 
 @pytest.mark.parametrize("hazard", [0x0D, 0x23, 0x52])
-def test_a_list_that_would_set_off_a_trap_is_refused(hazard: int) -> None:
+def test_a_list_with_hazard_bytes_is_refused(hazard: int) -> None:
     world, station = mavlink_only()
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
     degrees = trapped_degrees(hazard)
@@ -126,18 +126,18 @@ def test_a_list_that_would_set_off_a_trap_is_refused(hazard: int) -> None:
 
 
 def trapped_degrees(hazard: int) -> float:
-    """Return a latitude whose single-precision bytes hold three hazard bytes in a row."""
+    """A latitude whose single-precision bytes have three hazard bytes in a row."""
 
     for high in range(256):
         (degrees,) = struct.unpack("<f", bytes((hazard, hazard, hazard, high)))
         if 1 <= abs(degrees) <= 89:
             return float(degrees)
-    # The exponent's bytes do not allow it: the run begins in the field before.
+    # Not possible with the exponent's bytes: the run begins in the previous field.
     raise AssertionError(hazard)
 
 
 @pytest.mark.parametrize("rate", [3e-4, 1e-3])
-def test_a_bad_line_costs_time_and_never_the_truth(rate: float) -> None:
+def test_on_a_bad_line_the_result_is_true(rate: float) -> None:
     outcomes = set()
     for seed in range(6):
         world, station = mavlink_only(seed=seed)
@@ -154,7 +154,7 @@ def test_a_bad_line_costs_time_and_never_the_truth(rate: float) -> None:
     assert A.ACCEPTED in outcomes
 
 
-def test_an_unpatched_harakiri_that_answers_msp_is_told_what_it_lacks() -> None:
+def test_for_an_unpatched_harakiri_on_msp_the_pilot_learns_the_reason() -> None:
     faults = Faults(extension=False)
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=(115200,))
     world.wait_until(lambda w: w.kind is harakiri.UNPATCHED, 8)
@@ -164,7 +164,7 @@ def test_an_unpatched_harakiri_that_answers_msp_is_told_what_it_lacks() -> None:
 
 @example(3384)
 @given(st.integers(-1_800_000_000, 1_800_000_000) | st.integers(-20_000_000, 20_000_000) | st.integers(-1000, 1000))
-def test_a_place_that_was_read_is_written_as_it_was_read(value_e7: int) -> None:
+def test_a_position_read_from_the_board_is_written_back_unchanged(value_e7: int) -> None:
     readable = readable_e7(value_e7)
     assert readable_e7(readable) == readable
     degrees = abs(value_e7) / 1e7
@@ -172,9 +172,7 @@ def test_a_place_that_was_read_is_written_as_it_was_read(value_e7: int) -> None:
 
 
 @pytest.mark.parametrize(("is_there", "outcome"), [(True, Outcome.VERIFIED), (False, Outcome.FAILED)])
-def test_a_mission_that_a_killed_daemon_left_pending_is_settled_in_mavlink_mode_too(
-    is_there: bool, outcome: Outcome
-) -> None:
+def test_a_mission_left_pending_by_a_killed_daemon_is_settled_in_mavlink_mode(is_there: bool, outcome: Outcome) -> None:
     flash = memoryview(bytearray(b"\xff") * flash_size(SimOptions()))
     _, station = mavlink_only(flash=flash)
     assert Upload(station, waypoints(12, seed=0 if is_there else 1)).run() is A.ACCEPTED

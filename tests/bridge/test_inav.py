@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions to INAV and MultiWii NAV through the whole bridge: proof, faults, arming, clearing, progress."""
+"""Missions to INAV and MultiWii NAV through the whole bridge: verification, faults, arming, clearing, progress."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,7 +30,7 @@ CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
 def plan(count: int, seed: int = 0) -> list[MissionItem]:
     """Waypoints that INAV stores as they are."""
     home, *legs = waypoints(count, seed)
-    # Read as it was sent, for this is where the fake has its home.
+    # The fake's own home, so that it reads back as sent.
     home = replace(home, lat_e7=453838000, lon_e7=84733000)
     return [replace(item, p2=0.0) for item in (home, *legs)]
 
@@ -48,7 +48,7 @@ def found(peer: FakeInav) -> tuple[World, GroundStation]:
 @pytest.mark.parametrize(
     ("make", "kind", "capacity"), [(FakeInav, inav.PROFILE, 120), (FakeMultiwii, multiwii.PROFILE, 60)]
 )
-def test_it_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
+def test_the_board_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
     world, _ = found(make())
     assert world.kind is kind
     assert world.bridge.session.controller is not None
@@ -81,7 +81,7 @@ def test_each_record_is_read_before_the_next_is_sent() -> None:
         assert (mission[n + 1].command, mission[n + 1].payload[0]) == (Nav.WP, mission[n].payload[0])
 
 
-def test_multiwii_holds_a_way_home_until_the_whole_list_is_there() -> None:
+def test_multiwii_holds_a_return_home_until_the_list_is_complete() -> None:
     multiwii = FakeMultiwii()
     world, station = found(multiwii)
     first = plan(20)
@@ -94,7 +94,7 @@ def test_multiwii_holds_a_way_home_until_the_whole_list_is_there() -> None:
         world.run(0.01)
         seen.add(len(multiwii.flown))
     assert upload.result is DENIED
-    # What it would have flown at any moment: the old list, or nothing but the way home.
+    # At any moment it would have flown the old list or a return home.
     assert seen <= {19, 1}
 
 
@@ -118,7 +118,7 @@ def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> N
     assert "refused a record" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
 
 
-def test_where_there_was_nothing_half_a_list_stays_that_cannot_be_flown() -> None:
+def test_half_a_list_on_an_empty_board_cannot_be_flown() -> None:
     inav = FakeInav(drop=lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 20 else "")
     world, station = found(inav)
     assert Upload(station, plan(40)).run() is DENIED
@@ -128,7 +128,7 @@ def test_where_there_was_nothing_half_a_list_stays_that_cannot_be_flown() -> Non
 
 
 @pytest.mark.parametrize("make", [FakeInav, FakeMultiwii])
-def test_losses_only_cost_time(make: Callable[[], FakeInav]) -> None:
+def test_losses_only_delay_the_upload(make: Callable[[], FakeInav]) -> None:
     for seed in range(6):
         peer = make()
         peer.drop = lossy(0.05, seed)
@@ -138,7 +138,7 @@ def test_losses_only_cost_time(make: Callable[[], FakeInav]) -> None:
         assert Download(station).run() == plan(30, seed)
 
 
-def test_armed_nothing_is_sent() -> None:
+def test_nothing_is_sent_while_armed() -> None:
     inav = FakeInav()
     world, station = found(inav)
     inav.armed = True
@@ -150,7 +150,7 @@ def test_armed_nothing_is_sent() -> None:
     assert any("disarm" in text for text in station.texts())
 
 
-def test_armed_before_the_status_is_polled_it_is_asked_for() -> None:
+def test_the_arming_state_is_read_before_a_transfer() -> None:
     inav = FakeInav()
     world, _ = found(inav)
     upload = Upload(GroundStation(world, "far", air=Air(delay_s=0.02)), plan(10))
@@ -161,7 +161,7 @@ def test_armed_before_the_status_is_polled_it_is_asked_for() -> None:
     assert inav.writes == 0
 
 
-def test_armed_in_the_middle_the_last_record_is_never_sent() -> None:
+def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     inav = FakeInav()
     world, station = found(inav)
     assert Upload(station, plan(10)).run() is ACCEPTED
@@ -189,7 +189,7 @@ def test_a_save_that_fails_is_reported() -> None:
     assert inav.is_valid
 
 
-def test_cleared_is_a_single_way_home_and_reads_as_nothing() -> None:
+def test_a_cleared_list_is_one_return_home_and_reads_as_empty() -> None:
     for board in (FakeInav(), FakeMultiwii()):
         world, station = found(board)
         assert Upload(station, plan(10)).run() is ACCEPTED
@@ -204,7 +204,7 @@ def test_cleared_is_a_single_way_home_and_reads_as_nothing() -> None:
         assert Download(other_station).run()[1:] == []
 
 
-def test_a_link_lost_in_the_middle_is_reported_and_the_next_upload_works() -> None:
+def test_a_link_lost_during_a_transfer_is_reported_and_the_next_upload_works() -> None:
     inav = FakeInav()
     world, station = found(inav)
     upload = Upload(station, plan(60))
@@ -217,7 +217,7 @@ def test_a_link_lost_in_the_middle_is_reported_and_the_next_upload_works() -> No
     assert Upload(station, plan(60)).run() is ACCEPTED
 
 
-def test_foreign_records_are_shown_and_damage_nothing() -> None:
+def test_foreign_records_are_shown() -> None:
     inav = FakeInav()
     inav.records = [bytes((99, *range(18), 0)), bytes((6, *bytes(12), 0x9C, 0xFF, *bytes(4), LAST))]
     inav.is_valid = True
@@ -228,7 +228,7 @@ def test_foreign_records_are_shown_and_damage_nothing() -> None:
     assert (shown[0].lat_e7, shown[0].lon_e7) == (453838000, 84733000)
 
 
-def test_the_item_that_is_flown_to_and_those_reached_are_reported() -> None:
+def test_the_current_item_and_reached_items_are_reported() -> None:
     inav = FakeInav()
     world, station = found(inav)
     speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
@@ -255,7 +255,7 @@ def test_the_item_that_is_flown_to_and_those_reached_are_reported() -> None:
 
 
 def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -> None:
-    """INAV takes a '#' that is not in a frame, and 100 ms of silence, for its user: MSP is dead from then on."""
+    """INAV opens its CLI on a '#' outside a frame followed by 100 ms of silence, and then no longer answers MSP."""
     for lost in range(1, 12):
         inav = FakeInav()
         world, station = found(inav)
@@ -276,8 +276,8 @@ def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -
         assert all(any(at < later < at + 0.1 for later in moments) for at in risky)
 
 
-def test_only_a_question_tells_that_a_telemetry_reply_is_not_a_record() -> None:
-    """Home is asked for with the same command: its answer is not taken for the record that was written."""
+def test_a_reply_for_home_is_not_taken_for_a_written_record() -> None:
+    """Telemetry reads home with the same command."""
     inav = FakeInav()
     world, station = found(inav)
     upload = Upload(station, plan(40))
@@ -290,7 +290,7 @@ def test_only_a_question_tells_that_a_telemetry_reply_is_not_a_record() -> None:
 
 
 @pytest.mark.parametrize("name", [b"BTFL", b"CLFL", b"INAV"])
-def test_others_are_telemetry_only(name: bytes) -> None:
+def test_other_firmware_is_telemetry_only(name: bytes) -> None:
     board = FakeInav()
     board.answers = {1: b"\0\1\x2a", 2: name, 119: bytes((0, 1, 2)), 116: b"ARM;ANGLE;"}
     board.answer = lambda frame: (  # type: ignore[method-assign]
@@ -305,7 +305,7 @@ def test_others_are_telemetry_only(name: bytes) -> None:
     assert not {Nav.SET_WP, Nav.SAVE, Nav.LOAD} & set(board.commands)
 
 
-def test_the_boxes_of_a_betaflight_whose_names_outgrow_a_frame() -> None:
+def test_the_arm_box_of_a_betaflight_whose_box_names_exceed_a_frame() -> None:
     board = FakeInav()
     board.answers = {2: b"BTFL", 119: bytes((0, 1, 46, 11))}
     board.answer = lambda frame: (  # type: ignore[method-assign]
@@ -320,7 +320,7 @@ def test_the_boxes_of_a_betaflight_whose_names_outgrow_a_frame() -> None:
 
 
 def test_a_crashing_record_is_not_written_back() -> None:
-    """Somebody else left a JUMP to 0 there; the push after it fails, and the old list cannot be restored."""
+    """Another program left a JUMP to 0; the next push fails, and the old list cannot be restored."""
     inav = FakeInav()
     waypoint, *_ = packed(plan(3))
     jump = bytes((NavAction.JUMP, *bytes(18), 0))
@@ -344,7 +344,7 @@ def test_a_list_replaced_by_another_program_is_not_restored() -> None:
     assert "no mission to fly" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
 
 
-def test_a_save_whose_answer_is_lost_is_done_again() -> None:
+def test_a_save_whose_reply_is_lost_is_repeated() -> None:
     lost = iter(("reply",))
     inav = FakeInav(drop=lambda frame: next(lost, "") if frame.command == Nav.SAVE else "")
     _, station = found(inav)
@@ -353,7 +353,7 @@ def test_a_save_whose_answer_is_lost_is_done_again() -> None:
 
 
 @pytest.mark.parametrize("erased", [bytes(19) + b"\xfe", b"\xff" * 20])
-def test_an_erased_place_ends_the_reading_of_a_multiwii(erased: bytes) -> None:
+def test_reading_a_multiwii_ends_at_an_erased_record(erased: bytes) -> None:
     multiwii = FakeMultiwii()
     multiwii.erased = erased
     multiwii.places[1] = packed(plan(9))[0]
@@ -363,17 +363,17 @@ def test_an_erased_place_ends_the_reading_of_a_multiwii(erased: bytes) -> None:
     assert {frame.payload[0] for frame in asked} == {0, 1, 2}
 
 
-def test_a_multiwii_is_not_made_to_store_what_it_holds() -> None:
+def test_records_that_a_multiwii_already_holds_are_not_written() -> None:
     multiwii = FakeMultiwii()
     _, station = found(multiwii)
     assert Upload(station, plan(20)).run() is ACCEPTED
     written = multiwii.writes
     assert Upload(station, plan(20)).run() is ACCEPTED
-    # The way home while it is checked, and the first record again.
+    # Only the return home for the time of the check, and the first record again.
     assert multiwii.writes == written + 2
 
 
-def test_if_the_first_record_never_came_the_old_list_is_read_and_said_to_be_kept() -> None:
+def test_if_the_first_record_is_lost_the_old_list_is_reported_kept() -> None:
     inav = FakeInav()
     world, station = found(inav)
     assert Upload(station, plan(12)).run() is ACCEPTED

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions to the simulated INAV and MultiWii (simulator), which have every trap of docs/inav.md."""
+"""Missions to the simulated INAV and MultiWii, which have every hazard of docs/inav.md."""
 
 from typing import Any
 
@@ -55,7 +55,7 @@ def board_with(
 
 
 def mixed() -> list[MissionItem]:
-    """Home and one of everything that INAV can hold."""
+    """Home and one item of each kind that INAV can hold."""
     home, *legs = plan(len(MIXED) + 1)
     items = []
     for leg, (command, p1) in zip(legs, MIXED, strict=True):
@@ -68,7 +68,7 @@ def mixed() -> list[MissionItem]:
 
 
 def without_home(items: list[MissionItem]) -> list[MissionItem]:
-    """Home is where the board has it."""
+    """Home is read from the board, not from the list."""
     return items[1:]
 
 
@@ -88,7 +88,7 @@ def test_a_mission_comes_back_as_it_was_sent_on_each_version(version: str) -> No
     assert without_home(Download(station).run()) == without_home(sent)
 
 
-def test_a_multiwii_holds_what_it_can() -> None:
+def test_a_multiwii_holds_the_items_it_supports() -> None:
     board, world, station = board_with("multiwii", capacity=40)
     assert world.kind is multiwii.PROFILE
     assert Upload(station, plan(42), tries=60).run() is MissionResult.NO_SPACE
@@ -102,7 +102,7 @@ def test_a_multiwii_holds_what_it_can() -> None:
 
 
 @pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
-def test_armed_nothing_is_changed(version: str) -> None:
+def test_nothing_is_changed_while_armed(version: str) -> None:
     board, world, station = board_with(version=version)
     assert Upload(station, plan(10)).run() is ACCEPTED
     before = board.stored_records
@@ -117,7 +117,7 @@ def test_armed_nothing_is_changed(version: str) -> None:
 
 
 @pytest.mark.parametrize("moment", [0.05, 0.2, 0.5, 0.7, 0.75, 0.8, 0.85])
-def test_armed_at_any_moment_no_half_list_can_be_flown(moment: float) -> None:
+def test_arming_at_any_moment_flies_no_half_list(moment: float) -> None:
     board, world, station = board_with()
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(100, 1))
@@ -133,7 +133,7 @@ def test_armed_at_any_moment_no_half_list_can_be_flown(moment: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_on_a_line_that_damages_bytes_no_trap_is_set_off(seed: int) -> None:
+def test_damaged_bytes_set_off_no_hazard(seed: int) -> None:
     faults = Faults(boxes=0)
     board, world, station = board_with(faults=faults, version="7.1.2", seed=seed)
     faults.lost_byte_rate = faults.bit_error_rate = 5e-4
@@ -147,8 +147,8 @@ def test_on_a_line_that_damages_bytes_no_trap_is_set_off(seed: int) -> None:
     assert (result is ACCEPTED) <= (read == without_home(plan(40, seed)))
 
 
-def test_on_a_wire_the_transfer_takes_its_bytes() -> None:
-    """But for the time until the board looks at its port."""
+def test_a_transfer_takes_little_more_than_its_time_on_the_wire() -> None:
+    """Apart from the time until the board reads its port."""
     board, world, station = board_with(eeprom_write_ms=0.0, serial_task_ms=0.1)
     upload = Upload(station, plan(121))
     began = world.now
@@ -161,7 +161,7 @@ def test_on_a_wire_the_transfer_takes_its_bytes() -> None:
     assert board.counters.rx_overflows == 0
 
 
-def test_a_board_that_serves_a_request_each_10_ms_is_served() -> None:
+def test_a_transfer_to_a_board_that_serves_one_request_per_10_ms() -> None:
     _, world, station = board_with(serial_task_ms=10.0)
     upload = Upload(station, plan(61))
     assert upload.run() is ACCEPTED
@@ -170,8 +170,8 @@ def test_a_board_that_serves_a_request_each_10_ms_is_served() -> None:
     assert sent.count(Nav.SET_WP) == 60
 
 
-def test_polls_wait_for_their_turn_on_such_a_board() -> None:
-    """Several requests at once are served one after the other: none of them is lost."""
+def test_polls_to_a_slow_board_are_not_lost() -> None:
+    """The board serves one request per 10 ms."""
     _, world, station = board_with(serial_task_ms=10.0)
     assert Upload(station, plan(41)).run() is ACCEPTED
     assert world.bridge.session.link is not None
@@ -183,7 +183,7 @@ def test_polls_wait_for_their_turn_on_such_a_board() -> None:
     assert len(station.said("ATTITUDE")) > 5 * 18
 
 
-def test_a_mission_that_is_flown_is_reported_item_by_item() -> None:
+def test_mission_progress_is_reported_item_by_item() -> None:
     board, world, station = board_with()
     home = world.bridge.session.vehicle.home
     assert home is not None
@@ -217,7 +217,7 @@ wild = st.builds(
 
 @given(st.lists(wild, min_size=2, max_size=10))
 @settings(max_examples=25, deadline=None)
-def test_whatever_the_rules_let_pass_the_board_arms_with(items: list[MissionItem]) -> None:
+def test_the_board_arms_with_any_list_that_the_rules_accept(items: list[MissionItem]) -> None:
     sent = [plan(1)[0], *items]
     if not check_list(sent, NavRules(inav_profile())).records:
         return
@@ -229,7 +229,7 @@ def test_whatever_the_rules_let_pass_the_board_arms_with(items: list[MissionItem
     assert board.counters.crashes == 0
 
 
-def test_a_stop_in_the_middle_loads_the_old_list_again() -> None:
+def test_a_stop_during_a_transfer_loads_the_old_list_again() -> None:
     board, world, station = board_with()
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(100, 1))
@@ -242,8 +242,8 @@ def test_a_stop_in_the_middle_loads_the_old_list_again() -> None:
 
 
 @pytest.mark.parametrize("size", [21, 100, 192])
-def test_a_frame_that_somebody_left_unfinished_does_not_hide_the_board(size: int) -> None:
-    """Its parser has no timeout: it waits for the rest, and takes our questions for it."""
+def test_an_unfinished_frame_in_its_parser_does_not_hide_the_board(size: int) -> None:
+    """The parser has no timeout: it takes the bridge's requests for the rest of the frame."""
     board = make_board("inav", MspOptions())
     world = World(speeds=(115200,), peer=board, plugged=False)
     world.run(0.5)

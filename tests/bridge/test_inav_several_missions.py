@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV with several missions in its store, and lists changed on the board without the bridge."""
+"""INAV with several stored missions, and lists changed on the board by other programs."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ NOTHING_MORE = NavWaypoint().pack(0)[1:]
 
 
 class Bench:
-    """A board in whose EEPROM another planner has put missions of so many records."""
+    """A board whose EEPROM has missions of the given sizes from another planner."""
 
     def __init__(self, *sizes: int, faults: Faults | None = None, is_loaded: bool = True) -> None:
         records = [record for mission in sets(*sizes) for record in mission]
@@ -48,7 +48,7 @@ class Bench:
         self.world.run(5)
 
     def stored(self) -> list[list[bytes]]:
-        """The missions in the EEPROM, without the numbers of their records."""
+        """The missions in the EEPROM, without record numbers."""
         records = [bytes(self.eeprom[at + 1 : at + WAYPOINT_SIZE]) for at in range(0, len(self.eeprom), WAYPOINT_SIZE)]
         missions: list[list[bytes]] = [[]]
         for record in records:
@@ -68,7 +68,7 @@ class Bench:
         return [] if held is None else [record.pack() for record in held.records]
 
     def told(self) -> str:
-        """All texts so far; long ones come in pieces."""
+        """All texts so far; long ones arrive in pieces."""
         self.world.run(0.1)
         return " ".join(self.station.texts())
 
@@ -88,7 +88,7 @@ def others_of(bench: Bench) -> list[list[bytes]]:
 
 
 @pytest.mark.parametrize("selected", [1, 2, 3])
-def test_read_shows_the_one_that_is_loaded(selected: int) -> None:
+def test_a_download_shows_the_loaded_mission(selected: int) -> None:
     bench = Bench(4, 6, 9, faults=Faults(boxes=0, selected_mission=selected))
     shown = Download(bench.station).run()
     assert without_home(shown) == without_home(plan((5, 7, 10)[selected - 1], selected))
@@ -96,7 +96,7 @@ def test_read_shows_the_one_that_is_loaded(selected: int) -> None:
 
 
 @pytest.mark.parametrize("selected", [1, 2])
-def test_write_replaces_the_loaded_one_and_keeps_the_others(selected: int) -> None:
+def test_an_upload_replaces_the_loaded_mission_and_keeps_the_others(selected: int) -> None:
     bench = Bench(4, 6, 9, faults=Faults(boxes=0, selected_mission=selected))
     bench.faults.selected_mission = 0
     assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
@@ -108,7 +108,7 @@ def test_write_replaces_the_loaded_one_and_keeps_the_others(selected: int) -> No
     assert others_of(bench) == kept
 
 
-def test_what_does_not_fit_is_reported_before_and_copied_to_the_pi() -> None:
+def test_missions_that_no_longer_fit_are_reported_and_copied_to_the_pi() -> None:
     bench = Bench(4, 30, 60)
     assert Upload(bench.station, plan(81, 7)).run() is ACCEPTED
     assert bench.stored() == [packed(plan(81, 7)), sets(4, 30)[1]]
@@ -117,8 +117,8 @@ def test_what_does_not_fit_is_reported_before_and_copied_to_the_pi() -> None:
     assert "Mission of 60 records does not fit" in bench.told()
 
 
-def test_what_items_cannot_show_survives_a_read_and_a_write() -> None:
-    """The list of another planner: a user action, a leg that flies home, a landing's ground elevation."""
+def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> None:
+    """From another planner: a user action, a leg that flies home, a landing's ground elevation."""
     legs = [
         waypoint(1, p3=0b110),
         waypoint(2, flag=FLAG_HOME),
@@ -137,7 +137,7 @@ def test_what_items_cannot_show_survives_a_read_and_a_write() -> None:
     assert bench.world.store.missions[-1][0].verdict.findings == ()
 
 
-def test_clear_clears_the_loaded_one() -> None:
+def test_clear_clears_the_loaded_mission() -> None:
     bench = Bench(4, 6)
     bench.station.send(clear_message())
     bench.world.run(3)
@@ -146,7 +146,7 @@ def test_clear_clears_the_loaded_one() -> None:
     assert bench.flown() == []
 
 
-def test_a_push_that_breaks_off_brings_all_of_them_back() -> None:
+def test_after_a_failed_push_all_missions_are_restored() -> None:
     bench = Bench(4, 6)
     upload = Upload(bench.station, plan(100, 7))
     bench.world.run(0.4)
@@ -157,7 +157,7 @@ def test_a_push_that_breaks_off_brings_all_of_them_back() -> None:
     assert bench.flown() == sets(4, 6)[0]
 
 
-def test_missions_are_split_at_their_ends_and_the_last_give_way() -> None:
+def test_missions_are_split_at_their_last_records_and_the_last_are_dropped() -> None:
     records = check_list(plan(10), RULES).records
     one, two = records[:3], records[3:9]
     ended = (*one[:2], replace(one[2], flag=LAST)), (*two[:5], replace(two[5], flag=LAST))
@@ -177,7 +177,7 @@ def restart(bench: Bench) -> None:
     bench.world.run(3)
 
 
-def test_after_a_restart_the_saved_mission_is_loaded_again_and_told() -> None:
+def test_after_a_restart_the_saved_mission_is_loaded_and_reported() -> None:
     bench = Bench()
     assert Upload(bench.station, plan(13)).run() is ACCEPTED
     restart(bench)
@@ -186,13 +186,13 @@ def test_after_a_restart_the_saved_mission_is_loaded_again_and_told() -> None:
     assert bench.flown() == packed(plan(13))
 
 
-def test_a_saved_mission_that_is_not_ours_is_called_that() -> None:
+def test_a_saved_mission_from_another_planner_is_reported_as_such() -> None:
     bench = Bench(4)
     assert "not written by naze-bridge" in bench.told()
     assert bench.flown() == sets(4)[0]
 
 
-def test_armed_it_is_not_loaded_and_that_is_reported_until_it_is_disarmed() -> None:
+def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
     bench = Bench(4, faults=Faults(boxes=0, armed=True))
     assert bench.told().count("No mission is loaded: disarm to load the saved one") == 1
     assert Download(bench.station).run() in ([], None)
@@ -202,7 +202,7 @@ def test_armed_it_is_not_loaded_and_that_is_reported_until_it_is_disarmed() -> N
 
 
 @pytest.mark.parametrize("armed", [False, True])
-def test_a_mission_chosen_by_the_sticks_is_noticed_within_two_seconds(armed: bool) -> None:
+def test_a_mission_selected_by_sticks_is_noticed_within_two_seconds(armed: bool) -> None:
     bench = Bench(4, 6)
     bench.faults.armed = armed
     bench.world.run(3)
@@ -214,7 +214,7 @@ def test_a_mission_chosen_by_the_sticks_is_noticed_within_two_seconds(armed: boo
     assert "changed: 6 records" in bench.told()
 
 
-def test_another_clients_list_is_noticed_and_its_flight_is_shown_right() -> None:
+def test_another_clients_list_is_noticed_and_its_progress_is_correct() -> None:
     bench = Bench(9)
     assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
     bench.eeprom[: 4 * WAYPOINT_SIZE] = b"".join(
@@ -259,7 +259,7 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
 def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_hz: int) -> None:
-    """The board serves one request in 10 ms, and a ground station wants all telemetry at once."""
+    """The board serves one request per 10 ms, and a ground station requests all telemetry."""
     board, world, station = board_with(serial_task_ms=10.0)
     assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
     for stream in range(1, 13) if streams_hz else ():
@@ -274,7 +274,7 @@ def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_
     assert [record.pack() for record in world.bridge.missions.held.records] == other  # type: ignore[union-attr]
 
 
-def test_one_other_record_in_the_longest_list_is_noticed_by_the_upload_itself() -> None:
+def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> None:
     board, world, station = board_with(serial_task_ms=10.0)
     assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
     world.run(3)
@@ -308,7 +308,7 @@ def test_a_list_that_another_client_left_unfinished_is_reported() -> None:
 
 
 def test_a_multiwii_is_not_read_in_flight() -> None:
-    """Its reply to a read would be the record that it flies."""
+    """Reading a record would change the record that it flies."""
     board, world, station = board_with("multiwii")
     assert Upload(station, plan(9), tries=60).run(60) is ACCEPTED
     board.faults.armed, board.faults.boxes = True, 1 << 10
@@ -323,8 +323,8 @@ def test_a_multiwii_is_not_read_in_flight() -> None:
 
 
 @pytest.mark.parametrize("is_blank", [False, True])
-def test_a_multiwii_that_was_read_still_hovers_after_a_return_home_by_the_switch(is_blank: bool) -> None:
-    """It would land if the record that it read last had a p1: a hold, or an erased record."""
+def test_after_a_read_a_multiwii_still_hovers_at_the_end_of_a_return_home(is_blank: bool) -> None:
+    """It would land if the last record read had a p1 (a hold, or an erased record)."""
     board, world, station = board_with("multiwii")
     if not is_blank:
         items = [replace(item, p1=7.0) for item in plan(9)]
@@ -341,7 +341,7 @@ def test_a_multiwii_that_was_read_still_hovers_after_a_return_home_by_the_switch
     assert board.counters.flash_writes == written
 
 
-def test_a_multiwii_that_holds_nothing_is_watched_without_news() -> None:
+def test_polling_an_empty_multiwii_reports_nothing() -> None:
     _, world, station = board_with("multiwii")
     before = len(world.written)
     world.run(5)
@@ -350,7 +350,7 @@ def test_a_multiwii_that_holds_nothing_is_watched_without_news() -> None:
     assert [frame.payload for frame in asked if frame.command == Nav.WP and frame.payload[0] > 1] == []
 
 
-def test_a_push_that_breaks_off_for_good_is_mended_by_the_saved_mission() -> None:
+def test_after_a_push_that_fails_for_good_the_saved_mission_is_loaded() -> None:
     bench = Bench()
     assert Upload(bench.station, plan(13)).run() is ACCEPTED
     upload = Upload(bench.station, plan(100, 1))

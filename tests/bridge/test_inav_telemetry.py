@@ -57,8 +57,8 @@ def test_its_platform_is_shown(platform: int, kind: int, by_hand: int) -> None:
 
 
 @pytest.mark.parametrize(("platform", "pitot"), [(1, True), (1, False), (0, True), (0, False)])
-def test_airspeed_is_measured_or_not_told(platform: int, pitot: bool) -> None:
-    """Ground speed is not airspeed for a wing; for a copter ArduCopter shows it as one."""
+def test_airspeed_is_measured_or_unknown(platform: int, pitot: bool) -> None:
+    """Ground speed stands in for airspeed on a copter, as in ArduCopter, but not on a plane."""
     _, world, station = introduced(platform=platform, pitot=pitot, faults=Faults(boxes=0))
     world.run(2)
     hud = station.said("VFR_HUD")[-1]
@@ -89,7 +89,7 @@ def test_a_failsafe_is_critical_at_once_and_only_in_flight() -> None:
     ]
 
 
-def test_load_battery_percentage_and_cells_are_the_boards_own() -> None:
+def test_load_battery_percentage_and_cells_come_from_the_board() -> None:
     _, world, station = introduced()
     power, health = world.bridge.session.vehicle.last(Power), world.bridge.session.vehicle.last(Health)
     assert power is not None
@@ -102,7 +102,7 @@ def test_load_battery_percentage_and_cells_are_the_boards_own() -> None:
 
 
 @pytest.mark.parametrize("unix_s", [0.0, 1_777_636_800.0])
-def test_its_time_is_known_once_it_has_it_from_its_gps(unix_s: float) -> None:
+def test_the_boards_time_is_known_once_its_gps_has_it(unix_s: float) -> None:
     _, world, _ = introduced(unix_s=unix_s)
     heard = world.bridge.session.vehicle.last(GpsTime)
     assert (heard is not None) == bool(unix_s)
@@ -120,8 +120,8 @@ def test_arming_blockers_are_reported_when_they_change() -> None:
     assert len([text for text in station.texts() if "arm" in text]) == 1
 
 
-def test_a_mission_that_is_loaded_while_it_is_identified_does_not_hide_it() -> None:
-    """Of GETINFO only the capacity is compared: the count may change with every answer."""
+def test_loading_a_mission_during_identification_does_not_hide_the_board() -> None:
+    """The record count may change with every GETINFO; only the capacity is compared."""
     board = make_board("inav", MspOptions(), Faults(boxes=0))
     world = World(speeds=(115200,), peer=board)
     original, counts = board.receive, iter(range(1, 10_000))
@@ -136,7 +136,7 @@ def test_a_mission_that_is_loaded_while_it_is_identified_does_not_hide_it() -> N
     world.wait_until(lambda w: w.kind is not None and w.kind.name == "INAV", 15)
 
 
-def test_the_present_item_is_reported_together_with_nav_status() -> None:
+def test_the_current_item_is_reported_together_with_nav_status() -> None:
     board, world, station = introduced()
     home = (453838000, 84733000)
     legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home[0] + 500 * n, home[1], 4.0) for n in (1, 2, 3)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The limit on pending replies: never more bytes than the flight controller's send ring holds, stalled or not."""
+"""Pending replies never exceed the flight controller's send ring, stalled or not."""
 
 import random
 from itertools import pairwise
@@ -32,8 +32,8 @@ def sent(link: MspLink) -> list[int]:
 
 
 @pytest.mark.parametrize("stall_ms", [150.0, 300.0])
-def test_a_read_that_meets_the_writing_of_the_configuration(stall_ms: float) -> None:
-    """Mission Planner sets the radius after a Write; a second later the board stalls, and a Read may be in progress."""
+def test_a_download_while_the_board_writes_its_configuration(stall_ms: float) -> None:
+    """Mission Planner sets the radius after a Write; the board stalls a second later, perhaps during a Read."""
     for seed in range(8):
         draw = random.Random(seed)
         options = SimOptions(config_write_ms=stall_ms, config_write_delay_ms=draw.random() * 300)
@@ -49,8 +49,8 @@ def test_a_read_that_meets_the_writing_of_the_configuration(stall_ms: float) -> 
 
 
 @pytest.mark.parametrize("baud", [115200, 38400, 9600])
-def test_all_at_once_at_every_speed(baud: int) -> None:
-    """A push, readings, parameters and telemetry."""
+def test_everything_at_once_at_every_speed(baud: int) -> None:
+    """A push, downloads, parameters and telemetry."""
     world = World(SimOptions(baud=baud), speeds=(baud,), flash=FULL_FLASH)
     world.wait_ready(40)
     station = GroundStation(world)
@@ -68,8 +68,8 @@ def test_all_at_once_at_every_speed(baud: int) -> None:
 
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("rate", [1e-3, 1e-2])
-def test_lost_bytes_make_no_ring_overflow(rate: float, extension: bool) -> None:
-    """Cut frames, repeats, and the filling up of a parser that has no timeout."""
+def test_lost_bytes_do_not_overflow_the_ring(rate: float, extension: bool) -> None:
+    """Truncated frames, repeats, and padding for a parser without a timeout."""
     for seed in range(4):
         world = World(SimOptions(seed=seed), Faults(lost_byte_rate=rate, extension=extension), speeds=(115200,))
         world.run(20)
@@ -81,10 +81,8 @@ def test_lost_bytes_make_no_ring_overflow(rate: float, extension: bool) -> None:
 @pytest.mark.parametrize("hang_s", [0.3, 1.0, 1.6, 2.0, 2.4, 2.8])
 @pytest.mark.parametrize("baud", [115200, 9600, 1200])
 @pytest.mark.parametrize("extension", [True, False])
-def test_a_board_that_stands_still_answers_no_more_than_its_ring_holds(
-    hang_s: float, baud: int, extension: bool
-) -> None:
-    """When it resumes it answers at once: earlier requests, repeats, and the probes of the search that has begun."""
+def test_the_backlog_of_a_stalled_board_fits_its_ring(hang_s: float, baud: int, extension: bool) -> None:
+    """It answers everything at once when it resumes: requests, repeats and the probes of the new search."""
     for seed in range(2):
         draw = random.Random(seed)
         world = World(SimOptions(baud=baud, seed=seed), Faults(extension=extension))
@@ -106,7 +104,7 @@ def test_a_board_that_stands_still_answers_no_more_than_its_ring_holds(
         assert counters.max_outstanding_reply_bytes <= 255
 
 
-def test_polls_keep_their_pace() -> None:
+def test_polls_keep_their_rate() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     world.written.clear()
@@ -119,7 +117,7 @@ def test_polls_keep_their_pace() -> None:
 # The link alone.
 
 
-def test_no_more_goes_out_than_may_come_back() -> None:
+def test_requests_wait_for_room_for_their_replies() -> None:
     link = MspLink(115200, 0.0)
     for _ in range(5):
         link.send(question(195, 99), 0.0)
@@ -130,7 +128,7 @@ def test_no_more_goes_out_than_may_come_back() -> None:
     assert sent(link) == [195]
 
 
-def test_what_timed_out_counts_until_its_answer_cannot_come_any_longer() -> None:
+def test_a_timed_out_request_counts_until_its_reply_can_no_longer_come() -> None:
     link = MspLink(115200, 0.0)
     link.receiver_timeout_s = 0.05
     link.send(question(195, 99), 0.0)
@@ -142,14 +140,14 @@ def test_what_timed_out_counts_until_its_answer_cannot_come_any_longer() -> None
     assert not link.awaits(frozenset((195,)))
     assert link.outstanding_bytes == 210
     link.send(question(195, 99), now)
-    # There is no room for it; a short question behind those two finds out whether they are over.
+    # There is no room for it; the reply to a short request shows that those two will not be answered.
     assert sent(link) == [1]
     link.receive(MspFrame(Direction.ERROR, 1).encode(), now + 0.01)
     assert sent(link) == [195]
     assert link.outstanding_bytes == 105
 
 
-def test_what_is_never_answered_is_forgotten_after_the_longest_stall() -> None:
+def test_an_unanswered_request_is_forgotten_after_the_longest_stall() -> None:
     link = MspLink(115200, 0.0)
     link.receiver_timeout_s = 0.05
     link.send(question(195, 99), 0.0)
@@ -163,7 +161,7 @@ def test_what_is_never_answered_is_forgotten_after_the_longest_stall() -> None:
     assert sent(link).count(195) == 3
 
 
-def test_a_late_answer_is_not_measured_and_not_counted_twice() -> None:
+def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
     link = MspLink(115200, 0.0)
     link.receiver_timeout_s = 0.05
     link.send(question(101, 11), 0.0)
@@ -172,13 +170,13 @@ def test_a_late_answer_is_not_measured_and_not_counted_twice() -> None:
     before = link.round_trip_s
     link.receive(reply(101, 11), 0.201)
     assert link.round_trip_s == before
-    # Either of the two was answered; the other may still come.
+    # One of the two was answered; the other reply may still come.
     assert link.outstanding_bytes == 17
     link.receive(reply(101, 11), 0.202)
     assert link.outstanding_bytes == 0
 
 
-def test_an_answer_tells_that_what_was_asked_before_is_over() -> None:
+def test_a_reply_ends_earlier_requests() -> None:
     link = MspLink(115200, 0.0)
     for command in (101, 106, 108):
         link.send(question(command, 11), 0.0)
@@ -197,7 +195,7 @@ def test_nothing_is_sent_alongside_an_exclusive_request() -> None:
     assert sent(link) == [101]
 
 
-def test_our_own_echo_is_no_answer() -> None:
+def test_our_own_echo_is_not_a_reply() -> None:
     link = MspLink(115200, 0.0)
     link.send(question(101, 11), 0.0)
     assert link.receive(request(101), 0.01) == []
@@ -205,7 +203,7 @@ def test_our_own_echo_is_no_answer() -> None:
     assert link.last_heard_at == 0.0
 
 
-def test_a_reply_behind_a_false_header_is_found_when_the_line_falls_silent() -> None:
+def test_a_reply_behind_a_false_header_is_found_once_the_line_is_silent() -> None:
     link = MspLink(115200, 0.0)
     link.send(question(101, 11), 0.0)
     assert link.receive(b"$M>\xf0" + reply(101, 11), 0.005) == []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boards that fall silent, restart, arm or change their speed at any moment of identification are found again."""
+"""Boards that fall silent, restart, arm or change speed at any moment of identification are found again."""
 
 import random
 from functools import cache
@@ -11,7 +11,7 @@ from bridge.fc.states.msp import Identifying
 from simulator.options import SimOptions, TelemetryProtocol
 from tests.support.world import World
 
-#: From the moment at which the board can be heard again.
+#: Counted from when the board can be heard again.
 FOUND_WITHIN_S = 8.0
 SPEEDS = [115200, 57600, 38400, 19200, 9600]
 MOMENTS = 12
@@ -43,7 +43,7 @@ def is_known(world: World) -> bool:
 
 
 @pytest.mark.parametrize("baud", SPEEDS)
-def test_power_cut(baud: int) -> None:
+def test_a_power_cut(baud: int) -> None:
     for seed in range(MOMENTS):
         world = identifying(baud, seed)
         world.power_off()
@@ -56,19 +56,19 @@ def test_power_cut(baud: int) -> None:
 
 @pytest.mark.parametrize("baud", SPEEDS)
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
-def test_arms(baud: int, protocol: TelemetryProtocol) -> None:
+def test_arming(baud: int, protocol: TelemetryProtocol) -> None:
     for seed in range(MOMENTS):
         world = identifying(baud, seed, protocol)
         world.faults.armed = True
         world.wait_until(is_known, FOUND_WITHIN_S)
-        # At 9600 baud Harakiri's telemetry is more than the line carries: many a heartbeat is lost.
+        # At 9600 baud Harakiri's telemetry exceeds the line's capacity, so many heartbeats are lost.
         world.wait_until(lambda w: w.bridge.session.vehicle.armed is True, FOUND_WITHIN_S)
         world.faults.armed = False
         world.wait_until(lambda w: w.kind is harakiri.PATCHED, FOUND_WITHIN_S)
 
 
 @pytest.mark.parametrize("baud", SPEEDS)
-def test_stands_still(baud: int) -> None:
+def test_a_stall(baud: int) -> None:
     for seed in range(MOMENTS):
         world = identifying(baud, seed)
         world.faults.hang = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strangers with addresses by the thousand, and one that sends as fast as it can."""
+"""Floods from thousands of forged addresses and from a single one."""
 
 import itertools
 import random
@@ -24,7 +24,7 @@ Address = tuple[str, int]
 
 
 def new_hosts(draw: random.Random) -> Callable[[], Address]:
-    """Forged: each datagram is from another machine."""
+    """Forged: each datagram comes from another machine."""
     return lambda: (f"10.{draw.randrange(256)}.{draw.randrange(256)}.{draw.randrange(256)}", 14550)
 
 
@@ -35,7 +35,7 @@ def new_ports(_draw: random.Random) -> Callable[[], Address]:
 
 
 def same_again(draw: random.Random) -> Callable[[], Address]:
-    """Ninety addresses of three machines, each of which comes again and again, as a ground station does."""
+    """Ninety addresses of three machines; each keeps sending, like a ground station."""
     return lambda: (f"10.0.0.{draw.randrange(3)}", draw.randrange(30))
 
 
@@ -55,7 +55,7 @@ def longest_gap_s(pilot: GroundStation, since: float) -> float:
     return max(after - before for before, after in pairwise([since, *beats, pilot.world.now]))
 
 
-def test_the_pilot_that_was_there_before_notices_nothing() -> None:
+def test_a_pilot_connected_before_the_flood_notices_nothing() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
@@ -68,13 +68,13 @@ def test_the_pilot_that_was_there_before_notices_nothing() -> None:
     world.run(began + SECONDS - world.now)
     assert world.stored == records_of(waypoints(20))
     assert longest_gap_s(pilot, began) <= 1.1
-    # Few are noted, and nothing is kept of the others.
+    # Few of them are remembered.
     assert len(world.events("gcs.found")) < 3 * MAX_PEERS
     assert len(world.bridge.ground.peers()) <= MAX_PEERS
     assert len(world.bridge.ground.budgets._peers) < 2000
 
 
-def test_nothing_is_kept_of_refused_addresses() -> None:
+def test_refused_addresses_are_not_remembered() -> None:
     world = World(speeds=(115200,), links={"udp": LinkAccess(may_write=lambda _peer: False)})
     stranger = GroundStation(world, "stranger")
     for number in range(2000):
@@ -85,8 +85,8 @@ def test_nothing_is_kept_of_refused_addresses() -> None:
 
 
 @pytest.mark.parametrize("addresses", [new_hosts, new_ports, same_again])
-def test_a_pilot_that_comes_now_writes_in_time(addresses: Callable[[random.Random], Callable[[], Address]]) -> None:
-    """Five hundred lists a second are announced, sixty times what all newcomers together may."""
+def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random], Callable[[], Address]]) -> None:
+    """The flood announces 500 lists a second, sixty times the limit for all newcomers together."""
     world = World(speeds=(115200,))
     world.wait_ready()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
@@ -103,7 +103,7 @@ def test_a_pilot_that_comes_now_writes_in_time(addresses: Callable[[random.Rando
     assert longest_gap_s(pilot, came_at) <= 1.1
 
 
-def test_who_sends_too_much_is_not_read() -> None:
+def test_a_sender_over_its_limit_is_not_read() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     stranger = GroundStation(world)

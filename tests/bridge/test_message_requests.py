@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each ground station gets the messages and rates it requested, without effect on the others."""
+"""Each ground station gets the messages and rates it requested, independently of the others."""
 
 import math
 
@@ -17,7 +17,7 @@ from tests.support.world import GroundStation, World
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 ATTITUDE, GPS_RAW_INT, RAW_IMU = m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_GPS_RAW_INT, m.MAVLINK_MSG_ID_RAW_IMU
-#: What Mission Planner asks for, twice, at the first heartbeat: stream, rate.
+#: Mission Planner's requests (stream, rate), sent twice at the first heartbeat.
 MISSION_PLANNER = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
 
 
@@ -29,7 +29,7 @@ def world() -> World:
 
 
 def station_of(world: World, name: str) -> GroundStation:
-    # Two with the same ids would be one that has moved to another address.
+    # Different ids: with the same ids it would be one station that has moved.
     station = GroundStation(world, name, sysid=255 - len(world.stations))
     beat(station)
     world.run(1.1)
@@ -56,7 +56,7 @@ def stream(number: int, rate_hz: int, *, start: int = 1) -> Message:
 
 
 def rates_hz(station: GroundStation, seconds: float = 20) -> dict[str, float]:
-    """Listen for a while; return how often each message came a second."""
+    """The rate of each message, measured over `seconds`."""
     station.take()
     station.world.run(seconds)
     names = [message.get_type() for message in station.said()]
@@ -70,7 +70,7 @@ def polls_hz(world: World, command: Msp, seconds: float = 10) -> float:
     return sum(frame.command == command for frame in frames) / seconds
 
 
-def test_mission_planner_gets_just_what_it_asks_for(world: World) -> None:
+def test_mission_planner_gets_the_rates_it_requests(world: World) -> None:
     planner, other = station_of(world, "planner"), station_of(world, "other")
     for _ in range(2):
         for number, rate_hz in MISSION_PLANNER:
@@ -89,11 +89,11 @@ def test_mission_planner_gets_just_what_it_asks_for(world: World) -> None:
     assert of_other["ATTITUDE"] == pytest.approx(25, rel=0.05)
     assert of_other["GPS_RAW_INT"] == pytest.approx(5, rel=0.05)
     assert "RAW_IMU" not in of_other
-    # Another station's request makes messages at most a quarter of an interval early.
+    # A faster station can make a message up to a quarter of its interval early.
     assert of_planner["ATTITUDE"] <= 4.1
 
 
-def test_all_streams_at_once_as_mavproxy_asks(world: World) -> None:
+def test_all_streams_at_once_as_mavproxy_requests(world: World) -> None:
     station = station_of(world, "mavproxy")
     station.send(stream(0, 4))
     world.run(1)
@@ -116,13 +116,13 @@ def test_a_stations_requests_set_the_poll_rates_until_it_leaves(world: World) ->
     assert ask(station, 511, ATTITUDE, 20_000) == ACCEPTED
     assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(50, rel=0.05)
     world.run(EXPIRY_S + 2)
-    # No one is there: the bridge itself needs to know it once a second.
+    # Without a station, the bridge itself polls it once a second.
     assert polls_hz(world, Msp.ATTITUDE) == pytest.approx(1, rel=0.15)
     back = station_of(world, "gcs")
     assert rates_hz(back)["ATTITUDE"] == pytest.approx(25, rel=0.05)
 
 
-def test_one_message_at_an_interval(world: World) -> None:
+def test_a_message_is_sent_at_the_requested_interval(world: World) -> None:
     station = station_of(world, "gcs")
     for interval_us, expected_hz in ((100_000, 10), (-1, 0), (0, 25), (20_000, 50)):
         beat(station)
@@ -148,7 +148,7 @@ def interval_us(station: GroundStation, msgid: int) -> int:
     return found
 
 
-def test_the_interval_that_is_reported_is_the_one_that_is_kept(world: World) -> None:
+def test_the_reported_interval_is_the_actual_one(world: World) -> None:
     station = station_of(world, "gcs")
     assert interval_us(station, ATTITUDE) == 40_000
     assert interval_us(station, m.MAVLINK_MSG_ID_HEARTBEAT) == 1_000_000
@@ -162,7 +162,7 @@ def test_the_interval_that_is_reported_is_the_one_that_is_kept(world: World) -> 
     assert interval_us(station, ATTITUDE) == 2**31 - 1
 
 
-def test_no_request_takes_more_than_the_line_has(world: World) -> None:
+def test_requests_do_not_exceed_the_lines_capacity(world: World) -> None:
     stations = [station_of(world, f"gcs{number}") for number in range(3)]
     for station in stations:
         for row in TELEMETRY:
@@ -177,13 +177,13 @@ def test_no_request_takes_more_than_the_line_has(world: World) -> None:
 @pytest.mark.parametrize(
     "row", [row for row in TELEMETRY if row.reading in POLL_FOR], ids=lambda row: m.mavlink_map[row.msgid].msgname
 )
-def test_each_message_can_be_asked_for_once(world: World, row: Row) -> None:
+def test_each_message_can_be_requested_once(world: World, row: Row) -> None:
     msgid = row.msgid
     world.faults.armed = True
     station = station_of(world, "gcs")
     world.run(4)
     if msgid == RAW_IMU:
-        # No one wanted to hear of it, so it is not polled.
+        # No station requested it, so it is not polled.
         assert ask(station, 512, msgid) == TEMPORARILY_REJECTED
         ask(station, 511, msgid, 100_000)
         world.run(0.5)
@@ -193,7 +193,7 @@ def test_each_message_can_be_asked_for_once(world: World, row: Row) -> None:
     assert name in {message.get_type() for message in station.said()}
 
 
-def test_before_a_flight_controller_is_there_nothing_is_known() -> None:
+def test_without_a_flight_controller_messages_are_temporarily_rejected() -> None:
     world = World(powered=False)
     station = station_of(world, "gcs")
     for row in TELEMETRY:
@@ -202,7 +202,7 @@ def test_before_a_flight_controller_is_there_nothing_is_known() -> None:
     assert set(rates_hz(station, 5)) == {"HEARTBEAT", "MISSION_CURRENT"}
 
 
-def test_requests_that_are_made_before_it_is_there_count_then() -> None:
+def test_rates_requested_before_the_flight_controller_is_found_are_kept() -> None:
     world = World(speeds=(115200,), powered=False)
     station = station_of(world, "gcs")
     assert ask(station, 511, ATTITUDE, 100_000) == ACCEPTED
@@ -211,7 +211,7 @@ def test_requests_that_are_made_before_it_is_there_count_then() -> None:
     assert rates_hz(station)["ATTITUDE"] == pytest.approx(10, rel=0.05)
 
 
-def test_the_modes_are_listed_and_the_present_one_is_reported(world: World) -> None:
+def test_the_modes_are_listed_and_the_current_one_is_reported(world: World) -> None:
     station, old = station_of(world, "gcs"), GroundStation(world, "old", version=1)
     beat(old)
     world.run(1)

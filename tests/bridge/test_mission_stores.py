@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contract of all mission stores, whatever the flight controller.
+"""The contract of all mission stores, on every flight controller.
 
-Each store is tested through the whole bridge, on its simulated flight controller, for what ground stations and the Pi's
-store rely on. Its procedure has its own tests.
+Each store is tested through the whole bridge on its simulated flight controller, for the properties that ground
+stations and the Pi's store rely on. How it writes is tested elsewhere.
 """
 
 import itertools
@@ -29,13 +29,13 @@ from tests.support.conversations import Download, Upload, clear_message, waypoin
 from tests.support.world import GroundStation, World
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
-#: A push on MultiWii takes 70 ms a record, on a Harakiri in MAVLink mode seconds for its flash.
+#: MultiWii takes 70 ms per record, a Harakiri in MAVLink mode several seconds for its flash.
 PATIENCE_S, TRIES = 60.0, 100
 
 
 @dataclass(frozen=True)
 class Craft:
-    """A flight controller and the world around it. radius_m: a hit radius that it keeps."""
+    """A flight controller and its world. `radius_m`: a hit radius that it stores unchanged."""
 
     world: World
     station: GroundStation
@@ -43,7 +43,7 @@ class Craft:
     radius_m: float
 
     def plan(self, count: int, seed: int = 0) -> list[MissionItem]:
-        """A list that it stores without a finding (but for places in single precision)."""
+        """A list that it stores without a finding, apart from positions in single precision."""
         return [replace(item, p2=self.radius_m) for item in waypoints(count, seed)]
 
     def upload(self, items: Sequence[MissionItem]) -> MissionResult | None:
@@ -60,7 +60,7 @@ class Craft:
         return held[0]
 
     def holds(self, items: Sequence[MissionItem]) -> bool:
-        """True if it reads as that list; home may be its own, and a place 0.4 m off."""
+        """True if it reads back as that list; home may be its own, and positions 0.4 m off."""
         read = self.download()
         return len(read) == len(items) and all(map(is_alike, read[1:], items[1:]))
 
@@ -100,7 +100,7 @@ MAKERS: dict[str, Callable[[], Craft]] = {
 }
 
 
-def test_every_mission_store_is_here() -> None:
+def test_every_mission_store_is_tested() -> None:
     assert MAKERS.keys() == {profile.name for profile in PROFILES if profile.open_store is not None}
 
 
@@ -113,7 +113,7 @@ def assert_is_true(
     elif delivery.text not in {failure.value for failure in LIST_IS_GONE}:
         assert craft.holds(old)
     elif delivery.text != PushFailure.UNCERTAIN.value:
-        # An INAV is made to load its saved mission again, which the pilot is told.
+        # An INAV loads its saved mission again, and the pilot is told.
         assert len(craft.download()) <= 1 or craft.holds(old)
 
 
@@ -126,7 +126,7 @@ def craft(request: pytest.FixtureRequest) -> Craft:
     return made
 
 
-def test_an_accepted_list_is_stored_and_read_by_all(craft: Craft) -> None:
+def test_an_accepted_list_is_stored_and_read_back_by_all(craft: Craft) -> None:
     sent = craft.plan(25)
     assert craft.upload(sent) is ACCEPTED
     assert craft.world.store.outcomes() == [Outcome.VERIFIED]
@@ -154,7 +154,7 @@ def test_a_new_list_replaces_the_old_one(craft: Craft) -> None:
         assert craft.holds(craft.plan(count, seed))
 
 
-def test_a_cleared_one_reads_as_none_and_takes_a_list_again(craft: Craft) -> None:
+def test_a_cleared_list_reads_as_empty_and_can_be_replaced(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     craft.station.send(clear_message())
     craft.world.run(6)
@@ -165,7 +165,7 @@ def test_a_cleared_one_reads_as_none_and_takes_a_list_again(craft: Craft) -> Non
     assert craft.holds(craft.plan(7))
 
 
-def test_rejected_lists_change_nothing_and_say_why(craft: Craft) -> None:
+def test_rejected_lists_change_nothing_and_have_a_reason(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     good = craft.plan(6, 1)
     for bad in (
@@ -205,7 +205,7 @@ def test_item_by_item_and_whole_list_checks_agree(craft: Craft) -> None:
             assert [item.seq for item in whole.items] == list(range(len(whole.items)))
 
 
-def test_an_armed_craft_is_left_alone(craft: Craft) -> None:
+def test_nothing_is_sent_to_an_armed_craft(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     craft.arm()
     assert craft.upload(craft.plan(8, 1)) is DENIED
@@ -219,7 +219,7 @@ def test_an_armed_craft_is_left_alone(craft: Craft) -> None:
 
 
 @pytest.mark.parametrize("moment", [0.05, 0.3, 0.6])
-def test_a_push_that_loses_its_line_ends_and_says_what_is_left(craft: Craft, moment: float) -> None:
+def test_a_push_that_loses_its_line_ends_with_a_true_result(craft: Craft, moment: float) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     outcome = craft.world.push(craft.plan(60, 1))
     craft.world.run(moment)
@@ -233,7 +233,7 @@ def test_a_push_that_loses_its_line_ends_and_says_what_is_left(craft: Craft, mom
 
 
 @pytest.mark.parametrize("moment", [0.05, 0.3, 0.6])
-def test_a_stop_ends_a_push_and_says_what_is_left(craft: Craft, moment: float) -> None:
+def test_a_push_that_is_stopped_ends_with_a_true_result(craft: Craft, moment: float) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     outcome = craft.world.push(craft.plan(100, 1))
     craft.world.run(moment)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adding a flight controller takes one profile and one line in the table (docs/design.md)."""
+"""A new flight controller needs one profile and one line in the table (docs/design.md)."""
 
 from bridge.controllers.table import PROFILES
 from bridge.fc.interview import Interview
@@ -22,7 +22,7 @@ NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "Toys do not navigate")
 TOY = Profile("a toy", "Toy", recognise=recognise, no_missions=NO_MISSIONS)
 
 
-def test_a_profile_is_all_it_takes() -> None:
+def test_a_profile_is_enough() -> None:
     board = FakeInav()
     board.answers = {2: b"TOYS", 116: b"ANGLE;ARM;"}
     board.answer = lambda frame: (  # type: ignore[method-assign]

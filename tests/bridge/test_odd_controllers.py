@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flight controllers with arbitrary replies: every conversation ends, nothing raises, nothing false is accepted."""
+"""Flight controllers with arbitrary replies: every conversation ends, nothing raises, no false acceptance."""
 
 import random
 
@@ -23,7 +23,7 @@ TELEMETRY = {101: 11, 106: 18, 108: 8, 109: 10, 110: 7, 118: 21}
 
 
 class Odd(QuietLine):
-    """Says that it is a Harakiri with the extension; what else it answers is `answer`'s business."""
+    """Identifies as a Harakiri with the extension; `answer` decides the other replies."""
 
     def __init__(self, seed: int = 0, info: Info = INFO) -> None:
         super().__init__()
@@ -49,7 +49,7 @@ class Odd(QuietLine):
                 self.outgoing += MspFrame(Direction.REPLY, frame.command, payload).encode()
 
     def answer(self, frame: MspFrame) -> bytes | None:
-        """Answer a command of the extension; None: not at all."""
+        """The reply to a command of the extension; None: no reply."""
         draw = self.random
         status = draw.choice((ReplyStatus.OK, ReplyStatus.OK, *ReplyStatus))
         count, checksum = draw.choice((0, 1, 5, 146, 65535)), draw.choice((0, 1, 0xFFFFFFFF))
@@ -68,7 +68,7 @@ class Odd(QuietLine):
 
 
 class Stubborn(Odd):
-    """Answers every CHUNK, COMMIT or READ in the same way, forever."""
+    """Always gives the same reply to CHUNK, COMMIT or READ."""
 
     def __init__(self, answers: dict[int, bytes], info: Info = INFO) -> None:
         super().__init__(info=info)
@@ -85,7 +85,7 @@ def found(peer: QuietLine) -> tuple[World, GroundStation]:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_every_procedure_ends_whatever_is_answered(seed: int) -> None:
+def test_every_conversation_ends_with_any_replies(seed: int) -> None:
     world, station = found(Odd(seed, Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0)))
     assert Upload(station, waypoints(30, seed)).run(120) not in (None, MissionResult.ACCEPTED)
     Download(station).run(60)
@@ -111,7 +111,7 @@ PROOF = Stored(ReplyStatus.OK, identify(records_of(waypoints(30)))).encode()
         {MissionCommand.BEGIN: b"\xff"},
     ],
 )
-def test_a_board_that_insists_is_given_up(answers: dict[int, bytes]) -> None:
+def test_a_board_that_always_gives_the_same_reply_is_given_up(answers: dict[int, bytes]) -> None:
     _, station = found(Stubborn(answers))
     assert Upload(station, waypoints(30)).run(60) is MissionResult.DENIED
 
@@ -126,7 +126,7 @@ def test_a_board_that_insists_is_given_up(answers: dict[int, bytes]) -> None:
         Records(ReplyStatus.RANGE, 0, []),
     ],
 )
-def test_a_reading_that_makes_no_progress_ends(answer: Records) -> None:
+def test_a_download_without_progress_ends(answer: Records) -> None:
     info = Info(1, InfoFlag(0), 15, 2, 6, 146, ListIdentity(20, 99), 200, 50, 0, 0)
     _, station = found(Stubborn({MissionCommand.READ: answer.encode()}, info))
     download = Download(station, repeat_s=30)
@@ -135,7 +135,7 @@ def test_a_reading_that_makes_no_progress_ends(answer: Records) -> None:
 
 
 @pytest.mark.parametrize("records", [15, 16, 40, 255])
-def test_a_board_that_offers_more_than_a_frame_holds_gets_what_fits(records: int) -> None:
+def test_a_chunk_size_beyond_a_frame_is_limited(records: int) -> None:
     info = Info(1, InfoFlag(0), records, 255, records, 146, ListIdentity(0, 0), 200, 50, 0, 0)
     _, station = found(Stubborn({}, info))
     assert Upload(station, waypoints(60)).run(60) is MissionResult.DENIED

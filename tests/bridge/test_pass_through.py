@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pass-through of an autopilot that speaks MAVLink itself: frames go to their targets unchanged, both ways."""
+"""Pass-through for an autopilot that speaks MAVLink itself: frames reach their targets unchanged, both ways."""
 
 import random
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ KEY = sha256(b"a passphrase").digest()
 
 
 class Autopilot(QuietLine):
-    """Sends what a test gives it, and a heartbeat a second. `received`: what came over the wire."""
+    """Sends the frames a test gives it and a heartbeat a second. `received`: bytes from the wire."""
 
     def __init__(self, sysid: int = 1, compid: int = 1, version: int = 2) -> None:
         super().__init__()
@@ -54,7 +54,7 @@ class Autopilot(QuietLine):
 def passing(
     autopilot: Autopilot | None = None, stations: int = 2, *, everything: bool = False
 ) -> tuple[World, Autopilot, list[GroundStation]]:
-    """An autopilot that was found, and ground stations that were heard. `everything`: commands pass an open link."""
+    """A found autopilot and known ground stations. `everything`: commands pass an open link."""
     autopilot = autopilot or Autopilot()
     world = World(peer=autopilot, passes_everything=everything)
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
@@ -79,7 +79,7 @@ def telemetry(seed: int, count: int) -> Iterable[mavlink.MAVLink_message]:
 
 
 @pytest.mark.parametrize(("version", "signed"), [(1, False), (2, False), (2, True)])
-def test_everyone_gets_everything_as_it_was_sent(version: int, signed: bool) -> None:
+def test_every_station_gets_every_frame_unchanged(version: int, signed: bool) -> None:
     autopilot = Autopilot(version=version)
     if signed:
         autopilot.mavlink.signing.secret_key = KEY
@@ -100,7 +100,7 @@ def test_the_bridge_sends_no_messages_of_its_own() -> None:
     assert bytes(autopilot.received) == b""
 
 
-def test_what_ground_stations_send_arrives_as_it_was_sent() -> None:
+def test_frames_from_ground_stations_arrive_unchanged() -> None:
     world, autopilot, (one, other) = passing(everything=True)
     sent = b""
     for message in (
@@ -116,7 +116,7 @@ def test_what_ground_stations_send_arrives_as_it_was_sent() -> None:
         sent += frame
     world.run(0.1)
     assert bytes(autopilot.received) == sent
-    # The others get broadcasts, and no sender its own frame.
+    # The others get broadcasts; no sender gets its own frame.
     assert [message.get_type() for message in other.said()] == ["PARAM_REQUEST_LIST", "HEARTBEAT"]
     assert one.said() == []
 
@@ -193,8 +193,8 @@ def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
     assert len(intact) - len(passed) <= 2
 
 
-def test_the_bridge_does_not_stand_in_for_a_lost_autopilot() -> None:
-    """A heartbeat of ours would show a vehicle that is gone."""
+def test_the_bridge_sends_no_heartbeats_for_a_lost_autopilot() -> None:
+    """They would show a vehicle that is gone."""
     world, _autopilot, (station, _) = passing()
     is_passing = world.bridge.is_passing_through
     assert is_passing
@@ -211,15 +211,15 @@ def test_the_bridge_does_not_stand_in_for_a_lost_autopilot() -> None:
     assert station.said("HEARTBEAT")
 
 
-def test_frames_are_split_as_mavlink_says() -> None:
-    """What the tests above compare is whole frames on both sides."""
+def test_frames_are_split_as_in_pymavlink() -> None:
+    """The tests above compare only whole frames."""
     _, autopilot, _ = passing()
     frames = [autopilot.pack(message) for message in telemetry(5, 10)]
     assert [frame.raw for frame in MavlinkSplitter().feed(b"".join(frames))] == frames
 
 
-def test_a_false_header_does_not_hold_back_a_slow_stream() -> None:
-    """Twelve heartbeats would fit the frame that never comes."""
+def test_a_false_header_does_not_delay_a_slow_stream() -> None:
+    """The false frame has room for twelve heartbeats."""
     world, autopilot, (station, _) = passing()
     autopilot.outgoing += b"\xfd\xff\x00\x00\x00\x01\x01\x1e\x00\x00"
     world.run(6)
@@ -228,7 +228,7 @@ def test_a_false_header_does_not_hold_back_a_slow_stream() -> None:
     assert len(autopilot.sent) >= 5
 
 
-def test_a_companion_of_the_autopilots_own_system_is_heard_and_echoes_are_not() -> None:
+def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not() -> None:
     world, autopilot, (one, _) = passing()
     companion = GroundStation(world, "companion", sysid=1, compid=191)
     companion.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
@@ -242,8 +242,8 @@ def test_a_companion_of_the_autopilots_own_system_is_heard_and_echoes_are_not() 
     assert bytes(autopilot.received) == b""
 
 
-def test_a_sender_with_all_ids_takes_no_frames_from_others() -> None:
-    """Sixty thousand made-up numbers from one address: it is sent no more than its share, and others are heard."""
+def test_a_sender_with_all_ids_does_not_displace_others() -> None:
+    """One address with 60,000 forged ids gets no more than its share."""
     world, autopilot, (one, _) = passing()
     liar = GroundStation(world, "liar", sysid=99)
     for sysid in range(2, 200):

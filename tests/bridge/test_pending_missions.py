@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission with an unknown outcome: the board is asked when it is back, and the pilot is told."""
+"""After a push with an unknown outcome the board is asked once it is back, and the pilot is told."""
 
 import pytest
 
@@ -28,10 +28,8 @@ def is_committing(world: World) -> bool:
 
 @pytest.mark.parametrize("boot_ms", [7100, 25200])
 @pytest.mark.parametrize(("cut_after_s", "outcome"), [(0.0, Outcome.FAILED), (0.05, Outcome.VERIFIED)])
-def test_a_board_that_resets_while_it_stores_is_asked_when_it_is_back(
-    boot_ms: int, cut_after_s: float, outcome: Outcome
-) -> None:
-    """7.1 s from reset to the first answer, 25.2 s without its GPS module."""
+def test_a_board_that_resets_during_commit_is_asked_later(boot_ms: int, cut_after_s: float, outcome: Outcome) -> None:
+    """7.1 s from reset to the first reply, 25.2 s without its GPS module."""
     world = World(SimOptions(boot_ms=boot_ms), speeds=(115200,), flash=OLD_FLASH)
     world.wait_ready()
     station = GroundStation(world)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The poll schedule: refused, unanswered and lost requests, and the line's limits on requested rates."""
+"""The poll schedule: refused, unanswered and lost polls, and the line's limits on requested rates."""
 
 import random
 from collections import Counter
@@ -15,7 +15,7 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
 
 REPLY_PAYLOADS = {101: 11, 104: 16, 102: 18, 105: 16, 106: 14, 108: 8, 109: 6, 110: 5, 118: 12}
-#: Answers a command with a payload's size; None: not at all, -1: an error.
+#: Maps a command to the size of the reply's payload; None: no reply, -1: an error.
 Answer = Callable[[int], int | None]
 
 
@@ -24,7 +24,7 @@ def answer_all(command: int) -> int | None:
 
 
 class Line:
-    """A flight controller that answers after `delay_s`, or does not."""
+    """A flight controller that answers after `delay_s` or not at all."""
 
     def __init__(
         self, baud: int | None = 115200, delay_s: float = 0.004, answer: Answer = answer_all, turn_s: float = 0.0
@@ -40,7 +40,7 @@ class Line:
         self._replies: list[tuple[float, bytes]] = []
 
     def run(self, seconds: float) -> Counter[int]:
-        """Let time pass; return how often each question was asked."""
+        """Let time pass; return the number of polls by command."""
         end, before = self.now + seconds, len(self.asked)
         while self.now < end:
             due = [self.schedule.next_deadline(self.link), self.link.next_deadline(), *(at for at, _ in self._replies)]
@@ -60,7 +60,7 @@ class Line:
             self.schedule.answered(frame)
 
     def _take(self, command: int) -> None:
-        size: int | None = -1  # the link's own question
+        size: int | None = -1  # the link's own request
         if command in REPLY_PAYLOADS:
             self.asked.append((self.now, command))
             size = self.answer(command)
@@ -70,13 +70,13 @@ class Line:
             self._replies.append((self.now + self._delay_s, frame))
 
 
-def test_at_first_all_is_asked_at_once() -> None:
+def test_everything_is_polled_at_the_start() -> None:
     line = Line()
     asked = line.run(0.2)
     assert set(asked) == set(REPLY_PAYLOADS) - {Msp.RAW_IMU, Msp.MOTOR}
 
 
-def test_what_is_refused_is_asked_twice_and_never_again_until_another_is_there() -> None:
+def test_a_refused_poll_is_tried_twice_per_flight_controller() -> None:
     line = Line(answer=lambda command: -1 if command == Msp.WP else REPLY_PAYLOADS[command])
     assert line.run(60)[Msp.WP] == 2
     assert line.schedule.interval_s(Msp.WP) is None
@@ -86,13 +86,13 @@ def test_what_is_refused_is_asked_twice_and_never_again_until_another_is_there()
     assert line.run(60)[Msp.WP] == 2
 
 
-def test_one_error_may_be_noise() -> None:
+def test_a_single_error_is_taken_for_noise() -> None:
     noisy = [True]
     line = Line(answer=lambda command: -1 if command == Msp.WP and noisy and noisy.pop() else REPLY_PAYLOADS[command])
     assert line.run(60)[Msp.WP] >= 29
 
 
-def test_what_is_never_answered_is_asked_less_and_less_and_the_others_do_not_suffer() -> None:
+def test_an_unanswered_poll_slows_down_without_delaying_others() -> None:
     line = Line(answer=lambda command: None if command == Msp.RAW_GPS else REPLY_PAYLOADS[command])
     line.schedule.want({Msp.ATTITUDE: 0.04, Msp.RAW_GPS: 0.2})
     line.run(30)
@@ -107,7 +107,7 @@ def test_what_is_never_answered_is_asked_less_and_less_and_the_others_do_not_suf
 @pytest.mark.parametrize(
     ("loss", "least", "most"), [(0.0, 1.0, 1.0), (0.01, 0.7, 1.0), (0.1, 0.2, 0.75), (0.5, 0.1, 0.2)]
 )
-def test_losses_bend_the_rates(loss: float, least: float, most: float) -> None:
+def test_losses_lower_the_rates(loss: float, least: float, most: float) -> None:
     chance = random.Random(1)
     line = Line(answer=lambda command: None if chance.random() < loss else REPLY_PAYLOADS[command])
     line.schedule.want({Msp.ATTITUDE: 0.04, Msp.RAW_GPS: 0.2})
@@ -123,7 +123,7 @@ def test_losses_bend_the_rates(loss: float, least: float, most: float) -> None:
 
 
 @pytest.mark.parametrize("delay_s", [0.05, 0.1])
-def test_over_a_slow_line_a_question_waits_for_its_answer(delay_s: float) -> None:
+def test_on_a_slow_line_the_next_poll_waits_for_the_reply(delay_s: float) -> None:
     line = Line(None, delay_s)
     line.schedule.want({Msp.ATTITUDE: 0.04})
     line.run(10)
@@ -151,7 +151,7 @@ def test_any_requests_fit_the_line_and_the_board(
     used = sum(count * (REPLY_PAYLOADS[command] + 2 * FRAME_OVERHEAD) for command, count in asked.items()) / 20
     assert used <= (baud or 115200) / 10 * 0.6 * 1.1
     assert asked.total() / 20 * turn_s <= 0.6 * 1.1
-    # Nothing that is wanted is forgotten, and arming is noticed.
+    # Every requested poll is sent, and arming is noticed.
     wanted = {poll.command for poll in POLLS if poll.needed_s < 100} | {c for c, s in wishes.items() if s <= 5}
     assert set(asked) >= {command for command in wanted if wishes.get(command, 0) <= 5}
     assert asked[Msp.STATUS] / 20 >= (0.6 if baud == 1200 else 1.2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recognising GPS receivers and radios on a port before anything is sent there."""
+"""GPS receivers and radios on a port are recognised before anything is sent there."""
 
 import pytest
 from hypothesis import given
@@ -38,7 +38,7 @@ def ubx(payload: bytes) -> bytes:
     ],
 )
 @pytest.mark.parametrize("size", [1, 7, 1000])
-def test_other_devices_are_named(sent: bytes, named: str, size: int) -> None:
+def test_other_devices_are_recognised(sent: bytes, named: str, size: int) -> None:
     watch = OtherDeviceWatch()
     data = b"\x00\xff" + sent + sent
     for start in range(0, len(data), size):
@@ -47,13 +47,13 @@ def test_other_devices_are_named(sent: bytes, named: str, size: int) -> None:
 
 
 @pytest.mark.parametrize("sent", [heartbeat(2, 3), request(Msp.IDENT), b"$M>\x07\x64\xd3\x03\x00\x00\x00\x00\x80\x37"])
-def test_a_flight_controller_is_not(sent: bytes) -> None:
+def test_a_flight_controller_is_not_taken_for_another_device(sent: bytes) -> None:
     watch = OtherDeviceWatch()
     watch.feed(sent * 3)
     assert not watch.what
 
 
-def test_a_damaged_sentence_proves_nothing() -> None:
+def test_a_damaged_sentence_is_not_enough() -> None:
     watch = OtherDeviceWatch()
     watch.feed(NMEA.replace(b"123519", b"123518") + ubx(bytes(92))[:-1] + b"\x00")
     assert not watch.what
@@ -68,21 +68,21 @@ def test_noise_neither_raises_nor_is_a_radio(chunks: list[bytes]) -> None:
 
 
 def listen(sent_at: dict[int, bytes]) -> tuple[str, list[int]]:
-    """Run a listener on a line where something comes every second; return what it says, and the speeds it was at."""
+    """Run a listener on a line with data every second; return its result and the speeds it tried."""
     now = 0.0
     speeds: list[int] = []
     listener = PortListener(now)
     while not listener.is_done:
         if not speeds or speeds[-1] != listener.speed:
             speeds.append(listener.speed)
-        # At another speed than the sender's the same bits make other bytes.
+        # At a speed other than the sender's the bits give other bytes.
         listener.receive(sent_at.get(listener.speed, b"\x00\xfe\x80" * 10 if sent_at else b""))
         now = max(now + 0.5, now)
         listener.tick(now)
     return listener.what, speeds
 
 
-def test_a_silent_port_is_listened_to_at_one_speed() -> None:
+def test_on_a_silent_port_only_one_speed_is_tried() -> None:
     assert listen({}) == ("", [115200])
 
 
@@ -90,9 +90,9 @@ def test_a_gps_receiver_is_found_at_its_own_speed() -> None:
     assert listen({9600: NMEA}) == ("a GPS receiver (NMEA)", [115200, 9600])
 
 
-def test_a_vehicle_at_the_first_speed_ends_it() -> None:
+def test_a_vehicle_at_the_first_speed_ends_the_listening() -> None:
     assert listen({115200: heartbeat(2, 3)}) == ("", [115200])
 
 
-def test_what_is_not_understood_was_listened_to_at_every_speed() -> None:
+def test_unknown_data_is_listened_to_at_every_speed() -> None:
     assert listen({1: b""}) == ("", list(LISTENING_SPEEDS))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Probes received at another speed never contain one of the runs on which Harakiri acts.
+"""Probes received at the wrong speed never contain a run of bytes on which Harakiri acts.
 
-`garble` samples the waveform of 8N1 bytes as the receiver does. The receiver's clock may be off by 2 %; a probe may
-follow another at once or after a pause, from one speed or another, forever. Harakiri counts across frames, so what
-matters is each byte sequence by itself and what any sequence can begin and end with.
+`garble` samples the waveform of 8N1 bytes like a receiver whose clock may be off by 2 %. Probes may follow each other
+at once or after a pause, at any speeds. Harakiri counts across frames, so the tests check every byte sequence by
+itself, and the bytes with which sequences can begin and end.
 """
 
 import itertools
@@ -20,9 +20,9 @@ from simulator.traps import HazardWatch
 from tests.support.world import World
 
 SENT = sorted(set(SPEEDS))
-#: What a CLI takes for `serial_baudrate`, and what other boards use.
+#: Values of `serial_baudrate` in the CLI, and speeds of other boards.
 READ = (1200, 2400, 4800, 7200, 9600, 14400, 19200, 28800, 38400, 57600, 76800, 100000, 115200, 230400, 250000, 1000000)
-#: The receiver's clock against the sender's, in thousandths.
+#: The receiver's clock relative to the sender's, in thousandths.
 CLOCKS = (970, 985, 1000, 1015, 1030)
 
 
@@ -34,7 +34,7 @@ def runs(data: bytes) -> int:
     return HazardWatch().runs_in(data)
 
 
-def test_what_is_sent_is_clean_at_its_own_speed() -> None:
+def test_probes_are_clean_at_their_own_speed() -> None:
     assert is_clean(PROBE)
     assert is_clean(RESYNC)
 
@@ -45,16 +45,13 @@ def test_no_run_within_a_probe(read: int) -> None:
         assert runs(heard(PROBE, sent, read, clock)) == 0
         assert runs(heard(RESYNC, sent, read, clock)) == 0
         assert runs(heard(RUB_OUT_LINE + typed_and_rubbed_out(PROBE) * 2, sent, read, clock)) == 0
-        # The frames that follow without a pause, again and again: the sampling falls into many places.
+        # Frames without a pause, repeated, so that the sampling points vary.
         assert runs(heard(RESYNC * 4, sent, read, clock)) == 0
 
 
 @pytest.mark.parametrize("read", READ)
-def test_no_run_at_the_border_of_any_two_or_more_probes(read: int) -> None:
-    """A run over a border needs a probe that ends in a hazard byte and one that begins with it, or is nothing else.
-
-    There are none, so probes may follow each other in any order forever.
-    """
+def test_no_run_across_probes(read: int) -> None:
+    """A run across probes needs one that ends with a hazard byte and one that begins with it. There are none."""
     for clock in CLOCKS:
         words = {heard(frame, sent, read, clock) for sent in SENT for frame in (PROBE, RESYNC)} - {b""}
         for hazard in HAZARDS:
@@ -65,8 +62,8 @@ def test_no_run_at_the_border_of_any_two_or_more_probes(read: int) -> None:
 
 
 @pytest.mark.parametrize("sent", SENT)
-def test_no_run_where_a_receiver_begins_in_the_middle_of_a_probe(sent: int) -> None:
-    """A receiver that is switched on, or finds its first falling edge, in the middle of what we send."""
+def test_no_run_for_a_receiver_that_starts_within_a_probe(sent: int) -> None:
+    """A receiver that is switched on, or sees its first falling edge, in the middle of a probe."""
     for read in (sent // 12, sent // 6, sent // 4, sent // 3, sent // 2, 2 * sent):
         for clock in CLOCKS:
             for cut in range(1, len(RESYNC)):
@@ -74,8 +71,8 @@ def test_no_run_where_a_receiver_begins_in_the_middle_of_a_probe(sent: int) -> N
 
 
 @pytest.mark.parametrize("read", [300, 14400, 31250, 250000])
-def test_a_search_that_never_ends_enters_no_trap(read: int) -> None:
-    """A board at a speed that is not in our list hears the search for a minute: ten rounds of it."""
+def test_a_long_search_triggers_no_hazard(read: int) -> None:
+    """A board at an unlisted speed receives a minute of searching, ten rounds."""
     world = World(SimOptions(baud=read))
     world.run(60)
     assert world.events("fc.found") == []
@@ -85,7 +82,7 @@ def test_a_search_that_never_ends_enters_no_trap(read: int) -> None:
 
 
 @pytest.mark.parametrize("read", [9600, 19200, 38400, 57600, 115200, 230400, 250000, 460800, 921600, 1000000])
-def test_no_single_trap_byte_at_the_speeds_of_other_firmware(read: int) -> None:
+def test_no_single_hazard_byte_at_the_speeds_of_other_firmware(read: int) -> None:
     """INAV needs one '#' and silence to enter its command line, and one 'R' to reboot into its bootloader."""
     for sent, clock, probe in itertools.product(SENT, CLOCKS, (PROBE, RESYNC)):
         assert not {0x23, 0x52} & set(heard(probe, sent, read, clock))

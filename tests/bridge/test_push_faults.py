@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A push under every fault: the flight controller has the new list, and confirmed it, or the whole old one.
+"""A push under every fault: the flight controller ends with the confirmed new list or the whole old one.
 
-Only a push whose COMMIT was in progress may end with "read the mission back". Afterwards the line always works.
+Only a push interrupted during COMMIT may end with "read the mission back". Afterwards the line always works.
 """
 
 import random
@@ -44,7 +44,7 @@ def commands_sent(world: World) -> list[int]:
 
 
 def push_under(inject: Injection, seed: int, options: SimOptions | None = None) -> tuple[str, World]:
-    """Push the new list during faults; return the result, after checking that it is true."""
+    """Push the new list during faults; return the result after checking that it is true."""
     world = holding_the_old_list(seed, options)
     world.written.clear()
     inject(world, random.Random(seed))
@@ -58,7 +58,7 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
         came_to = "ACCEPTED"
     else:
         came_to = result.text
-        # INVALID: three attempts, and the last one ended with a record whose damage passed the checksum.
+        # INVALID: the last of three attempts ended with a record whose damage passed the checksum.
         assert result.ack in (MissionResult.DENIED, MissionResult.NO_SPACE, MissionResult.INVALID)
         if result.text == PushFailure.UNCERTAIN.value:
             assert committed
@@ -70,7 +70,7 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
 
 
 def works_again(world: World) -> None:
-    """Take the faults away: the same push succeeds, and the flight controller's list reads back."""
+    """Without the faults, the same push succeeds and the list reads back."""
     world.run(4)
     faults = world.faults
     for name in Faults.__dataclass_fields__:
@@ -98,7 +98,7 @@ def setting(**faults: float) -> Injection:
 
 
 def switching(fault: str, latest: float, longest: float) -> Injection:
-    """Switch a fault on at some moment of the push, and off later."""
+    """Switch a fault on at some moment of the push and off later."""
 
     def inject(world: World, draw: random.Random) -> None:
         begin = draw.random() * latest
@@ -120,11 +120,11 @@ def test_bit_errors_are_recovered(rate: float) -> None:
 
 
 def test_many_bit_errors_are_recovered() -> None:
-    """One long frame in three is damaged, and some damage passes an 8 bit checksum."""
+    """A third of the long frames are damaged, and some damage passes an 8-bit checksum."""
     assert outcomes(setting(bit_error_rate=5e-4), 15) == {"ACCEPTED": 15}
 
 
-def test_a_list_that_is_written_again_continues_where_it_ended() -> None:
+def test_a_repeated_push_continues_where_it_ended() -> None:
     for seed in range(10):
         world = holding_the_old_list(seed)
         world.faults.bit_error_rate = 1e-3
@@ -148,15 +148,15 @@ def test_more_bit_errors_end_while_mission_planner_still_waits_for_the_ack(rate:
         assert world.stored == (NEW_RECORDS if result.ack is MissionResult.ACCEPTED else OLD_RECORDS)
 
 
-def test_a_damaged_answer_is_not_believed() -> None:
-    """Seeds at which damage once passed the checksum: of INFO's radius, of COMMIT's answer."""
+def test_a_damaged_reply_is_not_trusted() -> None:
+    """Seeds with damage that passed the checksum: INFO's radius and COMMIT's reply."""
     for seed in (1073, 1171, 1339, 1540):
         came_to, _ = push_under(setting(bit_error_rate=1e-3), seed)
         assert came_to in ("ACCEPTED", PushFailure.OUT_OF_TIME.value)
 
 
-def test_a_pull_over_a_bad_line_is_right_or_refused() -> None:
-    """A READ reply whose place was damaged raised a KeyError out of the bridge in one of fifty."""
+def test_a_pull_over_a_bad_line_is_exact_or_fails() -> None:
+    """A READ reply with a damaged position once raised a KeyError in one run of fifty."""
     held = 0
     for seed in range(24):
         world = holding_the_old_list(seed)
@@ -180,23 +180,23 @@ def test_lost_bytes_are_recovered(rate: float) -> None:
 
 @pytest.mark.parametrize("window", [1, 2, 3, 4])
 @pytest.mark.parametrize("chunk", [1, 4, 15])
-def test_losses_are_recovered_whatever_the_window_and_the_chunks(window: int, chunk: int) -> None:
+def test_losses_are_recovered_with_any_window_and_chunk_size(window: int, chunk: int) -> None:
     options = SimOptions(boot_ms=500, chunk_window=window, chunk_records=chunk)
     assert outcomes(setting(lost_byte_rate=1e-3), 4, options) == {"ACCEPTED": 4}
 
 
-def test_a_board_that_hangs_for_a_while_is_waited_for() -> None:
+def test_a_push_waits_for_a_short_stall() -> None:
     came_to = outcomes(switching("hang", 0.4, 1.0), 15)
     assert came_to == {"ACCEPTED": 15}
 
 
-def test_a_stalled_board_is_never_asked_for_more_than_its_ring_holds() -> None:
+def test_replies_pending_during_a_stall_fit_the_ring() -> None:
     for seed in range(10):
         _, world = push_under(switching("hang", 0.4, 1.5), seed)
         assert world.naze.counters.tx_overflows == 0
 
 
-def test_a_board_that_hangs_for_long_is_given_up() -> None:
+def test_a_push_fails_after_a_long_stall() -> None:
     came_to = outcomes(
         lambda world, draw: world.after(draw.random() * 0.4, lambda: setattr(world.faults, "hang", True)), 15
     )
@@ -213,7 +213,7 @@ def test_a_power_cut_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
     assert len(outcomes(inject, 24)) > 1
 
 
-def test_a_port_that_goes_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
+def test_a_port_lost_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
     def inject(world: World, draw: random.Random) -> None:
         begin = draw.random() * 0.4
         world.after(begin, world.unplug)
@@ -223,7 +223,7 @@ def test_a_port_that_goes_at_any_moment_leaves_the_old_list_or_the_new_one() -> 
 
 
 def test_a_power_cut_at_every_flash_operation_leaves_a_whole_list() -> None:
-    """Three erases, 146 records, the header, its seal."""
+    """Three erases, 146 records, the header and its seal."""
     cuts = 0
     for operation in range(1, 3 + 146 + 2 + 1):
         world = holding_the_old_list(0)
@@ -242,7 +242,7 @@ def test_a_power_cut_at_every_flash_operation_leaves_a_whole_list() -> None:
     assert cuts == 3 + 146 + 2
 
 
-def test_armed_in_the_middle_the_old_list_stays() -> None:
+def test_arming_during_a_push_keeps_the_old_list() -> None:
     def inject(world: World, draw: random.Random) -> None:
         world.after(draw.random() * 0.45, lambda: setattr(world.faults, "armed", True))
 
@@ -251,13 +251,13 @@ def test_armed_in_the_middle_the_old_list_stays() -> None:
     assert came_to[PushFailure.ARMED.value] > 6
 
 
-def test_armed_for_a_moment_in_the_middle() -> None:
+def test_arming_briefly_during_a_push() -> None:
     came_to = outcomes(switching("armed", 0.4, 0.1), 15)
     assert set(came_to) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
 
 
 @pytest.mark.parametrize(("busy_s", "expected"), [(0.5, "ACCEPTED"), (3.0, BUSY_TEXT)])
-def test_a_busy_board_is_waited_for_up_to_a_second(busy_s: float, expected: str) -> None:
+def test_a_push_waits_up_to_a_second_for_a_busy_board(busy_s: float, expected: str) -> None:
     def inject(world: World, _: random.Random) -> None:
         world.faults.busy = True
         world.after(busy_s, lambda: setattr(world.faults, "busy", False))
@@ -265,12 +265,12 @@ def test_a_busy_board_is_waited_for_up_to_a_second(busy_s: float, expected: str)
     assert outcomes(inject, 3) == {expected: 3}
 
 
-def test_a_board_that_becomes_busy_in_the_middle_keeps_the_old_list() -> None:
+def test_a_board_that_becomes_busy_during_a_push_keeps_the_old_list() -> None:
     came_to = outcomes(switching("busy", 0.4, 2), 12)
     assert set(came_to) <= {"ACCEPTED", PushFailure.BUSY.value, BUSY_TEXT}
 
 
-def test_a_board_that_limits_flash_wear_is_not_called_busy() -> None:
+def test_a_refusal_for_flash_wear_is_not_reported_as_busy() -> None:
     world = holding_the_old_list(0)
     results = []
     for seed in range(65):
@@ -283,11 +283,11 @@ def test_a_board_that_limits_flash_wear_is_not_called_busy() -> None:
 
 
 @pytest.mark.parametrize(("failures", "expected"), [(1, "ACCEPTED"), (2, "ACCEPTED"), (3, PushFailure.FLASH.value)])
-def test_flash_that_fails_is_tried_twice_again(failures: int, expected: str) -> None:
+def test_a_failed_flash_write_is_retried_twice(failures: int, expected: str) -> None:
     def inject(world: World, draw: random.Random) -> None:
         world.after(draw.random() * 0.2, lambda: setattr(world.faults, "flash_failures", failures))
 
-    # Failures in a row may hit one page of an erase each, which is one failure of BEGIN.
+    # Successive failures may each hit one page of an erase; that is one failure of BEGIN.
     assert outcomes(inject, 12) == {expected: 12}
 
 
@@ -301,7 +301,7 @@ def test_an_identical_list_is_not_written_again() -> None:
     assert (world.naze.counters.flash_writes, world.naze.flash_operations) == (writes, operations)
 
 
-def test_a_cleared_list_is_cleared_once() -> None:
+def test_an_empty_list_is_not_cleared_again() -> None:
     world = holding_the_old_list(0)
     for expected in ("Mission on the flight controller cleared", "The flight controller already held no mission"):
         outcome = world.push([])
@@ -312,7 +312,7 @@ def test_a_cleared_list_is_cleared_once() -> None:
 
 
 def test_telemetry_continues_alongside_a_push_and_the_bounds_hold() -> None:
-    """Arming must be noticed while a list is on its way; the polls and the chunks share the board's ring."""
+    """Arming must be noticed during a push; polls and chunks share the board's ring."""
     world = holding_the_old_list(0)
     outcome = world.push(NEW)
     world.run(0.3)

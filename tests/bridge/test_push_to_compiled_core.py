@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole bridge against the firmware's compiled core on the simulated board, in simulated time.
+"""The whole bridge against the compiled firmware core on the simulated board, in simulated time.
 
-Whatever happens, the board's flash holds the old list or the new one, whole; and then a push works.
+After every fault the board's flash holds the whole old or new list, and another push works.
 """
 
 import random
@@ -38,7 +38,7 @@ def make_world(flash: bytearray, seed: int = 0) -> World:
 
 
 def pushed(world: World, items: Sequence[MissionItem], seconds: float = 90) -> bool:
-    """Push; tell whether the flight controller is said to have it."""
+    """Push the items; True if the push was accepted."""
     outcome = world.push(items)
     world.wait_until(lambda _: bool(outcome), seconds)
     return outcome[0][0].ack is MissionResult.ACCEPTED
@@ -48,14 +48,14 @@ def pushed(world: World, items: Sequence[MissionItem], seconds: float = 90) -> b
 def old_flash() -> bytes:
     flash = bytearray((ERASED,)) * flash_size(SimOptions())
     world = make_world(flash)
-    # The earlier list is what BEGIN has to erase.
+    # An earlier list that BEGIN has to erase.
     assert pushed(world, waypoints(146, seed=6))
     assert pushed(world, OLD)
     return bytes(flash)
 
 
 def push_under(inject: Inject, seed: int) -> bool:
-    """Push the new list while faults come; tell whether it was accepted."""
+    """Push the new list under faults; True if it was accepted."""
     world = make_world(bytearray(old_flash()), seed)
     assert world.stored == OLD_RECORDS
     inject(world, random.Random(seed))
@@ -88,12 +88,12 @@ def arming(world: World, draw: random.Random) -> None:
     world.after(draw.random() * 0.4, lambda: setattr(world.faults, "armed", True))
 
 
-def test_146_records_there_read_back_and_cleared() -> None:
+def test_146_records_are_written_read_back_and_cleared() -> None:
     flash = bytearray(old_flash())
     world = make_world(flash)
     assert pushed(world, NEW, 5)
     assert world.stored == NEW_RECORDS
-    # As naze_mission.h says: the first of two slots, its header and seal, and the records bit for bit.
+    # As in naze_mission.h: the first of two slots, its header and seal, and the records bit for bit.
     assert flash[0:2] == b"NM"
     assert flash[16:18] == b"\0\0"
     assert flash[32 : 32 + 16 * 146] == b"".join(record.pack() for record in NEW_RECORDS)
@@ -129,5 +129,5 @@ def test_a_power_cut_at_every_flash_operation_leaves_the_old_list() -> None:
     ],
     ids=["bit errors", "lost bytes", "flash fails twice", "flash fails", "resets", "arming"],
 )
-def test_faults_cost_time_or_the_push_but_never_a_list(inject: Inject, least: int) -> None:
+def test_faults_delay_or_fail_the_push_but_damage_no_list(inject: Inject, least: int) -> None:
     assert sum(push_under(inject, seed) for seed in range(10)) >= least

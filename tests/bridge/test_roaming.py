@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station whose address changes (Wi-Fi roaming): the same ids at a new address, silence at the old one."""
+"""A ground station whose address changes (Wi-Fi roaming): same ids at a new address, silence at the old one."""
 
 import random
 
@@ -13,7 +13,7 @@ from tests.support.world import Air, GroundStation, World
 
 m = messages
 PLAN = waypoints(40)
-#: An upload takes a while.
+#: Enough items for a long upload.
 WIFI = Air(delay_s=0.02)
 
 
@@ -24,7 +24,7 @@ def start() -> World:
 
 
 def beat(station: GroundStation, is_there: list[GroundStation]) -> None:
-    """Send a heartbeat a second as long as the station is the one in `is_there`."""
+    """Send a heartbeat a second while the station is in `is_there`."""
 
     def send() -> None:
         if station in is_there:
@@ -39,7 +39,7 @@ def heartbeat() -> Message:
 
 
 class Roamer:
-    """One ground station that is at one address after the other."""
+    """One ground station that moves from address to address."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -52,7 +52,7 @@ class Roamer:
         return self.present[0]
 
     def move(self, upload: Upload | None = None, *, speaks: bool = True) -> GroundStation:
-        """Be elsewhere; an upload continues there."""
+        """Move to a new address; an upload continues there."""
         left = self.present[:]
         self._number += 1
         station = GroundStation(self.world, f"roams {self._number}", air=WIFI)
@@ -68,7 +68,7 @@ class Roamer:
         return station
 
 
-def test_it_is_served_at_once_and_the_old_address_soon_no_more() -> None:
+def test_the_new_address_is_served_at_once_and_the_old_one_dropped() -> None:
     world = start()
     roamer = Roamer(world)
     old = roamer.station
@@ -83,7 +83,7 @@ def test_it_is_served_at_once_and_the_old_address_soon_no_more() -> None:
     assert world.bridge.ground.peers() == [new.peer]
 
 
-def test_there_and_back_again() -> None:
+def test_moving_and_back() -> None:
     world = start()
     roamer = Roamer(world)
     home = roamer.station
@@ -101,7 +101,7 @@ def test_there_and_back_again() -> None:
     assert home.said("HEARTBEAT")
 
 
-def test_two_with_the_same_ids_are_two() -> None:
+def test_two_stations_with_the_same_ids_stay_separate() -> None:
     """Two Mission Planners with their default ids."""
     world = start()
     both = [GroundStation(world, name) for name in ("one", "other")]
@@ -116,7 +116,7 @@ def test_two_with_the_same_ids_are_two() -> None:
     assert world.events("gcs.silent") == []
 
 
-def test_one_that_falls_silent_alongside_others_is_kept_for_a_minute() -> None:
+def test_a_silent_station_with_shared_ids_is_kept_for_a_minute() -> None:
     world = start()
     station, other = GroundStation(world), GroundStation(world, "other", sysid=250)
     station.send(heartbeat())
@@ -125,7 +125,7 @@ def test_one_that_falls_silent_alongside_others_is_kept_for_a_minute() -> None:
     assert station.peer in world.bridge.ground.peers()
 
 
-def test_behind_a_router_all_must_have_moved() -> None:
+def test_behind_a_router_a_station_moves_only_with_all_others() -> None:
     world = start()
     router, away = GroundStation(world, "router"), GroundStation(world, "away")
     behind = GroundStation(world, "router", sysid=250)
@@ -142,8 +142,8 @@ def test_behind_a_router_all_must_have_moved() -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_an_upload_continues_from_elsewhere(seed: int) -> None:
-    """Moved at any moment, once or twice; while the list is written, and behind the last item, too."""
+def test_an_upload_continues_from_a_new_address(seed: int) -> None:
+    """Moving once or twice at any moment, also after the last item and while the list is written."""
     chance = random.Random(seed)
     world = start()
     roamer = Roamer(world)
@@ -156,7 +156,7 @@ def test_an_upload_continues_from_elsewhere(seed: int) -> None:
     assert world.stored == records_of(PLAN)
 
 
-def test_one_that_answers_and_never_repeats_is_asked_where_it_is() -> None:
+def test_a_station_that_only_answers_is_asked_at_its_new_address() -> None:
     world = start()
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN, repeat_s=100)
@@ -166,7 +166,7 @@ def test_one_that_answers_and_never_repeats_is_asked_where_it_is() -> None:
     assert world.stored == records_of(PLAN)
 
 
-def test_a_list_started_again_from_elsewhere_is_the_one_that_counts() -> None:
+def test_an_upload_restarted_from_a_new_address_replaces_the_old_one() -> None:
     for count in (40, 30):
         world = start()
         roamer = Roamer(world)
@@ -180,7 +180,7 @@ def test_a_list_started_again_from_elsewhere_is_the_one_that_counts() -> None:
         assert world.stored == records_of(plan)
 
 
-def test_the_end_of_an_upload_is_reported_where_it_is_now() -> None:
+def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
     world = start()
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN)
@@ -192,8 +192,8 @@ def test_the_end_of_an_upload_is_reported_where_it_is_now() -> None:
     assert Upload(new, PLAN).run() is MissionResult.ACCEPTED
 
 
-def test_a_second_one_with_the_same_ids_gets_into_no_upload() -> None:
-    """It was there before, or the first one is still there: its list waits, and its items get nowhere."""
+def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
+    """It was known before, or the first one is still active: its list waits, and its items are ignored."""
     world = start()
     first, second = GroundStation(world, "first", air=WIFI), GroundStation(world, "second")
     second.send(heartbeat())
@@ -212,8 +212,8 @@ def test_a_second_one_with_the_same_ids_gets_into_no_upload() -> None:
     assert world.stored == records_of(PLAN)
 
 
-def test_one_that_was_refused_is_not_taken_for_one_that_moved() -> None:
-    """Mission Planner takes a refusal of its COUNT for "continue", and sends its items; the first is silent by then."""
+def test_a_refused_station_is_not_taken_for_one_that_moved() -> None:
+    """Mission Planner sends its items even after its COUNT was refused, when the first station is silent."""
     world = start()
     first = GroundStation(world, "first", air=WIFI)
     upload = Upload(first, PLAN, repeat_s=100)
@@ -232,7 +232,7 @@ def test_one_that_was_refused_is_not_taken_for_one_that_moved() -> None:
     assert world.stored == ()
 
 
-def test_a_download_continues_from_elsewhere() -> None:
+def test_a_download_continues_from_a_new_address() -> None:
     world = start()
     roamer = Roamer(world)
     assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED

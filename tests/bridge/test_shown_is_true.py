@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole flight in each protocol: every value on a ground station's screen is true and current."""
+"""A whole flight in each protocol: every value on a ground station's screen is correct and current."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -25,12 +25,12 @@ FIELD = 453838000, 84733000
 METRES_PER_UNIT = 0.01113
 ANGLE, BARO, GPS_HOLD = 1 << 0, 1 << 2, 1 << 7
 COPTER_STABILIZE, COPTER_ALT_HOLD, COPTER_AUTO, COPTER_LOITER = 0, 2, 3, 5
-#: Boards on which a mission is flown: the boxes of level flight, of the mission, and of holding a position.
+#: Boards that fly missions: the boxes of level flight, mission and position hold.
 BOXES = {
     "inav": [1 << INAV_BOXES["9.1.0"].index(box) for box in (INAV_ANGLE, NAV_WP, NAV_POSHOLD)],
     "multiwii": [1 << 1, 1 << 10, 1 << 8],
 }
-#: Home, and a way of 300 m around the field.
+#: Home and a 300 m path around the field.
 MISSION = [
     MissionItem(seq, 16, 3, 0, 0, 0, 0, FIELD[0] + north, FIELD[1] + east, height_m)
     for seq, (north, east, height_m) in enumerate(
@@ -40,14 +40,14 @@ MISSION = [
 
 
 def of_home(craft: Craft) -> float:
-    """Metres from the place of arming."""
+    """Distance from the place of arming, m."""
     north = (craft.flight.lat_e7 - FIELD[0]) * METRES_PER_UNIT
     east = (craft.flight.lon_e7 - FIELD[1]) * METRES_PER_UNIT * math.cos(math.radians(45.38))
     return math.hypot(north, east)
 
 
 def velocity_cm_s(craft: Craft, direction_deg: float) -> float:
-    """The part of its speed over ground in a direction."""
+    """The component of its ground speed in a direction."""
     return craft.flight.speed_ms * 100 * math.cos(math.radians(craft.flight.course - direction_deg))
 
 
@@ -61,7 +61,7 @@ def known_volts(message: Message) -> float | None:
 
 @dataclass(frozen=True)
 class Shown:
-    """One value on the screen: the message it is taken from, its truth, and the resolution it is sent with."""
+    """One value on the screen: its message, its true value, and the resolution it is sent with."""
 
     kind: str
     value: Callable[[Message], float | None]
@@ -70,7 +70,7 @@ class Shown:
     circle: bool = False
 
 
-#: As Mission Planner reads them: position, height and course from GLOBAL_POSITION_INT, volts from BATTERY_STATUS.
+#: Read as in Mission Planner: position, height and course from GLOBAL_POSITION_INT, volts from BATTERY_STATUS.
 SCREEN = {
     "roll": Shown("ATTITUDE", lambda msg: math.degrees(msg.roll), lambda c: c.flight.roll, 0.1),
     "pitch": Shown("ATTITUDE", lambda msg: math.degrees(msg.pitch), lambda c: -c.flight.pitch, 0.1),
@@ -94,7 +94,7 @@ SCREEN = {
     "throttle": Shown("RC_CHANNELS", lambda msg: msg.chan3_raw, lambda c: 1450 if c.armed else 1000, 0),
     "arm switch": Shown("RC_CHANNELS", lambda msg: msg.chan5_raw, lambda c: 2000 if c.armed else 1000, 0),
 }
-#: An armed Harakiri that hears nothing and sends FrSky telemetry: all that it tells, where coarser with its resolution.
+#: All values from an armed Harakiri that only sends FrSky telemetry, and their resolution where coarser.
 FRSKY = "FrSky"
 FRSKY_RESOLUTION = {
     "lat": 17, "lon": 17, "height": 11, "altitude": 11, "climb": 8, "speed north": 50, "speed east": 50,
@@ -108,7 +108,7 @@ SCREEN_BY_KIND = {
 
 @dataclass
 class Screen:
-    """Compares what is shown with the craft every 100 ms."""
+    """Compares the shown values with the craft every 100 ms."""
 
     world: World
     station: GroundStation
@@ -121,18 +121,18 @@ class Screen:
         self.station.on_message.append(self.take)
 
     def take(self, message: Message) -> None:
-        """Show a message; whatever it says was true a moment ago."""
+        """Show a message; each of its values was true a moment ago."""
         for name, what in SCREEN_BY_KIND.get(message.get_type(), ()):
             value = what.value(message)
             if value is None:
                 continue
             self.shown[name] = self.world.now, value
             if not self.is_true(name, value):
-                self.look()  # it may be news
+                self.look()  # the craft may have just changed
                 assert self.is_true(name, value), (self.world.now, name, value, what.truth(self.past[-1][1]))
 
     def look(self) -> None:
-        """Note the truth of this moment."""
+        """Record the craft's present state."""
         craft = self.world.naze.truth(self.world.now)
         if craft is not None:
             self.past.append((self.world.now, craft))
@@ -170,7 +170,7 @@ def beat(station: GroundStation) -> None:
 
 
 def on_the_ground(board: str | TelemetryProtocol) -> Screen:
-    """A ground station that watches a craft, ready to arm."""
+    """A ground station connected to a craft that is ready to arm."""
     if isinstance(board, TelemetryProtocol):
         world = World(SimOptions(tele_prot=board))
     elif board == FRSKY:
@@ -201,17 +201,17 @@ ALL = [*TelemetryProtocol, *BOXES, FRSKY]
 
 
 def modes_of(board: str | TelemetryProtocol) -> tuple[tuple[int, int], ...]:
-    """The boxes of three parts of a flight, each with the mode that they make."""
+    """The boxes of three parts of a flight, each with the resulting mode."""
     if isinstance(board, TelemetryProtocol):
         return (ANGLE, COPTER_STABILIZE), (ANGLE | BARO, COPTER_ALT_HOLD), (ANGLE | BARO | GPS_HOLD, COPTER_LOITER)
-    if board == FRSKY:  # which has no mode: the heartbeat keeps the last one
+    if board == FRSKY:  # FrSky has no mode: the heartbeat keeps the last one
         return ((ANGLE, COPTER_STABILIZE),) * 3
     level, mission, hold = BOXES[board]
     return (level, COPTER_STABILIZE), (mission, COPTER_AUTO), (hold, COPTER_LOITER)
 
 
 def shown_by(board: str | TelemetryProtocol) -> set[str]:
-    """What an armed board tells."""
+    """The values that an armed board sends."""
     return set(FRSKY_RESOLUTION if board == FRSKY else SCREEN)
 
 
@@ -236,7 +236,7 @@ def test_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
 
 
 @pytest.mark.parametrize("board", ALL)
-def test_what_was_heard_before_the_link_was_lost_is_not_shown_as_new(board: str | TelemetryProtocol) -> None:
+def test_values_from_before_a_lost_link_are_not_shown_as_current(board: str | TelemetryProtocol) -> None:
     screen = on_the_ground(board)
     boxes, mode = modes_of(board)[2]
     screen.world.faults.boxes = boxes

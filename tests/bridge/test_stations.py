@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground stations that come and go: which get messages, in which MAVLink version, and for how long."""
+"""Ground stations come and go: which of them get messages, in which MAVLink version, for how long."""
 
 import random
 
@@ -24,7 +24,7 @@ def gcs_heartbeat() -> Message:
 
 
 def versions(station: GroundStation, *, heartbeats: bool = True) -> set[int]:
-    """The MAVLink versions of the frames that came, by their first byte."""
+    """The MAVLink versions of the received frames, by their first byte."""
     heartbeat_ids = {(0xFE, 0), (0xFD, 0)}
     frames = station.frames_heard
     ids = [(frame[0], frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")) for frame in frames]
@@ -38,7 +38,7 @@ def start() -> World:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_each_is_answered_in_its_own_version(version: int) -> None:
+def test_each_station_is_answered_in_its_own_version(version: int) -> None:
     world = start()
     station = GroundStation(world, version=version)
     other = GroundStation(world, "other", sysid=250, version=3 - version)
@@ -50,7 +50,7 @@ def test_each_is_answered_in_its_own_version(version: int) -> None:
     world.run(2.5)
     assert versions(station, heartbeats=False) == {version}
     assert versions(other, heartbeats=False) == {3 - version}
-    # A MAVLink 1 station also gets heartbeats in MAVLink 2, so that Mission Planner switches.
+    # A MAVLink 1 station also gets MAVLink 2 heartbeats, which make Mission Planner switch.
     assert versions(station) == ({1, 2} if version == 1 else {2})
 
 
@@ -63,15 +63,15 @@ def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
     station.send(gcs_heartbeat())
     world.run(0.01)
     station.frames_heard.clear()
-    # It may still send a frame in MAVLink 1 now and then.
+    # It may still send an occasional MAVLink 1 frame.
     station.version = 1
     station.send(gcs_heartbeat())
     world.run(2)
     assert versions(station) == {2}
 
 
-def test_a_newcomer_gets_heartbeats_faster_for_three_seconds() -> None:
-    """Mission Planner needs two of them before it continues connecting."""
+def test_a_new_station_gets_faster_heartbeats_for_three_seconds() -> None:
+    """Mission Planner needs two heartbeats before it continues connecting."""
     world = start()
     old, new = GroundStation(world, "old"), GroundStation(world, "new", sysid=254)
     old.send(gcs_heartbeat())
@@ -85,7 +85,7 @@ def test_a_newcomer_gets_heartbeats_faster_for_three_seconds() -> None:
     assert len(new.said("HEARTBEAT")) == 10
 
 
-def test_the_vehicle_is_there_once_a_second() -> None:
+def test_a_heartbeat_is_sent_once_a_second() -> None:
     world = start()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
@@ -99,7 +99,7 @@ def test_the_vehicle_is_there_once_a_second() -> None:
     assert (beat.get_srcSystem(), beat.get_srcComponent(), beat.autopilot, beat.type) == (1, 1, 3, 2)
 
 
-def test_the_heartbeat_tells_whether_a_flight_controller_is_there_and_armed() -> None:
+def test_the_heartbeat_reflects_the_flight_controller_and_arming() -> None:
     world = World(speeds=(115200,), powered=False)
     station = GroundStation(world)
     station.send(gcs_heartbeat())
@@ -143,7 +143,7 @@ def test_an_active_station_is_kept() -> None:
     assert world.events("gcs.silent") == []
 
 
-def test_a_default_peer_is_spoken_to_unasked_and_forever_in_both_versions() -> None:
+def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
     world = start()
     station = GroundStation(world, "fixed")
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
@@ -178,7 +178,7 @@ def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
     assert everyone.said("HEARTBEAT")
 
 
-def test_strangers_by_the_hundred_take_no_memory_and_leave_room() -> None:
+def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
     world = start()
     station = GroundStation(world)
     frame = GroundStation(world, "pack", sysid=9).pack(gcs_heartbeat())
@@ -189,13 +189,13 @@ def test_strangers_by_the_hundred_take_no_memory_and_leave_room() -> None:
     assert len(world.bridge.ground.peers()) <= MAX_PEERS
     world.run(6)
     assert len(world.bridge.ground._writers) <= MAX_PEERS
-    # They fell silent: a new one finds room.
+    # Once they are silent, there is room for a new one.
     station.send(gcs_heartbeat())
     world.run(1.5)
     assert station.said("HEARTBEAT")
 
 
-def test_thirty_that_want_everything_share_2400_messages_a_second() -> None:
+def test_thirty_stations_that_request_everything_share_2400_messages_a_second() -> None:
     world = start()
     stations = [GroundStation(world, str(number), sysid=number) for number in range(1, 31)]
     for station in stations:
@@ -209,7 +209,7 @@ def test_thirty_that_want_everything_share_2400_messages_a_second() -> None:
     assert 1000 < sum(len(station.frames_heard) for station in stations) < 2 * 2600
 
 
-def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
+def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
     world = start()
     station = GroundStation(world, "tcp")
     data = station.pack(gcs_heartbeat()) + station.pack(
@@ -221,7 +221,7 @@ def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
     assert len(station.said("COMMAND_ACK")) == 1
     world.spoken_by(station, data[:9], datagram=False)
     world.bridge.gcs_gone(station.peer, world.now)
-    # A new connection from the same address starts again.
+    # A new connection from the same address starts from scratch.
     world.spoken_by(station, data, datagram=False)
     world.run(0.01)
     assert len(station.said("COMMAND_ACK")) == 2
@@ -230,7 +230,7 @@ def test_a_stream_is_split_over_reads_and_its_end_forgets_it() -> None:
     assert world.bridge.ground._splitters == {}
 
 
-def test_a_datagram_with_a_cut_frame_does_not_spoil_the_next() -> None:
+def test_a_truncated_datagram_does_not_affect_the_next() -> None:
     world = start()
     station = GroundStation(world)
     command = station.pack(m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0))
@@ -240,7 +240,7 @@ def test_a_datagram_with_a_cut_frame_does_not_spoil_the_next() -> None:
     assert len(station.said("COMMAND_ACK")) == 3
 
 
-def test_our_own_frames_are_not_a_station() -> None:
+def test_our_own_frames_are_not_taken_for_a_station() -> None:
     world = start()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
@@ -252,7 +252,7 @@ def test_our_own_frames_are_not_a_station() -> None:
     assert len(world.bridge.ground.peers()) == before
 
 
-def test_texts_fit_their_message_and_lose_nothing() -> None:
+def test_texts_are_split_without_loss() -> None:
     texts = [
         "short",
         "x" * 50,
@@ -264,7 +264,7 @@ def test_texts_fit_their_message_and_lose_nothing() -> None:
     ]
     for text in texts:
         pieces = split_text(text)
-        # A receiver that joins them takes a piece of 50 for "more follows".
+        # A receiver that joins pieces expects another one after a piece of 50 characters.
         assert all(len(piece) == 50 for piece in pieces[:-1])
         assert len(pieces[-1]) <= (50 if len(pieces) == 1 else 49)
         assert "".join("".join(pieces).split()) == "".join(text.split())
@@ -272,13 +272,13 @@ def test_texts_fit_their_message_and_lose_nothing() -> None:
 
 
 @given(st.lists(st.integers(1, 49), min_size=1, max_size=20))
-def test_joined_pieces_have_the_same_words(sizes: list[int]) -> None:
-    """MAVSDK and QGroundControl put nothing between the pieces."""
+def test_pieces_joined_without_a_space_have_the_same_words(sizes: list[int]) -> None:
+    """As MAVSDK and QGroundControl join them."""
     words = [chr(ord("a") + number % 26) * size for number, size in enumerate(sizes)]
     assert "".join(split_text(" ".join(words))).split() == words
 
 
-def test_a_long_text_can_be_joined_and_its_pieces_can_be_read_alone() -> None:
+def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
     world = start()
     stations = [GroundStation(world, "new"), GroundStation(world, "old", version=1, sysid=254)]
     for station in stations:
@@ -302,7 +302,7 @@ def test_a_long_text_can_be_joined_and_its_pieces_can_be_read_alone() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
-    """Checksums are right, contents are anything: too short, too long, not a number, no text."""
+    """Valid checksums around arbitrary contents: too short, too long, not a number, not text."""
     world = start()
     station = GroundStation(world)
     draw = random.Random(seed)
@@ -314,7 +314,7 @@ def test_any_payload_in_any_message_raises_nothing(seed: int) -> None:
         alphabet = draw.choice((bytes(range(256)), b"\x00\x01\xff", b"\x00\x00\xc0\x7f", b"\x01"))
         payload = bytes(draw.choices(alphabet, k=size))
         if msgid in (44, 45) and draw.random() < 0.5:
-            # The targets at their place, so that it reaches the transfer.
+            # Correct target ids, so that it reaches the transfer.
             payload = payload[:2].ljust(2, b"\0") + b"\x01\x01\x00"
         header = bytes((len(payload), 0, 0, number % 256, 255, 190)) + msgid.to_bytes(3, "little")
         crc = mcrf4xx(header + payload + bytes((CRC_EXTRA[msgid],)))

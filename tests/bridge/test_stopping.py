@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A stop during a mission transfer: the mission arrives or the old list stays, and its sender is told which."""
+"""A stop during a mission transfer: the new list arrives or the old one stays, and the sender is told which."""
 
 import random
 
@@ -51,7 +51,7 @@ def test_a_push_under_way_is_finished(world: World) -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_a_push_that_is_aborted_at_any_moment(world: World, seed: int) -> None:
-    """Whatever is answered is true; the board has been told, and takes the next list."""
+    """The result is true, and the board accepts the next list."""
     outcome = world.push(NEW)
     world.run(random.Random(seed).uniform(0, 0.45))
     stop(world)
@@ -61,7 +61,7 @@ def test_a_push_that_is_aborted_at_any_moment(world: World, seed: int) -> None:
     if result.ack is MissionResult.ACCEPTED:
         assert world.stored == records_of(NEW)
         assert world.store.outcomes() == [Outcome.VERIFIED]
-    elif isinstance(result, Refusal):  # it was still asking whether the board would take a list
+    elif isinstance(result, Refusal):  # BEGIN was not answered yet
         assert result.text == "naze-bridge is stopping: try again later"
         assert world.stored == records_of(OLD)
     else:
@@ -74,7 +74,7 @@ def test_a_push_that_is_aborted_at_any_moment(world: World, seed: int) -> None:
     world.assert_line_was_clean()
 
 
-def test_a_board_that_is_deaf_is_left_with_its_old_list() -> None:
+def test_a_board_that_does_not_answer_keeps_its_old_list() -> None:
     faults = Faults()
     world = World(SimOptions(boot_ms=500), faults, speeds=(115200,), flash=flash_holding(records_of(OLD)))
     world.wait_ready()
@@ -84,7 +84,7 @@ def test_a_board_that_is_deaf_is_left_with_its_old_list() -> None:
     world.run(0.05)
     stop(world)
     abort(world)
-    # The ABORT is not answered either. The daemon waits for 0.6 s, then it closes the port.
+    # ABORT is not answered either. The daemon waits 0.6 s, then closes the port.
     world.run(0.6)
     world.unplug()
     world.run(0.01)
@@ -94,20 +94,20 @@ def test_a_board_that_is_deaf_is_left_with_its_old_list() -> None:
     assert world.store.outcomes() == [Outcome.FAILED]
 
 
-def test_an_upload_whose_items_are_still_coming_is_cancelled_and_kept(world: World) -> None:
+def test_an_unfinished_upload_is_cancelled_and_stored(world: World) -> None:
     station = GroundStation(world, air=Air(delay_s=0.005))
     upload = Upload(station, NEW)
     world.wait_until(lambda _: len(upload.requested) > 20, 5)
     stop(world)
     world.run(0.1)
     assert world.store.outcomes() == [Outcome.CANCELLED]
-    # The item that was on its way then is answered the same.
+    # An item already on its way gets the same answer.
     assert {ack.type for ack in station.said("MISSION_ACK")} == {MissionResult.OPERATION_CANCELLED}
     assert "Upload ended: naze-bridge stops, old mission kept" in station.texts()
     assert world.stored == records_of(OLD)
 
 
-def test_no_transfer_is_started_any_longer(world: World) -> None:
+def test_no_transfer_is_started_while_stopping(world: World) -> None:
     station = GroundStation(world)
     stop(world)
     station.send(count_message(5))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""With an SD card that answers after minutes or never, telemetry and mission uploads still work."""
+"""Telemetry and mission uploads work even if the SD card answers after minutes or never."""
 
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionResult
@@ -15,7 +15,7 @@ def holding(count: int = 5) -> tuple[World, GroundStation]:
     return world, GroundStation(world)
 
 
-def test_a_mission_gets_there_while_mission_planner_still_waits() -> None:
+def test_a_mission_is_accepted_while_mission_planner_still_waits() -> None:
     world, station = holding()
     world.store.delay_s = NEVER
     items = waypoints(20)
@@ -35,7 +35,7 @@ def test_a_disk_that_hangs_after_the_push_does_not_delay_the_ack() -> None:
     assert world.store.outcomes() == [None]
 
 
-def test_the_flight_controller_is_found_and_read_anyway() -> None:
+def test_the_flight_controller_is_still_found_and_read() -> None:
     world = World(speeds=(115200,), flash=flash_holding(records_of(waypoints(5))))
     world.store.delay_s = NEVER
     world.wait_ready(8)
@@ -45,8 +45,8 @@ def test_the_flight_controller_is_found_and_read_anyway() -> None:
     assert len(Download(GroundStation(world)).run(10)) == 5
 
 
-def test_a_late_answer_of_the_store_is_dropped() -> None:
-    """The card continues after 10 s: what it says of one mission is not taken for another's."""
+def test_a_late_reply_of_the_store_is_dropped() -> None:
+    """The card resumes after 10 s; the reply for the first mission is not taken for the second's."""
     world, station = holding()
     world.store.delay_s = 10.0
     assert Upload(station, waypoints(6, 1)).run(8) is MissionResult.ACCEPTED

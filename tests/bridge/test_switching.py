@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arming changes protocol and speed (tele_prot 0..3), disarming changes them back; ground stations see one vehicle."""
+"""Arming changes protocol and speed (tele_prot 0..3) and disarming changes them back; stations see one vehicle."""
 
 from itertools import pairwise
 
@@ -24,7 +24,7 @@ def heartbeat_gaps(station: GroundStation) -> list[float]:
 
 
 def wait_for_telemetry(world: World, station: GroundStation, *, armed: bool) -> float:
-    """Wait for a heartbeat that tells `armed`, with attitude after it; return how long the attitude was missing."""
+    """Wait for a heartbeat with this armed state and an attitude; return the longest gap in ATTITUDE, s."""
     began = world.now
     longest, last = 0.0, began
     station.heard.clear()
@@ -42,7 +42,7 @@ def wait_for_telemetry(world: World, station: GroundStation, *, armed: bool) -> 
 
 @pytest.mark.parametrize("baud", [115200, 57600, 38400])
 @pytest.mark.parametrize("protocol", READABLE)
-def test_one_vehicle_throughout(protocol: TelemetryProtocol, baud: int) -> None:
+def test_ground_stations_see_one_vehicle(protocol: TelemetryProtocol, baud: int) -> None:
     world = World(SimOptions(baud=baud, tele_prot=protocol))
     station = GroundStation(world)
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
@@ -66,7 +66,7 @@ def test_one_vehicle_throughout(protocol: TelemetryProtocol, baud: int) -> None:
 
 
 @pytest.mark.parametrize(("board", "wanted"), [(SimulatedNaze, harakiri.PATCHED), (DeafWhileArmed, harakiri.FRSKY)])
-def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> None:
+def test_one_vehicle_while_frsky_is_sent(board: type[SimulatedNaze], wanted: Profile) -> None:
     faults = Faults()
     world = World(faults=faults, peer=board(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults))
     station = GroundStation(world)
@@ -81,7 +81,7 @@ def test_frsky_is_waited_out(board: type[SimulatedNaze], wanted: Profile) -> Non
         assert station.said("HEARTBEAT")[-1].base_mode & 128
         warnings = [text for text in station.texts() if "FrSky" in text]
         assert len(warnings) == (board is DeafWhileArmed)
-        # No value that is no longer received is shown as current.
+        # Values no longer received are not shown as current.
         status = station.said("SYS_STATUS")[-1]
         gps_health = status.onboard_control_sensors_health & messages.MAV_SYS_STATUS_SENSOR_GPS
         assert (gps_health == 0) == (board is DeafWhileArmed)

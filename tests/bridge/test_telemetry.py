@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Telemetry from MSP polls: the messages match the craft's state, and the line's limits are kept."""
+"""Telemetry from MSP polls: the messages match the craft, and the line is not overloaded."""
 
 import math
 import random
@@ -20,13 +20,13 @@ from tests.support.world import GroundStation, World
 
 m = messages
 ALL_SPEEDS = (115200, 57600, 38400, 19200, 9600, 4800, 2400, 1200)
-#: Question and reply of Harakiri's telemetry, bytes.
+#: Bytes of each of Harakiri's telemetry requests and its reply.
 ROUND_TRIPS = {104: 28, 101: 23, 102: 30, 105: 28, 106: 26, 108: 20, 109: 18, 110: 17, 113: 42, 118: 25}
 ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
 
 
 def flown(seconds: float, *, baud: int = 115200, faults: Faults | None = None) -> tuple[World, GroundStation]:
-    """A craft that was armed so long ago, and a ground station that listens."""
+    """A craft armed `seconds` ago, and a ground station that listens."""
     world = World(SimOptions(baud=baud), faults, speeds=(baud,))
     world.wait_ready(30)
     station = listening(world)
@@ -47,7 +47,7 @@ def beat(station: GroundStation) -> None:
 
 
 def polls(world: World) -> Counter[int]:
-    """How often each question was asked since `world.written` was cleared."""
+    """The number of polls by command since `world.written` was cleared."""
     return Counter(frame.command for _, _, data in world.written for frame in MspParser().feed(data))
 
 
@@ -55,10 +55,10 @@ def rate_hz(station: GroundStation, name: str, seconds: float) -> float:
     return len(station.said(name)) / seconds
 
 
-# What is sent is what the craft does.
+# The messages match the craft.
 
 
-def test_a_flown_circle_is_shown_as_it_was_flown() -> None:
+def test_a_flown_circle_is_shown_correctly() -> None:
     world, station = flown(3)
     truths: list[tuple[Message, FlightState]] = []
 
@@ -76,7 +76,7 @@ def test_a_flown_circle_is_shown_as_it_was_flown() -> None:
 
 
 def check_against(message: Message, truth: FlightState) -> None:
-    """MSP rounds to what it sends, and a message's other sources are up to 0.2 s old: at 2.5 m/s, 50 cm."""
+    """Tolerances: MSP's rounding, and values up to 0.2 s old, which is 50 cm at 2.5 m/s."""
     match message.get_type():
         case "ATTITUDE":
             assert math.degrees(message.roll) == pytest.approx(truth.roll, abs=0.2)
@@ -139,7 +139,7 @@ def test_the_sticks_are_in_arducopters_order() -> None:
     assert (raw.port, raw.chan3_raw, raw.chan4_raw, raw.rssi) == (0, 1450, 1500, channels.rssi)
 
 
-def test_values_without_a_mavlink_field_are_named_values() -> None:
+def test_values_without_a_mavlink_field_are_sent_as_named_values() -> None:
     _, station = flown(20)
     named = {message.name: message.value for message in station.said("NAMED_VALUE_INT", "NAMED_VALUE_FLOAT")}
     assert (named["cycle_us"], named["i2c_err"]) == (3000, 0)
@@ -147,8 +147,8 @@ def test_values_without_a_mavlink_field_are_named_values() -> None:
     assert 180 <= named["home_deg"] <= 270
 
 
-def test_no_ground_station_is_shown_an_alarm() -> None:
-    """MAVProxy says "fence breach" without the fence's bit, Mission Planner "SAFE" without the motors'."""
+def test_no_ground_station_shows_a_false_alarm() -> None:
+    """MAVProxy shows "fence breach" without the fence bit, Mission Planner "SAFE" without the motor bit."""
     _, station = flown(3)
     status = station.said("SYS_STATUS")[-1]
     present, health = status.onboard_control_sensors_present, status.onboard_control_sensors_health
@@ -175,7 +175,7 @@ def test_no_ground_station_is_shown_an_alarm() -> None:
         (1 << 9 | 1 << 3, 1, False),
     ],
 )
-def test_the_switches_make_the_mode(boxes: int, custom_mode: int, stabilized: bool) -> None:
+def test_the_switches_determine_the_mode(boxes: int, custom_mode: int, stabilized: bool) -> None:
     _, station = flown(1.5, faults=Faults(boxes=boxes))
     beat = station.said("HEARTBEAT")[-1]
     assert beat.custom_mode == custom_mode
@@ -194,7 +194,7 @@ def test_arming_and_modes_are_reported_at_once(switch: str, position: int) -> No
     assert bool(told.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED) is (switch == "boxes")
 
 
-def test_the_ground_is_where_it_is_disarmed() -> None:
+def test_a_disarmed_craft_is_on_the_ground() -> None:
     world, station = flown(3)
     assert station.take("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_IN_AIR
     world.faults.armed = False
@@ -202,18 +202,18 @@ def test_the_ground_is_where_it_is_disarmed() -> None:
     assert station.said("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_ON_GROUND
 
 
-def test_home_is_where_it_was_armed_and_as_high() -> None:
+def test_home_is_the_place_and_altitude_of_arming() -> None:
     _, station = flown(30)
     home = station.said("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == (453838000, 84733000)
     assert home.altitude == pytest.approx(131_000, abs=1000)
 
 
-# The line bears it.
+# The line is not overloaded.
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_telemetry_takes_its_share_of_the_line_and_no_more(baud: int) -> None:
+def test_telemetry_takes_only_its_share_of_the_line(baud: int) -> None:
     world, station = flown(2, baud=baud)
     for row in TELEMETRY:
         station.send(m.MAVLink_command_long_message(1, 1, 511, 0, row.msgid, 10_000, 0, 0, 0, 0, 0))
@@ -233,7 +233,7 @@ def test_telemetry_takes_its_share_of_the_line_and_no_more(baud: int) -> None:
     (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
     (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 0.9, 0.25, 0.7),
 ])  # fmt: skip
-def test_the_rates_without_a_request(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
+def test_the_default_rates(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
     world, station = flown(5, baud=baud)
     station.take()
     world.written.clear()
@@ -243,7 +243,7 @@ def test_the_rates_without_a_request(baud: int, attitude_hz: float, position_hz:
     assert polls(world)[Msp.STATUS] / 30 == pytest.approx(status_hz, rel=0.2)
 
 
-def test_an_address_without_a_station_gets_ten_a_second_until_one_answers_or_the_craft_arms() -> None:
+def test_an_unanswered_address_gets_ten_a_second_until_the_craft_arms() -> None:
     world = World(SimOptions(), speeds=(115200,))
     station = GroundStation(world)
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
@@ -269,7 +269,7 @@ def test_an_address_without_a_station_gets_ten_a_second_until_one_answers_or_the
     assert rate_hz(station, "ATTITUDE", 10) == pytest.approx(25, abs=2)
 
 
-def test_a_bad_line_slows_the_polls_and_a_good_one_brings_them_back() -> None:
+def test_a_bad_line_slows_the_polls_until_it_recovers() -> None:
     world, station = flown(5)
     rates = []
     for loss in (0.0, 0.01, 0.0):
@@ -285,8 +285,8 @@ def test_a_bad_line_slows_the_polls_and_a_good_one_brings_them_back() -> None:
     assert rates[2] == pytest.approx(25, abs=1)
 
 
-def test_a_slow_round_trip_slows_what_is_fast() -> None:
-    """A question is not asked again before it is answered: the board takes 120 ms for each of its loops here."""
+def test_a_slow_round_trip_limits_fast_polls() -> None:
+    """A poll is not repeated before its reply; the board's loop takes 120 ms here."""
     world = World(SimOptions(looptime_ms=120.0), speeds=(115200,))
     world.wait_ready(30)
     station = listening(world)
@@ -299,7 +299,7 @@ def test_a_slow_round_trip_slows_what_is_fast() -> None:
 
 @pytest.mark.parametrize("baud", [19200, 9600])
 def test_telemetry_continues_alongside_a_mission(baud: int) -> None:
-    """A STATUS that is due waits for the next one's time, and then for a long CHUNK."""
+    """A STATUS poll may be delayed by one interval and by a long CHUNK."""
     world = World(SimOptions(baud=baud), speeds=(baud,))
     world.wait_ready(30)
     station = listening(world)
@@ -318,7 +318,7 @@ def test_telemetry_continues_alongside_a_mission(baud: int) -> None:
     world.assert_line_was_clean()
 
 
-def test_noise_on_the_line_is_no_telemetry_and_no_flight_controller() -> None:
+def test_noise_gives_neither_telemetry_nor_a_flight_controller() -> None:
     world, station = flown(3)
     world.power_off()
     world.run(0.5)
@@ -341,7 +341,7 @@ def test_noise_on_the_line_is_no_telemetry_and_no_flight_controller() -> None:
 
 
 @pytest.mark.parametrize("baud", [1200, 2400, 4800])
-def test_on_a_slow_line_messages_of_several_readings_come_as_often_as_their_polls(baud: int) -> None:
+def test_on_a_slow_line_combined_messages_keep_the_rate_of_their_polls(baud: int) -> None:
     world, station = flown(10, baud=baud)
     station.heard.clear()
     world.run(40)
@@ -349,7 +349,7 @@ def test_on_a_slow_line_messages_of_several_readings_come_as_often_as_their_poll
     assert fixes >= 40 / 5 - 2
     for name in ("GLOBAL_POSITION_INT", "VFR_HUD"):
         assert fixes - 2 <= len(station.said(name)) <= fixes + 2, name
-    # What it no longer hears is unknown anyway, as soon as the loss is noticed.
+    # Missing values become unknown as soon as the loss is noticed.
     world.faults.hang = True
     beat(station)
     world.run(12)

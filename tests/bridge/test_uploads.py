@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing a mission, row by row of docs/mission-rules.md: "Before the first item" and "While items arrive"."""
+"""Mission uploads, row by row of docs/mission-rules.md: "Before the first item" and "While items arrive"."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -32,7 +32,7 @@ A = MissionResult
 
 
 def holding(options: SimOptions | None = None, faults: Faults | None = None) -> tuple[World, GroundStation]:
-    """A bridge at a board that holds the old list, and one ground station that has been heard."""
+    """A bridge connected to a board that holds the old list, and one known ground station."""
     world = World(options, faults, speeds=(115200,), flash=OLD_FLASH)
     world.wait_ready()
     assert world.stored == OLD_RECORDS
@@ -67,7 +67,7 @@ def partial_list_message() -> Message:
 
 
 def assert_refusal_stands(world: World, station: GroundStation, result: MissionResult) -> None:
-    """Mission Planner continues after any ack to its count: what it sends then is answered by the same refusal."""
+    """Mission Planner continues after any ack to its count; its further messages get the same refusal."""
     for seq in (0, 1, 0, 999):
         station.take()
         station.send(item_message(seq, OLD[1]))
@@ -83,7 +83,7 @@ def assert_refusal_stands(world: World, station: GroundStation, result: MissionR
 
 
 def refused(world: World, station: GroundStation, count: int, result: MissionResult, words: str) -> None:
-    """Announce a list: it is refused with this answer and these words, and the old list stays."""
+    """Announce a list; it is refused with this result and text, and the old list stays."""
     station.send(count_message(count))
     world.wait_until(lambda _: bool(acks(station)), 3)
     assert acks(station) == [result]
@@ -129,7 +129,7 @@ def test_another_mission_type_does_not_disturb_a_transfer() -> None:
     assert world.stored == records_of(waypoints(30))
 
 
-def test_armed_is_denied() -> None:
+def test_an_upload_while_armed_is_denied() -> None:
     world, station = holding()
     world.faults.armed = True
     world.run(1)
@@ -139,14 +139,14 @@ def test_armed_is_denied() -> None:
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
-def test_armed_in_mavlink_mode_is_denied() -> None:
+def test_an_upload_while_armed_in_mavlink_mode_is_denied() -> None:
     world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.faults.armed = True
     world.run(5)
     refused(world, station, 5, A.DENIED, "Armed")
 
 
-def test_armed_while_items_come_in_is_denied() -> None:
+def test_arming_while_items_arrive_denies_the_upload() -> None:
     world, station = holding()
     receiving(world, station, waypoints(50), 10)
     world.faults.armed = True
@@ -158,7 +158,7 @@ def test_armed_while_items_come_in_is_denied() -> None:
     assert world.store.outcomes()[-1] is Outcome.REJECTED
 
 
-def test_armed_for_a_moment_while_items_come_in_is_denied() -> None:
+def test_arming_briefly_while_items_arrive_denies_the_upload() -> None:
     world, station = holding()
     receiving(world, station, waypoints(50), 10)
     world.faults.armed = True
@@ -169,7 +169,7 @@ def test_armed_for_a_moment_while_items_come_in_is_denied() -> None:
 
 
 @pytest.mark.parametrize("message", [count_message(0), clear_message(), clear_message(255)])
-def test_the_list_is_cleared_and_verified(message: Message) -> None:
+def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     world, station = holding()
     stored_at_ack = []
     station.on_message.append(
@@ -180,14 +180,14 @@ def test_the_list_is_cleared_and_verified(message: Message) -> None:
     assert acks(station) == [A.ACCEPTED]
     assert stored_at_ack == [()]
     assert world.naze.counters.flash_writes == 2
-    # Once more: nothing is written.
+    # The second time nothing is written.
     station.send(message)
     world.run(1)
     assert acks(station) == [A.ACCEPTED, A.ACCEPTED]
     assert world.naze.counters.flash_writes == 2
 
 
-def test_armed_nothing_is_cleared() -> None:
+def test_nothing_is_cleared_while_armed() -> None:
     world, station = holding()
     world.faults.armed = True
     world.run(1)
@@ -197,13 +197,13 @@ def test_armed_nothing_is_cleared() -> None:
         world.run(1)
         assert acks(station) == [A.DENIED]
         assert any("disarm" in text for text in station.texts())
-        # The same refusal is not said again for ten seconds.
+        # The text of a refusal is not repeated for ten seconds.
         world.run(10)
     assert world.stored == OLD_RECORDS
 
 
 def test_home_alone_is_invalid() -> None:
-    """Mission Planner's empty Write; a count of 1 is first answered by asking for the item."""
+    """Mission Planner's empty Write; a count of 1 is first answered with a request for the item."""
     world, station = holding()
     assert Upload(station, waypoints(1)).run() is A.INVALID
     assert "Mission rejected: only a home point, no command" in station.texts()
@@ -212,7 +212,7 @@ def test_home_alone_is_invalid() -> None:
 
 
 def test_one_item_of_zeros_clears() -> None:
-    """MAVSDK's clear_mission on a vehicle that says ARDUPILOTMEGA."""
+    """MAVSDK's clear_mission on an ARDUPILOTMEGA vehicle."""
     world, station = holding()
     blank = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
     assert Upload(station, [blank]).run() is A.ACCEPTED
@@ -231,8 +231,8 @@ def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> Non
     assert Upload(station, waypoints(capacity)).run() is A.ACCEPTED
 
 
-def test_two_that_press_write_together_both_succeed() -> None:
-    """The second one's MISSION_COUNT is repeated for 2.8 s, and answered when its turn has come."""
+def test_two_simultaneous_uploads_both_succeed() -> None:
+    """The second station repeats its MISSION_COUNT for 2.8 s and is answered when its turn comes."""
     world, station = holding()
     second = GroundStation(world, "second", sysid=254, air=Air(delay_s=0.002))
     station.air = Air(delay_s=0.002)
@@ -242,13 +242,13 @@ def test_two_that_press_write_together_both_succeed() -> None:
     assert [upload.requested for upload in uploads] == [list(range(100)), list(range(30))]
 
 
-def test_a_slow_ground_station_holds_up_no_other() -> None:
+def test_a_slow_upload_does_not_delay_others() -> None:
     world, slow = holding()
     receiving(world, slow, waypoints(4, 1), 0)
     for seq in range(4):
         world.after(4.9 * (seq + 1), lambda seq=seq: slow.send(item_message(seq, waypoints(4, 1)[seq])))  # type: ignore[misc]
     world.run(2)
-    # The first of these waits for its turn until the slow list has been arriving for 4 s.
+    # The first of these waits until the slow list has been arriving for 4 s.
     for number in range(3):
         plan = waypoints(30, number)
         assert (
@@ -260,8 +260,8 @@ def test_a_slow_ground_station_holds_up_no_other() -> None:
     assert world.stored == records_of(waypoints(4, 1))
 
 
-def test_many_that_begin_and_never_end_hold_up_no_other() -> None:
-    """Those with the slowest progress end."""
+def test_unfinished_uploads_do_not_delay_others() -> None:
+    """The ones with the slowest progress end."""
     world, station = holding()
     station.air = Air(delay_s=0.03)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
@@ -277,7 +277,7 @@ def test_many_that_begin_and_never_end_hold_up_no_other() -> None:
     assert state(world) is None
 
 
-def test_few_lists_that_a_station_gives_up_are_stored() -> None:
+def test_only_some_cancelled_lists_are_stored() -> None:
     world, station = holding()
     for _ in range(60):
         station.take()
@@ -289,7 +289,7 @@ def test_few_lists_that_a_station_gives_up_are_stored() -> None:
     assert 10 < len(world.store.missions) <= 25
 
 
-def test_nothing_is_kept_of_a_station_that_hangs_up_before_its_answer() -> None:
+def test_a_station_that_disconnects_before_the_ack_is_forgotten() -> None:
     world, station = holding()
     receiving(world, station, waypoints(60), 60)
     assert state(world) is Delivering
@@ -300,12 +300,12 @@ def test_nothing_is_kept_of_a_station_that_hangs_up_before_its_answer() -> None:
 
 
 def hanging_push(world: World) -> None:
-    """The command line pushes a list, which waits for a disk that hangs."""
+    """A push from the command line that waits for a disk that hangs."""
     world.store.delay_s = 60
     world.push(waypoints(3))
 
 
-def test_a_ground_station_whose_turn_does_not_come_is_denied() -> None:
+def test_an_upload_whose_turn_does_not_come_is_denied() -> None:
     world, station = holding()
     second = GroundStation(world, "second", sysid=254)
     receiving(world, station, waypoints(50), 10)
@@ -322,7 +322,7 @@ def test_a_ground_station_whose_turn_does_not_come_is_denied() -> None:
     assert state(world) is Receiving
 
 
-def test_a_ground_station_is_denied_while_the_command_line_writes() -> None:
+def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
     world, station = holding()
     hanging_push(world)
     for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
@@ -334,7 +334,7 @@ def test_a_ground_station_is_denied_while_the_command_line_writes() -> None:
     assert station.texts() == ["Another mission transfer is running"]
 
 
-def test_a_list_whose_turn_to_be_written_does_not_come_is_denied() -> None:
+def test_a_complete_list_whose_turn_does_not_come_is_denied() -> None:
     world, station = holding()
     receiving(world, station, waypoints(8), 7)
     hanging_push(world)
@@ -350,7 +350,7 @@ def test_a_list_whose_turn_to_be_written_does_not_come_is_denied() -> None:
 
 
 @pytest.mark.parametrize("message", [count_message(0), ack_message(A.OPERATION_CANCELLED)])
-def test_a_ground_station_that_waits_may_cancel(message: Message) -> None:
+def test_a_waiting_upload_can_be_cancelled(message: Message) -> None:
     world, station = holding()
     second = GroundStation(world, "second", sysid=254)
     receiving(world, station, waypoints(8), 3)
@@ -387,7 +387,7 @@ def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
 
 @pytest.mark.parametrize("sent", [0, 1, 10, 29])
 @pytest.mark.parametrize("count", [7, 30, 60])
-def test_the_same_ground_station_starts_again_while_items_come_in(sent: int, count: int) -> None:
+def test_the_same_station_restarts_while_items_arrive(sent: int, count: int) -> None:
     world, station = holding()
     receiving(world, station, waypoints(30, 1), sent)
     again = waypoints(count, 2)
@@ -395,7 +395,7 @@ def test_the_same_ground_station_starts_again_while_items_come_in(sent: int, cou
     assert world.stored == records_of(again)
 
 
-def test_the_same_ground_station_starts_again_while_the_flight_controller_is_asked() -> None:
+def test_the_same_station_restarts_while_the_flight_controller_is_asked() -> None:
     world, station = holding()
     station.send(count_message(9))
     world.run(0.0005)
@@ -406,7 +406,7 @@ def test_the_same_ground_station_starts_again_while_the_flight_controller_is_ask
 
 
 @pytest.mark.parametrize("after_s", [0.001, 0.02, 0.1, 0.2])
-def test_the_same_ground_station_starts_again_while_the_list_is_written(after_s: float) -> None:
+def test_the_same_station_restarts_while_the_list_is_written(after_s: float) -> None:
     world, station = holding()
     first, again = waypoints(146, 1), waypoints(12, 2)
     receiving(world, station, first, 146)
@@ -419,14 +419,14 @@ def test_the_same_ground_station_starts_again_while_the_list_is_written(after_s:
     assert state(world) is None
 
 
-def test_a_new_list_that_is_announced_while_the_one_before_is_written_is_asked_for() -> None:
+def test_a_list_announced_while_another_is_written_is_requested() -> None:
     world, station = holding()
     first, again = waypoints(146, 1), waypoints(12, 2)
     receiving(world, station, first, 146)
     world.run(0.05)
     station.send(count_message(12))
     world.wait_until(lambda _: bool(requested(station)), 2)
-    # The ground station would take the first list's ack for this one's.
+    # The ground station would take the first list's ack for the second one's.
     assert acks(station) == []
     assert world.stored == records_of(first)
     for seq, item in enumerate(again):
@@ -437,14 +437,14 @@ def test_a_new_list_that_is_announced_while_the_one_before_is_written_is_asked_f
 
 
 @pytest.mark.parametrize("announce", [count_message(0), clear_message(), count_message(12)])
-def test_the_ack_of_a_list_does_not_come_after_its_station_has_announced_another(announce: Message) -> None:
+def test_no_ack_for_a_list_after_its_station_has_announced_another(announce: Message) -> None:
     world, station = holding()
     receiving(world, station, waypoints(146, 1), 146)
     world.run(0.05)
     assert state(world) is Delivering
     station.send(announce)
     world.run(1)
-    # A count of 0 is Mission Planner's Cancel, and comes too late; a clear ends with the only ack.
+    # A count of 0 is Mission Planner's Cancel and comes too late; a clear gets the only ack.
     assert acks(station) == ([] if announce.get_type() == "MISSION_COUNT" and announce.count else [A.ACCEPTED])
 
 
@@ -453,13 +453,13 @@ def busy_for(world: World, seconds: float) -> None:
     world.after(seconds, lambda: setattr(world.faults, "busy", False))
 
 
-def test_a_flash_write_is_waited_for() -> None:
+def test_an_upload_waits_for_a_flash_write() -> None:
     world, station = holding()
     busy_for(world, 0.7)
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
-def test_a_flash_write_that_lasts_is_denied() -> None:
+def test_an_upload_during_a_long_flash_write_is_denied() -> None:
     world, station = holding()
     busy_for(world, 3)
     began = world.now
@@ -471,7 +471,7 @@ def test_a_flash_write_that_lasts_is_denied() -> None:
     assert world.stored == OLD_RECORDS
 
 
-def test_without_a_link_is_denied() -> None:
+def test_an_upload_without_a_link_is_denied() -> None:
     world, station = holding()
     world.unplug()
     refused(world, station, 5, A.DENIED, "No link")
@@ -482,19 +482,19 @@ def test_without_a_link_is_denied() -> None:
         assert acks(station) == [A.DENIED]
 
 
-def test_a_flight_controller_that_was_never_there_is_no_link() -> None:
+def test_an_upload_before_any_flight_controller_is_denied() -> None:
     world = World(powered=False)
     station = GroundStation(world)
     refused(world, station, 5, A.DENIED, "No link")
 
 
-def test_a_harakiri_without_the_extension_is_unsupported() -> None:
+def test_an_upload_to_a_harakiri_without_the_extension_is_unsupported() -> None:
     world = World(faults=Faults(extension=False))
     world.wait_ready()
     refused(world, GroundStation(world), 5, A.UNSUPPORTED, "lacks the mission patch")
 
 
-def test_another_flight_controller_is_unsupported() -> None:
+def test_an_upload_to_another_flight_controller_is_unsupported() -> None:
     world = World(peer=MspFake({100: ident(240, HARAKIRI_CAPABILITY), 2: b"BTFL", 116: b"ARM;", 101: bytes(11)}))
     world.wait_until(lambda w: w.is_found, 3)
     refused(world, GroundStation(world), 5, A.UNSUPPORTED, "stores no missions")
@@ -511,7 +511,7 @@ def test_a_refusal_is_remembered_for_ten_seconds() -> None:
     assert "A mission can only be written as a whole" in station.texts()
 
 
-def test_items_of_an_upload_that_a_killed_daemon_knew_of_are_answered_at_once() -> None:
+def test_items_of_an_upload_begun_before_a_restart_are_refused_at_once() -> None:
     world, station = holding()
     for _ in range(3):
         for seq in (11, 12, 13):
@@ -523,8 +523,8 @@ def test_items_of_an_upload_that_a_killed_daemon_knew_of_are_answered_at_once() 
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
-def test_write_fast_that_lost_items_is_reported_as_an_error_and_more_than_once() -> None:
-    """It closes with success: its own MISSION_ACK says that it has ended."""
+def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:
+    """Mission Planner reports success regardless and ends with its own MISSION_ACK."""
     world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     items = waypoints(35)
@@ -554,7 +554,7 @@ def test_a_new_upload_ends_the_reminders() -> None:
     assert station.texts() == []
 
 
-def test_an_item_that_the_network_delayed_still_counts() -> None:
+def test_a_delayed_item_still_counts() -> None:
     world, station = holding()
     items = waypoints(35)
     receiving(world, station, items, 34)
@@ -566,7 +566,7 @@ def test_an_item_that_the_network_delayed_still_counts() -> None:
     assert world.stored == records_of(items)
 
 
-def test_a_new_count_makes_the_refusal_before_forgotten() -> None:
+def test_a_new_count_clears_the_previous_refusal() -> None:
     world, station = holding()
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
@@ -576,11 +576,11 @@ def test_a_new_count_makes_the_refusal_before_forgotten() -> None:
     assert acks(station) == []
 
 
-# While items come in.
+# While items arrive.
 
 
 @pytest.mark.parametrize("as_int", [True, False])
-def test_each_item_is_asked_for_once_by_the_request_that_mission_planner_understands(as_int: bool) -> None:
+def test_each_item_is_requested_once_with_mission_request(as_int: bool) -> None:
     world, station = holding()
     items = waypoints(146)
     upload = Upload(station, items, as_int=as_int)
@@ -595,7 +595,7 @@ def test_each_item_is_asked_for_once_by_the_request_that_mission_planner_underst
     world.assert_line_was_clean()
 
 
-def test_both_kinds_of_items_may_come_in_one_list() -> None:
+def test_a_list_may_mix_float_and_int_items() -> None:
     world, station = holding()
     items = waypoints(10)
     receiving(world, station, items, 0)
@@ -605,8 +605,8 @@ def test_both_kinds_of_items_may_come_in_one_list() -> None:
     assert acks(station) == [A.ACCEPTED]
 
 
-def test_a_burst_is_taken_and_answered_item_by_item() -> None:
-    """Mission Planner's "Write Fast": ten at once, then it wants the request for the eleventh."""
+def test_a_burst_of_items_is_acknowledged_item_by_item() -> None:
+    """Mission Planner's "Write Fast" sends ten at once, then waits for the request for the eleventh."""
     world, station = holding()
     items = waypoints(40)
     receiving(world, station, items, 0)
@@ -621,7 +621,7 @@ def test_a_burst_is_taken_and_answered_item_by_item() -> None:
     assert world.stored == records_of(items)
 
 
-def test_items_out_of_order_are_kept_and_the_missing_one_is_asked_for() -> None:
+def test_items_out_of_order_are_kept_and_the_missing_one_is_requested() -> None:
     world, station = holding()
     items = waypoints(8)
     receiving(world, station, items, 0)
@@ -636,14 +636,14 @@ def test_items_out_of_order_are_kept_and_the_missing_one_is_asked_for() -> None:
     assert world.stored == records_of(items)
 
 
-def test_a_repeat_is_answered_by_one_request_and_never_stored_again() -> None:
+def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
     world, station = holding()
     items = waypoints(8)
     receiving(world, station, items, 5)
     for seq in (0, 4, 4, 2):
         world.run(0.12)
         station.take()
-        # It says something else now: the first one counts.
+        # Even with other contents: the first one counts.
         station.send(item_message(seq, replace(items[seq], alt_m=99.0)))
         world.run(0.001)
         assert requested(station) == [5]
@@ -653,7 +653,7 @@ def test_a_repeat_is_answered_by_one_request_and_never_stored_again() -> None:
     assert world.stored == records_of(items)
 
 
-def test_a_copy_that_the_network_made_is_not_answered_with_a_copy() -> None:
+def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
     world, station = holding()
     items = waypoints(40)
     station.air = Air(repeat=0.1, delay_s=0.03, spread_s=0.02)
@@ -666,7 +666,7 @@ def test_a_copy_that_the_network_made_is_not_answered_with_a_copy() -> None:
     station.send(count_message(len(items)))
     world.run(10)
     assert world.stored == records_of(items)
-    # The air's own copies, and no more of them.
+    # Only the duplicates that the link itself adds.
     assert len(requested(station)) <= 1.4 * len(items)
 
 
@@ -686,7 +686,7 @@ def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continu
 
 
 @pytest.mark.parametrize("sent", [0, 3])
-def test_silence_repeats_the_request_and_ends_the_transfer_after_five_seconds(sent: int) -> None:
+def test_an_unanswered_request_is_repeated_for_five_seconds(sent: int) -> None:
     world, station = holding()
     receiving(world, station, waypoints(8), sent)
     began = world.now
@@ -698,7 +698,7 @@ def test_silence_repeats_the_request_and_ends_the_transfer_after_five_seconds(se
     assert set(requested(station)) == {sent}
     assert times[0] == pytest.approx(0.25, abs=0.05)
     assert 4 <= len(times) <= 8
-    # With growing intervals.
+    # At growing intervals.
     gaps = [later - earlier for earlier, later in pairwise(times)]
     assert gaps == sorted(gaps)
     assert world.stored == OLD_RECORDS
@@ -707,11 +707,11 @@ def test_silence_repeats_the_request_and_ends_the_transfer_after_five_seconds(se
 
 
 @pytest.mark.parametrize(("round_trip_s", "copies"), [(0.2, 1), (0.3, 2), (0.6, 2), (1.0, 3)])
-def test_the_waiting_adapts_to_the_round_trip(round_trip_s: float, copies: int) -> None:
-    """Asking twice costs Mission Planner one of its ten tries.
+def test_the_timeout_adapts_to_the_round_trip(round_trip_s: float, copies: int) -> None:
+    """A repeated request costs Mission Planner one of its ten tries.
 
-    The first request is repeated until it is answered. Each copy brings an item, and each item a request, so there are
-    as many copies of every later one; but no more.
+    The first request is repeated until it is answered. Each copy is answered by an item, which leads to the next
+    request, so every later request is repeated as often, but not more.
     """
     _, station = holding()
     station.air = Air(delay_s=round_trip_s / 2)
@@ -722,7 +722,7 @@ def test_the_waiting_adapts_to_the_round_trip(round_trip_s: float, copies: int) 
 
 @pytest.mark.parametrize("round_trip_s", [0.3, 0.6, 1.0])
 def test_needless_repeats_lengthen_the_timeout(round_trip_s: float) -> None:
-    """A ground station that answers each request once: only the first one is asked for too early."""
+    """A ground station that answers each request once: only the first request is repeated."""
     world, station = holding()
     station.air = Air(delay_s=round_trip_s / 2)
     items = waypoints(30)
@@ -752,8 +752,8 @@ def test_an_error_from_the_ground_station_cancels(result: MissionResult, sent: i
     assert world.stored == OLD_RECORDS
 
 
-def test_an_ack_from_before_the_first_item_ends_nothing() -> None:
-    """Mission Planner ends a Read with it, and the network may bring it late."""
+def test_a_late_ack_of_a_download_does_not_end_the_upload() -> None:
+    """Mission Planner ends a Read with MISSION_ACK, which the network may delay."""
     world, station = holding()
     items = waypoints(8)
     receiving(world, station, items, 0)
@@ -766,8 +766,8 @@ def test_an_ack_from_before_the_first_item_ends_nothing() -> None:
 
 
 @pytest.mark.parametrize("sent", [0, 4])
-def test_a_count_of_none_in_a_running_transfer_is_mission_planners_cancel(sent: int) -> None:
-    """The pilot did not ask to lose the list that is in the craft."""
+def test_a_count_of_0_during_an_upload_cancels_it(sent: int) -> None:
+    """It is Mission Planner's Cancel button; the list on board must not be erased."""
     world, station = holding()
     receiving(world, station, waypoints(8), sent)
     station.send(count_message(0))
@@ -776,7 +776,7 @@ def test_a_count_of_none_in_a_running_transfer_is_mission_planners_cancel(sent: 
     assert world.stored == OLD_RECORDS
 
 
-def test_a_cancel_that_comes_too_late_erases_nothing() -> None:
+def test_a_late_cancel_erases_nothing() -> None:
     world, station = holding()
     items = waypoints(30)
     receiving(world, station, items, 30)
@@ -788,7 +788,7 @@ def test_a_cancel_that_comes_too_late_erases_nothing() -> None:
 
 
 @pytest.mark.parametrize("sent", [0, 4, 8])
-def test_clear_all_in_a_running_transfer_clears(sent: int) -> None:
+def test_clear_all_during_an_upload_clears(sent: int) -> None:
     world, station = holding()
     receiving(world, station, waypoints(8), sent)
     station.send(clear_message())
@@ -797,7 +797,7 @@ def test_clear_all_in_a_running_transfer_clears(sent: int) -> None:
     assert world.stored == ()
 
 
-def test_a_repeated_last_item_is_met_with_silence_and_then_with_the_same_ack() -> None:
+def test_a_repeated_last_item_gets_no_reply_until_the_final_ack() -> None:
     world, station = holding(SimOptions(flash_erase_ms=1200))
     items = waypoints(146)
     receiving(world, station, items, 146)
@@ -814,7 +814,7 @@ def test_a_repeated_last_item_is_met_with_silence_and_then_with_the_same_ack() -
         world.run(0.45)
         assert acks(station) == [A.ACCEPTED]
         assert state(world) is None
-    # An item in the middle is not the last one.
+    # Only the last item.
     station.take()
     station.send(item_message(20, items[20]))
     world.run(0.45)
@@ -822,7 +822,7 @@ def test_a_repeated_last_item_is_met_with_silence_and_then_with_the_same_ack() -
     assert world.naze.counters.flash_writes == 2
 
 
-def test_a_lost_final_ack_is_given_again() -> None:
+def test_a_lost_final_ack_is_sent_again() -> None:
     world, station = holding()
     items = waypoints(20)
     receiving(world, station, items, 19)
@@ -837,7 +837,7 @@ def test_a_lost_final_ack_is_given_again() -> None:
 
 
 def test_the_final_ack_comes_within_two_seconds_of_the_last_item() -> None:
-    """With a flash that stalls for 300 ms and a store that takes its time."""
+    """With a flash that stalls for 300 ms and a slow store."""
     world, station = holding(SimOptions(flash_erase_ms=300))
     world.store.delay_s = 0.3
     items = waypoints(146)
@@ -847,7 +847,7 @@ def test_the_final_ack_comes_within_two_seconds_of_the_last_item() -> None:
     assert acks(station) == [A.ACCEPTED]
 
 
-def test_a_list_that_breaks_a_rule_is_refused_at_once_and_the_refusal_stands() -> None:
+def test_a_list_that_breaks_a_rule_is_refused_at_once() -> None:
     world, station = holding()
     items = waypoints(30)
     items[12] = replace(items[12], command=21)  # LAND must be last
@@ -860,7 +860,7 @@ def test_a_list_that_breaks_a_rule_is_refused_at_once_and_the_refusal_stands() -
     assert world.store.outcomes() == [Outcome.REJECTED]
 
 
-def test_a_list_of_which_nothing_is_left_clears_and_says_so() -> None:
+def test_a_list_with_every_item_dropped_clears_and_says_so() -> None:
     world, station = holding()
     items = waypoints(2)
     items[1] = replace(items[1], command=178)
@@ -869,7 +869,7 @@ def test_a_list_of_which_nothing_is_left_clears_and_says_so() -> None:
     assert any("erased" in text for text in station.texts())
 
 
-def test_the_summary_comes_first_and_goes_to_the_writer_alone() -> None:
+def test_the_summary_comes_first_and_goes_only_to_the_writer() -> None:
     world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     other.send(ack_message(A.ACCEPTED))
@@ -888,7 +888,7 @@ def test_the_summary_comes_first_and_goes_to_the_writer_alone() -> None:
     assert [text.text for text in other.said("STATUSTEXT")] == ["New mission, 20 items, by udp gcs"]
 
 
-def test_a_reason_is_said_on_every_attempt_but_once_an_attempt() -> None:
+def test_a_reason_is_sent_once_per_attempt() -> None:
     world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     for _ in range(3):
@@ -901,7 +901,7 @@ def test_a_reason_is_said_on_every_attempt_but_once_an_attempt() -> None:
     assert other.texts() == []
 
 
-def test_others_hear_that_the_list_was_erased() -> None:
+def test_other_stations_are_told_of_a_clear() -> None:
     world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     other.send(ack_message(A.ACCEPTED))
@@ -915,7 +915,7 @@ def test_others_hear_that_the_list_was_erased() -> None:
 
 @pytest.mark.parametrize("lose", [World.unplug, World.power_off])
 @pytest.mark.parametrize("sent", [0, 4, 30])
-def test_the_flight_controller_is_lost_in_the_middle(lose: Callable[[World], None], sent: int) -> None:
+def test_the_flight_controller_is_lost_during_the_write(lose: Callable[[World], None], sent: int) -> None:
     world, station = holding()
     receiving(world, station, waypoints(30), sent)
     world.run(0.05 if sent == 30 else 0.001)
@@ -941,7 +941,7 @@ def test_the_flight_controller_is_lost_while_it_is_asked() -> None:
 
 
 @pytest.mark.parametrize("failing", [True, False])
-def test_a_store_that_fails_or_is_slow_keeps_no_mission_from_the_flight_controller(failing: bool) -> None:
+def test_a_failing_or_slow_store_does_not_prevent_an_upload(failing: bool) -> None:
     world, station = holding()
     world.store.failing = failing
     world.store.delay_s = 0.7
@@ -951,7 +951,7 @@ def test_a_store_that_fails_or_is_slow_keeps_no_mission_from_the_flight_controll
     assert ("The mission could not be stored on the Pi" in station.texts()) is failing
 
 
-def test_uploads_over_bad_air_are_exact_or_refused() -> None:
+def test_uploads_over_a_bad_radio_link_are_exact_or_refused() -> None:
     accepted = 0
     for seed in range(25):
         world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH)
@@ -968,7 +968,7 @@ def test_uploads_over_bad_air_are_exact_or_refused() -> None:
 
 
 @pytest.mark.parametrize("late_s", [0.02, 0.2])
-def test_a_machine_that_wakes_late_loses_nothing(late_s: float) -> None:
+def test_late_wake_ups_lose_nothing(late_s: float) -> None:
     for seed in range(4):
         world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH, late_s=late_s)
         world.wait_ready()
@@ -981,8 +981,8 @@ def test_a_machine_that_wakes_late_loses_nothing(late_s: float) -> None:
         world.assert_line_was_clean()
 
 
-def test_a_station_that_hammers_fills_nothing() -> None:
-    """The world asserts that the queue of conversations stays short; nothing else may grow without bound either."""
+def test_a_flood_of_requests_fills_no_queue() -> None:
+    """The world asserts that the queue of conversations stays short; here the rest is checked."""
     world, station = holding()
     for number in range(3000):
         station.send(count_message(5 + number % 90))

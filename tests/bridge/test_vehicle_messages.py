@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Unknown values are sent as MAVLink's "unknown", never as 0; other firmware's replies are understood."""
+"""Unknown values are sent as MAVLink's "unknown", never as 0; replies of every firmware are understood."""
 
 import math
 import struct
@@ -31,12 +31,12 @@ U16, U8 = 65535, 255
 
 
 def at(vehicle: Vehicle, boot_ms: int = 0) -> make.Moment:
-    """The time at which everything was received."""
+    """A moment at which everything has just been received."""
     return make.Moment(vehicle, 0.0, boot_ms)
 
 
 def told(state: Vehicle, who: FlightController, **replies: bytes) -> Vehicle:
-    """Let a flight controller answer: a command's name and the payload."""
+    """Pass replies (payloads by command name) to a vehicle; return it."""
     for name, payload in replies.items():
         hear_msp(state, MspFrame(Direction.REPLY, Msp[name], payload), who, 0.0)
     return state
@@ -64,7 +64,7 @@ def fields(message: Any) -> dict[str, Any]:
     return {name: getattr(message, name) for name in message.fieldnames}
 
 
-def test_without_readings_no_message_is_made() -> None:
+def test_without_readings_there_are_no_messages() -> None:
     for row in TELEMETRY:
         for maker in row.makers:
             assert maker(at(Vehicle())) is None
@@ -104,13 +104,13 @@ def test_a_first_fix_in_motion_has_no_direction_yet() -> None:
     assert position["hdg"] == U16
 
 
-def test_standing_still_from_the_start() -> None:
+def test_a_craft_that_never_moved_has_zero_velocity() -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
     position = fields(make.global_position_int(at(state)))
     assert (position["vx"], position["vy"], position["relative_alt"]) == (0, 0, 0)
 
 
-def test_a_course_that_is_sent_is_taken() -> None:
+def test_a_reported_course_is_used() -> None:
     state = told(Vehicle(), INAV, STATUS=status(), ALTITUDE=bytes(10))
     told(state, INAV, RAW_GPS=gps(fix=2, more=struct.pack("<HH", 900, 140)))
     position, raw = fields(make.global_position_int(at(state))), fields(make.gps_raw_int(at(state)))
@@ -121,7 +121,7 @@ def test_a_course_that_is_sent_is_taken() -> None:
 @pytest.mark.parametrize(
     ("who", "fix", "fix_type"), [(INAV, 0, 1), (INAV, 1, 2), (INAV, 2, 3), (HARAKIRI, 1, 3), (BETAFLIGHT, 1, 3)]
 )
-def test_only_inavs_fix_has_grades(who: FlightController, fix: int, fix_type: int) -> None:
+def test_only_inav_reports_the_kind_of_fix(who: FlightController, fix: int, fix_type: int) -> None:
     assert made(make.gps_raw_int(at(told(Vehicle(), who, RAW_GPS=gps(fix=fix)), 0))).fix_type == fix_type
 
 
@@ -130,12 +130,12 @@ def test_without_a_barometer_there_is_no_height() -> None:
     assert make.global_position_int(at(state)) is None
     told(state, HARAKIRI, ATTITUDE=attitude(), RC=struct.pack("<8H", *[1500] * 8))
     assert math.isnan(made(make.vfr_hud(at(state))).climb)
-    # A board that makes one of its GPS has a height anyway.
+    # A board that derives height from GPS reports one.
     told(state, BETAFLIGHT, ALTITUDE=struct.pack("<ih", 20, 0))
     assert made(make.global_position_int(at(state))).relative_alt == 200
 
 
-def test_without_a_compass_there_is_no_heading() -> None:
+def test_without_a_compass_the_heading_is_unknown() -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b1011), ALTITUDE=bytes(6), RAW_GPS=gps(speed=0))
     told(state, HARAKIRI, ATTITUDE=attitude(heading=0))
     assert made(make.global_position_int(at(state))).hdg == U16
@@ -156,7 +156,7 @@ def test_signs_are_the_same_on_all_firmware(who: FlightController, heading: int,
     assert made(make.vfr_hud(at(state))).heading == shown
 
 
-def test_a_battery_that_is_not_measured() -> None:
+def test_an_unmeasured_battery() -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status())
     for reply in (None, struct.pack("<BHH", 0, 0, 0)):
         if reply:
@@ -166,7 +166,7 @@ def test_a_battery_that_is_not_measured() -> None:
         assert make.battery_status(at(state)) is None
 
 
-def test_a_battery_whose_current_is_measured_and_one_whose_is_not() -> None:
+def test_a_battery_with_and_without_measured_current() -> None:
     state = told(Vehicle(), BETAFLIGHT, STATUS=status(), ANALOG=struct.pack("<BHHh", 124, 350, 0, 1234))
     battery = fields(make.battery_status(at(state)))
     assert (battery["voltages"], battery["current_battery"], battery["current_consumed"]) == (
@@ -184,7 +184,7 @@ def test_a_battery_whose_current_is_measured_and_one_whose_is_not() -> None:
     )
 
 
-def test_a_receiver_without_a_strength() -> None:
+def test_a_receiver_without_signal_strength() -> None:
     state = told(Vehicle(), HARAKIRI, RC=struct.pack("<4H", 1500, 1500, 1500, 1000))
     assert made(make.rc_channels(at(state))).rssi == U8
     told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
@@ -194,7 +194,7 @@ def test_a_receiver_without_a_strength() -> None:
         assert made(make.rc_channels(at(state))).rssi == made(make.rc_channels_raw(at(state))).rssi == shown
 
 
-def test_channels_that_are_not_there() -> None:
+def test_missing_channels() -> None:
     state = told(Vehicle(), HARAKIRI, RC=struct.pack("<6H", 1501, 1502, 1503, 1004, 1005, 1006))
     all_channels, raw = made(make.rc_channels(at(state))), made(make.rc_channels_raw(at(state)))
     assert all_channels.chancount == 6
@@ -227,7 +227,7 @@ def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
         (99, 2),
     ],
 )
-def test_the_mixer_makes_the_type(mixer: int, mav_type: int) -> None:
+def test_the_mixer_determines_the_type(mixer: int, mav_type: int) -> None:
     assert make.heartbeat(Vehicle(airframe(mixer)), is_lost=False).type == mav_type
 
 
@@ -245,7 +245,7 @@ def test_the_mixer_makes_the_type(mixer: int, mav_type: int) -> None:
         (HARAKIRI, ("BARO", "ANGLE"), 2, 6, 0),
     ],
 )
-def test_modes_by_their_boxes(
+def test_modes_from_boxes(
     who: FlightController, active: tuple[str, ...], copter_mode: int, plane_mode: int, rover_mode: int
 ) -> None:
     flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
@@ -257,8 +257,8 @@ def test_modes_by_their_boxes(
         assert state.armed
 
 
-def test_inavs_gyro_makes_the_rates() -> None:
-    """About the axes forward, left and up; MAVLink's are forward, right and down."""
+def test_body_rates_from_inavs_gyro() -> None:
+    """INAV's axes are forward, left and up; MAVLink's are forward, right and down."""
     turning = struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0)
     for who, rates in ((INAV, (90, -45, 30)), (HARAKIRI, (math.nan, math.nan, math.nan))):
         state = told(Vehicle(), who, RAW_IMU=turning, ATTITUDE=attitude())
@@ -281,7 +281,7 @@ def test_home_in_flight_is_lower_than_the_craft() -> None:
         RAW_GPS=gps(),
         WP=struct.pack("<BiiHB", 0, 453830000, 84730000, 0, 0),
     )
-    assert make.home_position(at(state)) is None  # how high it flies is not known
+    assert make.home_position(at(state)) is None  # the craft's height is unknown
     told(state, HARAKIRI, ALTITUDE=struct.pack("<ih", 2150, 0))
     home = made(make.home_position(at(state)))
     assert (home.latitude, home.longitude, home.altitude) == (453830000, 84730000, 109_500)
@@ -298,12 +298,12 @@ def test_inavs_home_has_its_altitude_in_centimetres() -> None:
     assert made(make.global_position_int(at(state))).alt == 141_590
 
 
-def test_an_inav_without_a_voltage_says_none() -> None:
+def test_an_inav_without_a_voltage() -> None:
     analog = struct.pack("<BHHIIIIBH", 3 << 4, 0, 0, 0, 0, 0, 0, 0, 0)
     assert make.battery_status(at(told(Vehicle(), INAV, INAV_ANALOG=analog))) is None
 
 
-def test_the_way_home_only_while_there_is_a_home() -> None:
+def test_distance_home_only_with_a_known_home() -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), RAW_GPS=gps())
     assert make.home_distance(at(state)) is make.home_direction(at(state)) is None
     told(state, HARAKIRI, WP=struct.pack("<BiiHB", 0, 453838000 - 3593, 84733000, 0, 0))
@@ -321,8 +321,8 @@ def test_sensors_and_errors() -> None:
 @pytest.mark.parametrize(
     ("volts", "percent"), [((16.8,), 100), ((12.6,), 100), ((12.6, 11.4), 45), ((12.6, 10.5), 5), ((12.6, 9.0), 0)]
 )
-def test_what_is_left_of_a_battery_is_estimated(volts: tuple[float, ...], percent: int) -> None:
-    """By its cells, which are counted while it is full: it does not become a smaller one as it runs down."""
+def test_remaining_charge_is_estimated(volts: tuple[float, ...], percent: int) -> None:
+    """From the number of cells, determined while the battery is full; it does not change as the battery drains."""
     state = told(Vehicle(), HARAKIRI, STATUS=status())
     for voltage in volts:
         told(state, HARAKIRI, ANALOG=struct.pack("<BHH", round(voltage * 10), 0, 0))
@@ -353,7 +353,7 @@ def test_a_receiver_is_healthy_while_it_has_a_signal() -> None:
         (1 << 5, -200, 0, 300, m.MAV_LANDED_STATE_IN_AIR),
     ],
 )
-def test_in_the_air_and_on_the_ground(flags: int, height_cm: int, climb_cms: int, speed: int, landed: int) -> None:
+def test_landed_state(flags: int, height_cm: int, climb_cms: int, speed: int, landed: int) -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status(flags=flags), RAW_GPS=gps(speed=speed))
     told(state, HARAKIRI, ALTITUDE=struct.pack("<ih", height_cm, climb_cms))
     assert made(make.extended_sys_state(at(state))).landed_state == landed

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The vehicle's published groups: the same for every protocol of the flight controller."""
+"""The vehicle's published groups, the same for every protocol of the flight controller."""
 
 import json
 import math
@@ -35,7 +35,7 @@ def heard(station: GroundStation, kind: str) -> Any:
     return station.said(kind)[-1]
 
 
-def test_groups_say_what_ground_stations_are_reported() -> None:
+def test_groups_have_the_values_sent_to_ground_stations() -> None:
     world = World()
     station = GroundStation(world)
     station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
@@ -64,14 +64,14 @@ def test_groups_say_what_ground_stations_are_reported() -> None:
     assert report.mission.count == 0
 
 
-def test_nothing_is_known_before_a_flight_controller_is_there() -> None:
+def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:
     report = World(plugged=False).bridge.report
     assert {group: report.group(group) for group in EMPTY} == EMPTY
     assert report.group(Group.LINK).state == "no port"
     assert report.whole().mission is None
 
 
-def test_a_lost_link_leaves_what_was_known() -> None:
+def test_a_lost_link_keeps_the_last_values() -> None:
     world = World()
     world.wait_ready()
     world.run(3.0)
@@ -84,7 +84,7 @@ def test_a_lost_link_leaves_what_was_known() -> None:
     assert all(report.group(group).age_s > 9 for group in EMPTY)
 
 
-def test_watched_groups_are_polled_for_and_told_of_as_answers_come() -> None:
+def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
     world = World()
     world.wait_ready()
     report = world.bridge.report
@@ -102,7 +102,7 @@ def test_watched_groups_are_polled_for_and_told_of_as_answers_come() -> None:
     assert report.take_fresh() == frozenset()
 
 
-def test_an_autopilot_of_its_own_is_read_too() -> None:
+def test_groups_from_a_mavlink_autopilot() -> None:
     world, autopilot, _ = passing()
     world.bridge.report.watch(Group)
     autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3))
@@ -111,7 +111,7 @@ def test_an_autopilot_of_its_own_is_read_too() -> None:
     autopilot.say(m.MAVLink_gps_raw_int_message(1, 2, 0, 0, 0, 120, 65535, 65535, 65535, 255))
     autopilot.say(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, -1, -1, 0, 0, 0, 0, 0, 0))
     autopilot.say(m.MAVLink_rc_channels_raw_message(1, 0, 1500, 1501, 1000, 1502, *[65535] * 4, 127))
-    # A gimbal is aboard, too, and is no autopilot.
+    # A gimbal on board is not taken for the autopilot.
     gimbal = m.MAVLink(None, srcSystem=1, srcComponent=154)
     autopilot.outgoing += m.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3).pack(gimbal)
     autopilot.outgoing += m.MAVLink_attitude_message(1, 1.0, 1.0, 1.0, 0, 0, 0).pack(gimbal)
@@ -129,7 +129,7 @@ def test_an_autopilot_of_its_own_is_read_too() -> None:
     assert report.group(Group.LINK).state == "MAVLink"
 
 
-def test_an_armed_harakiri_continues_in_mavlink() -> None:
+def test_groups_continue_when_an_armed_harakiri_switches_to_mavlink() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.wait_ready()
     world.run(2.0)
@@ -147,8 +147,8 @@ def test_an_armed_harakiri_continues_in_mavlink() -> None:
 
 
 @given(st.data())
-def test_no_content_of_a_frame_is_too_odd(data: st.DataObject) -> None:
-    """Whatever a damaged autopilot sends within a frame that is whole."""
+def test_arbitrary_contents_of_an_intact_frame_raise_nothing(data: st.DataObject) -> None:
+    """As from a faulty autopilot."""
     world, autopilot, _ = passing()
     autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3))
     for msgid in (0, 1, 24, 30, 33, 35, 65, 74, 147, 242):
@@ -165,7 +165,7 @@ def test_no_content_of_a_frame_is_too_odd(data: st.DataObject) -> None:
         assert json.dumps(asdict(found), allow_nan=False)
 
 
-def test_autopilots_are_reported_apart_by_version_2_and_1() -> None:
+def test_autopilots_on_mavlink_1_and_2_are_reported_separately() -> None:
     world, autopilot, _ = passing(Autopilot(version=1))
     autopilot.say(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
     autopilot.say(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
