@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The emulated board's core: clocks, time, interrupts, reset, and what happens when code goes astray."""
+"""The emulated board's core: clocks, time, interrupts, reset, and crashed programs."""
 
 import logging
 from itertools import pairwise
@@ -40,14 +40,14 @@ def test_systick_interrupts_every_millisecond() -> None:
     assert rig.handler_log() == [15] * 50
 
 
-def test_systick_counts_down_and_tells_once_that_it_has_fired() -> None:
+def test_systick_counts_down_and_its_flag_is_cleared_by_reading() -> None:
     steps = ticking(72_000, interrupt=False).load(SYST_CVR).load(SYST_CVR).wait(SYST_CSR, 1 << 16).load(SYST_CSR)
     first, second, control = Rig(steps).run(0.01).log(3)
     assert 71_000 < second < first < 72_000
     assert control == 0b101
 
 
-def test_waiting_for_the_time_takes_the_time() -> None:
+def test_busy_waiting_takes_the_expected_time() -> None:
     steps = ticking(72_000, interrupt=False)
     for _ in range(20):
         steps.wait(SYST_CSR, 1 << 16)
@@ -56,10 +56,8 @@ def test_waiting_for_the_time_takes_the_time() -> None:
 
 
 @pytest.mark.parametrize(("systick_priority", "order"), [(0xF0, [53, 15]), (0, [15, 15])])
-def test_a_more_urgent_interrupt_does_not_wait_for_the_handler_that_runs(
-    systick_priority: int, order: list[int]
-) -> None:
-    """SysTick's handler makes interrupt 37, exception 53, pending. If that preempts it, it overwrites its log."""
+def test_a_more_urgent_interrupt_preempts_a_handler(systick_priority: int, order: list[int]) -> None:
+    """SysTick's handler sets interrupt 37 (exception 53) pending. If that preempts it, it overwrites its log."""
     enable, disable, pend, priorities = 0xE000_E104, 0xE000_E184, 0xE000_E204, 0xE000_ED20
     steps = at_72_mhz().store(priorities, systick_priority << 24).store(enable, 1 << 5).store(ICSR, 1 << 26)
     handler = Steps().load(ICSR).store(pend, 1 << 5).load(ICSR).store(disable, 1 << 5)
@@ -77,11 +75,11 @@ def test_a_reset_keeps_ram_and_a_power_cut_does_not() -> None:
     assert rig.ram(0x4000, 2) != b"\xfe\xca"
 
 
-def test_only_with_its_key_is_a_reset_granted() -> None:
+def test_a_reset_needs_its_key() -> None:
     assert Rig(Steps().store(AIRCR, 1 << 2)).run(0.001).board.counters.resets == 0
 
 
-def test_code_that_goes_astray_stops_the_board(caplog: pytest.LogCaptureFixture) -> None:
+def test_invalid_code_stops_the_board(caplog: pytest.LogCaptureFixture) -> None:
     rig = Rig(Steps().load(0x6000_0000)).run(0.001)
     assert rig.board.power is Power.CRASHED
     assert rig.board.counters.crashes == 1
@@ -91,7 +89,7 @@ def test_code_that_goes_astray_stops_the_board(caplog: pytest.LogCaptureFixture)
     assert rig.board.power.name == "RUNNING"
 
 
-def test_a_peripheral_that_is_not_emulated_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_an_access_to_a_missing_peripheral_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         rig = Rig(Steps().load(0x4000_6400).load(0x4000_6404)).run(0.001)
     assert rig.log(2) == [0, 0]
@@ -100,7 +98,7 @@ def test_a_peripheral_that_is_not_emulated_is_reported_once(caplog: pytest.LogCa
     ]
 
 
-def test_pins_read_what_they_are_driven_to_or_what_the_board_puts_on_them() -> None:
+def test_pins_read_their_driven_or_external_level() -> None:
     port_c, crh, idr, odr, bsrr, brr = 0x4001_1000, 4, 8, 12, 16, 20
     steps = Steps().load(port_c + idr).store(port_c + crh, 0x4444_4443).store(port_c + bsrr, 1 << 8).load(port_c + idr)
     steps.store(port_c + brr, 1 << 8).load(port_c + idr).store(port_c + bsrr, 1 << 8 | 1 << 24).load(port_c + odr)
@@ -115,7 +113,7 @@ def test_a_timer_counts_at_its_prescaled_clock() -> None:
     assert 1900 < microseconds < 2010
 
 
-def test_the_receiver_gives_its_channels_as_times_between_edges() -> None:
+def test_the_receiver_encodes_channels_as_times_between_edges() -> None:
     timer, cr1, dier, sr, psc, ccr1 = 0x4000_0000, 0, 0x0C, 0x10, 0x28, 0x34
     steps = at_72_mhz().store(0xE000_E100, 1 << 28).store(timer + psc, 71).store(timer + dier, 2).store(timer + cr1, 1)
     rig = Rig(steps, handler=Steps().load(timer + ccr1).store_half(timer + sr, 0))

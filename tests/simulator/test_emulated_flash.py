@@ -9,7 +9,7 @@ from tests.support.table_program import FLASH, RAM, Rig, Steps
 KEYR, SR, CR, AR = 0x4002_2004, 0x4002_200C, 0x4002_2010, 0x4002_2014
 PG, PER, STRT, LOCK = 1, 2, 1 << 6, 1 << 7
 PROGRAM_ERROR, END = 1 << 2, 1 << 5
-#: The first page that is free of the test's program, so that it may be written.
+#: The first page beyond the test's program.
 PAGE = 0x8000
 PLACE = FLASH + PAGE
 
@@ -28,13 +28,13 @@ def test_nothing_is_written_without_the_keys() -> None:
     assert rig.log(4) == [LOCK, LOCK, 0xFFFF_FFFF, PROGRAM_ERROR]
 
 
-def test_half_words_are_programmed_into_erased_flash_only() -> None:
+def test_half_words_can_only_be_programmed_into_erased_flash() -> None:
     steps = unlock().store(CR, PG).store_half(PLACE, 0x1234).load(SR).store(SR, END)
     steps.store_half(PLACE, 0x1230).load(SR).store(SR, PROGRAM_ERROR).load(PLACE).store_half(PLACE, 0).load(PLACE)
     assert Rig(steps).run(0.01).log(4) == [END, PROGRAM_ERROR, 0xFFFF_1234, 0xFFFF_0000]
 
 
-def test_a_page_is_erased_whole_and_its_neighbours_stay() -> None:
+def test_erasing_a_page_leaves_its_neighbours() -> None:
     flash = memoryview(bytearray(bytes(0x2_0000)))
     rig = Rig(erase(unlock()), flash=flash).run(0.1)
     assert bytes(flash[PAGE : PAGE + 1024]) == b"\xff" * 1024
@@ -42,13 +42,13 @@ def test_a_page_is_erased_whole_and_its_neighbours_stay() -> None:
     assert rig.board.counters.flash_erases == 1
 
 
-def test_the_core_stands_still_while_a_page_is_erased() -> None:
+def test_the_core_stalls_while_a_page_is_erased() -> None:
     rig = Rig(erase(unlock()).store(RAM + 0x4000, 0xCAFE))
     assert rig.run(0.024).ram(0x4000, 2) != b"\xfe\xca"
     assert rig.run(0.003).ram(0x4000, 2) == b"\xfe\xca"
 
 
-def test_operations_fail_as_often_as_they_are_reported_to() -> None:
+def test_a_given_number_of_operations_fail() -> None:
     steps = unlock().store(CR, PG).load(CR).store_half(PLACE, 1).load(SR).store(SR, PROGRAM_ERROR).store_half(PLACE, 2)
     rig = Rig(steps.load(PLACE))
     rig.board.faults.flash_failures = 1
@@ -57,7 +57,7 @@ def test_operations_fail_as_often_as_they_are_reported_to() -> None:
 
 
 @pytest.mark.parametrize("operation", [1, 2, 3])
-def test_power_goes_in_the_middle_of_an_operation(operation: int) -> None:
+def test_a_power_cut_during_an_operation(operation: int) -> None:
     flash = memoryview(bytearray(b"\xff" * 0x2_0000))
     steps = erase(unlock()).store(CR, PG).store_half(PLACE, 0).store_half(PLACE + 2, 0).store_half(PLACE + 4, 0)
     rig = Rig(steps, flash=flash)
@@ -65,7 +65,7 @@ def test_power_goes_in_the_middle_of_an_operation(operation: int) -> None:
     rig.run(0.1)
     assert rig.board.power is Power.OFF
     assert rig.board.flash_operations == operation
-    # The half-words programmed before are whole, those after were not started.
+    # Half-words programmed earlier are intact, later ones were not started.
     done = 2 * max(operation - 2, 0)
     assert bytes(flash[PAGE : PAGE + done]) == bytes(done)
     assert bytes(flash[PAGE + done + 2 : PAGE + 1024]) == b"\xff" * (1022 - done)

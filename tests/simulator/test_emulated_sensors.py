@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The emulated I2C bus and the three sensors on it, asked as a driver asks them."""
+"""The emulated I2C bus and its three sensors, accessed like a driver does."""
 
 from tests.support.table_program import Rig, Steps
 
@@ -27,7 +27,7 @@ def write(steps: Steps, device: int, *data: int) -> Steps:
 
 
 def read(steps: Steps, device: int, count: int) -> Steps:
-    """Log one word for SR2, then one for each byte: the last is not acknowledged and stops the transfer."""
+    """Log one word for SR2, then one for each byte; the last byte is not acknowledged, which ends the transfer."""
     address(steps, device, 1)
     if count == 1:
         return steps.store(CR1, PE).load(SR2).store(CR1, PE | STOP).wait(SR1, RXNE).load(DR)
@@ -42,7 +42,7 @@ def read(steps: Steps, device: int, count: int) -> Steps:
 
 
 def ask(device: int, register: int, count: int, *before: tuple[int, ...]) -> list[int]:
-    """The bytes of a register, after some writes."""
+    """The bytes of a register after some writes."""
     steps = bus()
     for data in before:
         write(steps, device, *data)
@@ -54,11 +54,11 @@ def signed(high: int, low: int) -> int:
     return int.from_bytes(bytes((high, low)), "big", signed=True)
 
 
-def test_the_gyroscope_says_who_it_is() -> None:
+def test_the_gyroscope_identifies_itself() -> None:
     assert ask(MPU6050, 0x75, 1) == [0x68]
 
 
-def test_the_board_lies_level_and_still() -> None:
+def test_the_board_is_level_and_at_rest() -> None:
     measured = ask(MPU6050, 0x3B, 14)
     x, y, z, _, *rotation = (signed(*measured[at : at + 2]) for at in range(0, 14, 2))
     assert abs(x) <= 2
@@ -67,12 +67,12 @@ def test_the_board_lies_level_and_still() -> None:
     assert all(abs(rate) <= 4 for rate in rotation)
 
 
-def test_a_register_keeps_what_is_written_until_a_reset() -> None:
+def test_a_register_keeps_its_value_until_a_reset() -> None:
     assert ask(MPU6050, 0x1B, 2, (0x1B, 0x18, 0x10)) == [0x18, 0x10]
     assert ask(MPU6050, 0x1B, 2, (0x1B, 0x18, 0x10), (0x6B, 0x80)) == [0, 0]
 
 
-def test_the_magnetometer_says_who_it_is_and_measures_its_own_coils() -> None:
+def test_the_magnetometer_identifies_itself_and_passes_its_self_test() -> None:
     assert ask(HMC5883L, 10, 3) == [*b"H43"]
     without, positive, negative = (signed(*ask(HMC5883L, 3, 2, (0, mode))) for mode in (0x10, 0x11, 0x12))
     assert abs(without - 300) <= 1
@@ -80,7 +80,7 @@ def test_the_magnetometer_says_who_it_is_and_measures_its_own_coils() -> None:
     assert abs(negative + 766) <= 1
 
 
-def test_the_barometers_coefficients_carry_their_checksum() -> None:
+def test_the_barometers_coefficients_have_a_checksum() -> None:
     words = [int.from_bytes(bytes(ask(MS5611, 0xA0 + 2 * index, 2)), "big") for index in range(8)]
     remainder = 0
     for at, byte in enumerate(b"".join(word.to_bytes(2, "big") for word in words)):
@@ -91,14 +91,14 @@ def test_the_barometers_coefficients_carry_their_checksum() -> None:
     assert remainder >> 12 == words[7] & 0xF
 
 
-def test_the_barometer_converts_what_it_is_reported_to() -> None:
+def test_the_barometer_converts_on_command() -> None:
     temperature = int.from_bytes(bytes(ask(MS5611, 0, 3, (0x58,))), "big")
     pressure = int.from_bytes(bytes(ask(MS5611, 0, 3, (0x48,))), "big")
     assert temperature == 8_569_150
     assert abs(pressure - 9_085_466) <= 100
 
 
-def test_nobody_answers_at_another_address() -> None:
+def test_no_device_answers_at_another_address() -> None:
     steps = bus().store(CR1, PE | START).wait(SR1, SB).store(DR, 0x50 << 1).wait(SR1, AF).store(SR1, 0)
     rig = Rig(steps.store(CR1, PE | STOP).load(SR1).load(SR2)).run(0.01)
     assert rig.log(1) == [0]

@@ -48,12 +48,12 @@ def test_bytes_are_received_one_by_one() -> None:
     assert rig.log(4) == [*b"abc", TC | TXE]
 
 
-def test_a_byte_that_nobody_takes_is_overrun() -> None:
+def test_an_unread_byte_is_overrun() -> None:
     rig = Rig(open_port(RXNE_INTERRUPT).wait(SR, 1 << 3).load(DR).load(SR)).run(0.001).send(b"ab").run(3 * BYTE_S)
     assert rig.log(2) == [ord("a"), TC | TXE]
 
 
-def test_an_interrupt_takes_each_byte() -> None:
+def test_an_interrupt_for_each_received_byte() -> None:
     steps = open_port(RXNE_INTERRUPT).store(0xE000_E104, 1 << 5)
     rig = Rig(steps, handler=Steps().load(DR)).run(0.001).send(b"abc").run(4 * BYTE_S)
     assert rig.handler_log() == [*b"abc"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each row of docs/inav.md's table, written to the simulated board and flown there by the firmware's own rules."""
+"""Each row of the table in docs/inav.md is written to the simulated board and flown there by the firmware's rules."""
 
 import struct
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ USUAL_MS, USUAL_M = 3.0, 20.0
 
 @dataclass
 class Leg:
-    """A record that was flown to, the seconds held there, and the greatest speed on the way."""
+    """A record that was flown to, the seconds held there, and the maximum speed on the way."""
 
     number: int
     held_s: float = 0.0
@@ -33,13 +33,13 @@ class Leg:
 
 
 class Flight:
-    """A list that is flown from the ground to its end."""
+    """A list flown from the ground to its end."""
 
     def __init__(self, kind: str, records: tuple[NavRecord, ...]) -> None:
         self.bench = MspBench(kind, faults=Faults(boxes=0))
         self._kind = kind
         if kind == "multiwii":
-            # The list before this one was longer, and is still in the EEPROM behind it.
+            # The previous list was longer; its last records are still in the EEPROM.
             self.bench.upload([waypoint(90 + number) for number in range(12)])
         self.bench.upload([unpack_waypoint(b"\0" + record.pack())[1] for record in records])
         self.bench.faults.armed, self.bench.faults.boxes = True, SWITCH[kind]
@@ -87,12 +87,12 @@ class Flight:
         return before == self._height()
 
     def told(self) -> str:
-        """As the table has it: only what is unusual is named."""
+        """The table's text: only unusual facts are given."""
         if self.end == "never ends":
             return self.end
         words = []
         for leg in self.legs:
-            speed = max(leg.speeds[1:] or leg.speeds)  # the first may still be that of the leg before
+            speed = max(leg.speeds[1:] or leg.speeds)  # the first sample may still belong to the previous leg
             words.append(str(leg.number))
             if leg.held_s > 1 and self.end != "(stays)":
                 words.append(f"({round(leg.held_s)} s)")
@@ -104,7 +104,7 @@ class Flight:
 
 @pytest.mark.parametrize("kind", ["inav", "multiwii"])
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_each_row_is_flown_as_the_table_says(row: Row, kind: str) -> None:
+def test_each_row_is_flown_as_documented(row: Row, kind: str) -> None:
     verdict, expected = row.verdict(kind), getattr(row, kind)
     if not expected:
         assert verdict.result is Result.REJECTED
@@ -114,7 +114,7 @@ def test_each_row_is_flown_as_the_table_says(row: Row, kind: str) -> None:
     assert flown == expected
 
 
-def test_every_command_that_is_known_has_a_row() -> None:
+def test_every_supported_command_has_a_row() -> None:
     assert {item.command for row in ROWS for item in row.items} >= set(Command)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""NOR flash: ones, zeros, and what a power cut leaves."""
+"""NOR flash: programming, erasing, and power cuts during both."""
 
 import pytest
 
@@ -31,7 +31,7 @@ def test_an_erase_leaves_the_other_page_alone() -> None:
     assert memory[PAGE_SIZE : PAGE_SIZE + 4] == b"kept"
 
 
-def test_the_time_that_it_takes_is_reported_once() -> None:
+def test_the_duration_of_an_operation_is_reported_once() -> None:
     flash, _, _ = make()
     flash.erase(0, 0.02)
     flash.program(0, b"ab", 0.001)
@@ -39,7 +39,7 @@ def test_the_time_that_it_takes_is_reported_once() -> None:
     assert flash.take_busy_seconds() == 0
 
 
-def test_a_power_cut_leaves_half_an_operation() -> None:
+def test_a_power_cut_leaves_an_operation_half_done() -> None:
     flash, faults, _ = make()
     faults.power_cut_at_flash_operation = 2
     flash.erase(0, 0.0)
@@ -48,7 +48,7 @@ def test_a_power_cut_leaves_half_an_operation() -> None:
     assert flash.read(0, 8) == b"1234\xff\xff\xff\xff"
 
 
-def test_failures_are_as_many_as_were_asked_for() -> None:
+def test_the_given_number_of_operations_fail() -> None:
     flash, faults, _ = make()
     faults.flash_failures = 1
     with pytest.raises(FlashError):

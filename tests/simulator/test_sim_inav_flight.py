@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated INAV flies its mission, and MSP_NAV_STATUS tells of it as INAV's does."""
+"""The simulated INAV flies its mission, and MSP_NAV_STATUS reports it as INAV does."""
 
 import struct
 from collections.abc import Callable
@@ -17,7 +17,7 @@ NAV, RTH, NONE = 3, 2, 0
 
 
 class Flight:
-    """A mission that is flown from now on; `seen` has (mode, state, action, number, error) four times a second."""
+    """A mission in flight; `seen` has (mode, state, action, number, error) four times a second."""
 
     def __init__(self, *waypoints: NavWaypoint) -> None:
         self.bench = MspBench("inav", faults=Faults(boxes=0))
@@ -37,11 +37,11 @@ class Flight:
             self.seen.append(self.status())
 
     def numbers(self) -> list[int]:
-        """The waypoints in the order in which they were active."""
+        """The waypoint numbers in the order they were active."""
         return [number for number, _ in groupby(status[3] for status in self.seen)]
 
     def modes(self) -> set[str]:
-        """The names of the modes that MSP_STATUS tells."""
+        """The names of the modes in MSP_STATUS."""
         flags = struct.unpack_from("<I", self.bench.payload(101), 6)[0]
         names = self.bench.payload(116).decode().split(";")
         return {name for bit, name in enumerate(names[:32]) if flags >> bit & 1}
@@ -58,14 +58,14 @@ def is_finished(status: tuple[int, ...]) -> bool:
     return status[4] == 4
 
 
-def test_on_the_ground_the_first_waypoint_is_named_and_the_mode_is_none() -> None:
+def test_on_the_ground_the_first_waypoint_is_reported_without_a_mode() -> None:
     bench = MspBench("inav")
     assert bench.payload(121) == bytes((NONE, 0, 0, 1, 0, 0, 0))
     bench.upload([waypoint(1)])
     assert bench.payload(121) == bytes((NONE, 0, 1, 1, 0, 0, 0))
 
 
-def test_a_circuit_is_flown_to_its_end_and_stays_there() -> None:
+def test_a_craft_stays_at_the_end_of_a_circuit() -> None:
     legs = [waypoint(10), waypoint(20), waypoint(30)]
     flight = Flight(*legs)
     flight.until(is_finished)
@@ -83,13 +83,13 @@ def test_the_speed_of_a_leg(speed: int, seconds: int) -> None:
     assert flight.bench.now == pytest.approx(seconds, abs=1.5)
 
 
-def test_in_a_mission_the_modes_below_it_are_reported_too() -> None:
+def test_during_a_mission_lower_modes_are_reported_too() -> None:
     flight = Flight(waypoint(20), waypoint(40))
     flight.until(lambda status: status[1] == 5)
     assert flight.modes() == {"ARM", "ANGLE", "NAV WP", "NAV ALTHOLD"}
 
 
-def test_a_hold_takes_its_seconds() -> None:
+def test_a_hold_lasts_its_time() -> None:
     flight = Flight(waypoint(3, Action.POSHOLD_TIME, p1=20, p2=400), waypoint(6))
     flight.until(is_finished)
     held = [status for status in flight.seen if status[1] == 4]
@@ -97,13 +97,13 @@ def test_a_hold_takes_its_seconds() -> None:
     assert len(held) / 4 == pytest.approx(20, abs=1)
 
 
-def test_a_jump_is_flown_as_often_as_it_says() -> None:
+def test_a_jump_is_repeated_as_given() -> None:
     flight = Flight(waypoint(5), waypoint(9), waypoint(13), waypoint(action=Action.JUMP, p1=1, p2=2), waypoint(17))
     flight.until(is_finished)
     assert flight.numbers() == [1, 2, 3, 1, 2, 3, 1, 2, 3, 5]
 
 
-def test_a_jump_to_nowhere_that_came_in_flight_is_a_crash() -> None:
+def test_an_invalid_jump_written_in_flight_crashes_the_board() -> None:
     flight = Flight(waypoint(5), waypoint(9))
     flight.until(is_finished)
     flight.bench.faults.boxes = 0
@@ -123,7 +123,7 @@ def test_a_jump_forever_never_ends() -> None:
         flight.until(is_finished, 200)
 
 
-def test_what_is_not_a_place_is_passed_by() -> None:
+def test_records_without_a_position_are_skipped() -> None:
     flight = Flight(waypoint(3), waypoint(action=Action.SET_HEAD, p1=90), waypoint(6, Action.SET_POI), waypoint(9))
     flight.until(is_finished)
     assert flight.numbers() == [1, 4]
@@ -140,7 +140,7 @@ def test_a_return_home_ends_above_it_or_on_it(p1: int, state: int) -> None:
 
 
 @pytest.mark.parametrize(("rth", "last", "state"), [(1, 0, 13), (0, 500, 10)])
-def test_whether_it_lands_after_a_return_is_the_last_waypoints_p1(rth: int, last: int, state: int) -> None:
+def test_the_last_waypoints_p1_decides_on_landing_after_a_return(rth: int, last: int, state: int) -> None:
     flight = Flight(waypoint(10), waypoint(action=Action.RTH, p1=rth), waypoint(20, p1=last))
     flight.until(lambda status: status[1] == state)
     assert flight.numbers() == [1, 2]
@@ -155,20 +155,20 @@ def test_a_landing_ends_the_mission_on_the_ground() -> None:
 
 
 @pytest.mark.parametrize(("alt_cm", "p3"), [(3000, 0), (16100, 1)])
-def test_heights_are_above_home_or_above_the_sea(alt_cm: int, p3: int) -> None:
+def test_heights_are_above_home_or_above_sea_level(alt_cm: int, p3: int) -> None:
     flight = Flight(waypoint(100, alt_cm=alt_cm, p3=p3))
     flight.until(is_finished)
     assert struct.unpack_from("<ih", flight.bench.payload(109))[0] == 3000
     assert struct.unpack_from("<h", flight.bench.payload(106), 10)[0] == 161
 
 
-def test_the_nose_is_down_and_the_sign_is_plus() -> None:
+def test_nose_down_is_a_positive_pitch() -> None:
     flight = Flight(waypoint(100))
     flight.bench.run(5)
     assert struct.unpack("<hhh", flight.bench.payload(108))[1] > 0
 
 
-def test_the_switch_stops_the_mission_and_continues_with_it() -> None:
+def test_the_switch_stops_and_resumes_the_mission() -> None:
     flight = Flight(waypoint(20), waypoint(40), waypoint(60))
     flight.until(lambda status: status[3] == 2)
     flight.bench.faults.boxes = 0
@@ -179,7 +179,7 @@ def test_the_switch_stops_the_mission_and_continues_with_it() -> None:
     assert flight.numbers() == [1, 2, 3]
 
 
-def test_disarming_ends_it() -> None:
+def test_disarming_ends_the_mission() -> None:
     flight = Flight(waypoint(20), waypoint(40))
     flight.until(lambda status: status[3] == 2)
     flight.bench.faults.armed = False
@@ -188,7 +188,7 @@ def test_disarming_ends_it() -> None:
 
 
 @pytest.mark.parametrize("home", [waypoint(30, flag=FLAG_HOME), waypoint(lat_e7=0, lon_e7=0)])
-def test_a_leg_without_a_place_or_with_the_flag_home_is_flown_to_home(home: NavWaypoint) -> None:
+def test_a_leg_without_a_position_or_with_the_home_flag_leads_home(home: NavWaypoint) -> None:
     flight = Flight(waypoint(20), home, waypoint(10))
     flight.until(lambda status: status[3] == 3)
     assert flight.away_from(waypoint(0)) < 5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated INAV has every trap of docs/inav.md, as observed on INAV's own simulator."""
+"""The simulated INAV has every hazard of docs/inav.md, as observed on INAV's own simulator."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ SELECTED = b"nav_wp_multi_mission_index\0"
         (255, waypoint(9)),
     ],
 )
-def test_what_is_acknowledged_and_not_stored(number: int, wrong: NavWaypoint) -> None:
+def test_records_that_are_acknowledged_but_not_stored(number: int, wrong: NavWaypoint) -> None:
     bench = MspBench("inav")
     bench.upload(THREE)
     bench.write(number, wrong)
@@ -59,7 +59,7 @@ def test_what_is_acknowledged_and_not_stored(number: int, wrong: NavWaypoint) ->
     assert bench.read(2) == THREE[1]
 
 
-def test_number_1_wipes_the_list_and_valid_comes_back_with_the_last() -> None:
+def test_record_1_clears_the_list_which_is_valid_again_after_the_last() -> None:
     bench = MspBench("inav")
     bench.upload(THREE)
     bench.write(1, waypoint(7))
@@ -97,7 +97,7 @@ def test_a_waypoint_of_another_size_is_an_error(size: int) -> None:
     assert frame.direction == "!"
 
 
-def test_a_flag_in_mid_list_makes_several_missions_of_it() -> None:
+def test_a_flag_within_a_list_splits_it_into_several_missions() -> None:
     bench = MspBench("inav")
     bench.write(1, waypoint(1, flag=FLAG_LAST))
     bench.write(2, waypoint(2))
@@ -117,14 +117,14 @@ def answer(bench: MspBench, command: int, payload: bytes = b"\0") -> str:
 
 @pytest.mark.parametrize("command", [SAVE, LOAD])
 @pytest.mark.parametrize("size", [0, 2])
-def test_save_and_load_take_exactly_one_byte(command: int, size: int) -> None:
+def test_save_and_load_need_a_payload_of_one_byte(command: int, size: int) -> None:
     bench = MspBench("inav")
     bench.upload(THREE)
     assert answer(bench, SAVE) == ">"
     assert answer(bench, command, bytes(size)) == "!"
 
 
-def test_a_saved_list_is_there_after_a_restart_only_once_it_is_loaded() -> None:
+def test_after_a_restart_a_saved_list_has_to_be_loaded() -> None:
     bench = MspBench("inav")
     bench.upload(THREE)
     assert answer(bench, SAVE) == ">"
@@ -136,7 +136,7 @@ def test_a_saved_list_is_there_after_a_restart_only_once_it_is_loaded() -> None:
     assert bench.read(2) == THREE[1]
 
 
-def test_what_was_not_saved_is_lost_with_a_restart() -> None:
+def test_an_unsaved_list_is_lost_in_a_restart() -> None:
     bench = MspBench("inav")
     bench.upload(THREE)
     bench.restart()
@@ -171,7 +171,7 @@ def test_load_with_nothing_saved_is_an_error_only_if_ram_is_empty() -> None:
         max_size=12,
     )
 )
-def test_any_list_outlives_a_restart(waypoints: list[NavWaypoint]) -> None:
+def test_any_saved_list_survives_a_restart(waypoints: list[NavWaypoint]) -> None:
     bench = MspBench("inav")
     bench.upload(waypoints)
     assert answer(bench, SAVE) == ">"
@@ -187,7 +187,7 @@ def test_any_list_outlives_a_restart(waypoints: list[NavWaypoint]) -> None:
 
 @pytest.mark.parametrize("p1", [0, -1, -32767])
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_jump_to_nowhere_is_acknowledged_and_kills_the_board(version: str, p1: int) -> None:
+def test_an_invalid_jump_is_acknowledged_and_crashes_the_board(version: str, p1: int) -> None:
     bench = MspBench("inav", MspOptions(version=version))
     bench.upload(THREE)
     bench.write(1, waypoint(0))
@@ -215,11 +215,11 @@ def test_a_jump_is_read_back_as_it_was_written() -> None:
         ({"p1": 3, "p2": 1}, False),  # the waypoint before it
         ({"p1": 4, "p2": 1}, False),  # itself
         ({"p1": 5, "p2": 1}, False),  # the next
-        ({"p1": 6, "p2": 1}, False),  # there is none
+        ({"p1": 6, "p2": 1}, False),  # no such waypoint
         ({"p1": 1, "p2": -2}, False),
     ],
 )
-def test_a_jump_that_inav_does_not_like_keeps_the_craft_on_the_ground(jump: dict[str, int], arms: bool) -> None:
+def test_an_invalid_jump_blocks_arming(jump: dict[str, int], arms: bool) -> None:
     bench = MspBench("inav")
     bench.upload([*THREE, waypoint(action=Action.JUMP, **jump), waypoint(4)])
     bench.faults.armed = True
@@ -231,7 +231,7 @@ def test_a_jump_that_inav_does_not_like_keeps_the_craft_on_the_ground(jump: dict
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_armed_version_7_stores_nothing_and_8_everything(version: str) -> None:
+def test_while_armed_version_7_stores_nothing_and_8_everything(version: str) -> None:
     bench = MspBench("inav", MspOptions(version=version))
     bench.upload(THREE)
     bench.faults.armed = True
@@ -267,7 +267,7 @@ def test_save_and_load_are_errors_while_armed(command: int) -> None:
 
 
 def several() -> MspBench:
-    """Missions of one, two and three waypoints, saved and loaded."""
+    """Three missions of one, two and three waypoints, saved and loaded."""
     bench = MspBench("inav", faults=Faults(boxes=0))
     ends = (1, 3, 6)
     for number in range(1, 7):
@@ -276,7 +276,7 @@ def several() -> MspBench:
     return bench
 
 
-def test_disarmed_all_missions_are_counted_and_armed_the_one_that_is_selected() -> None:
+def test_all_missions_are_counted_while_disarmed_but_one_while_armed() -> None:
     bench = several()
     assert bench.info() == (120, True, 6)
     bench.faults.selected_mission = 3
@@ -290,7 +290,7 @@ def test_disarmed_all_missions_are_counted_and_armed_the_one_that_is_selected() 
     ]
 
 
-def test_the_selected_mission_is_reported_as_a_setting_and_save_goes_back_to_the_first() -> None:
+def test_the_selected_mission_is_a_setting_that_save_resets() -> None:
     bench = several()
     bench.faults.selected_mission = 2
     assert bench.payload_v2(0x1003, SELECTED) == b"\2"
@@ -299,7 +299,7 @@ def test_the_selected_mission_is_reported_as_a_setting_and_save_goes_back_to_the
     assert bench.payload_v2(0x1003, SELECTED) == b"\1"
 
 
-def test_a_new_list_wipes_the_others_with_the_next_save() -> None:
+def test_a_new_list_erases_the_others_with_the_next_save() -> None:
     bench = several()
     bench.upload([waypoint(70)])
     assert answer(bench, SAVE) == ">"
@@ -308,7 +308,7 @@ def test_a_new_list_wipes_the_others_with_the_next_save() -> None:
     assert bench.info() == (120, True, 1)
 
 
-def test_the_sticks_load_what_is_saved() -> None:
+def test_the_sticks_load_the_saved_missions() -> None:
     bench = several()
     bench.restart()
     assert bench.info() == (120, False, 0)
@@ -321,23 +321,23 @@ def test_the_sticks_load_what_is_saved() -> None:
 
 
 def test_120_frames_at_once_overrun_the_ring() -> None:
-    """INAV's own simulator has a ring of 2048 bytes, in which the last 44 of 120 frames are left."""
+    """INAV's own simulator has a ring of 2048 bytes, which keeps the last 44 of 120 frames."""
     bench = MspBench("inav", MspOptions(baud=None, ring_size=2048))
     bench.send(b"".join(request(WP, waypoint(n).pack(n)) for n in range(1, 121)))
     assert bench.run(2.0).count(b"$M>") == 44
 
 
-def test_after_half_a_frame_the_next_requests_are_swallowed_however_late_they_come() -> None:
+def test_half_a_frame_swallows_the_next_requests_at_any_time() -> None:
     bench = MspBench("inav")
     bench.send(request(SET_WP, bytes(21))[:10])
     bench.run(60.0)
-    # 16 payload bytes and the checksum were owed: two requests of 6 bytes pay 12, the third 5.
+    # 16 payload bytes and the checksum are missing: two requests of 6 bytes supply 12, the third 5.
     for _ in range(3):
         assert bench.ask(GETINFO) is None
     assert bench.info() == (120, False, 0)
 
 
-def test_a_number_sign_and_silence_open_the_command_line_and_msp_is_dead() -> None:
+def test_a_number_sign_and_silence_open_the_cli_and_end_msp() -> None:
     bench = MspBench("inav")
     bench.send(b"#")
     assert b"CLI" in bench.run(0.2)
@@ -345,7 +345,7 @@ def test_a_number_sign_and_silence_open_the_command_line_and_msp_is_dead() -> No
     assert bench.board.counters.cli_entered
 
 
-def test_a_number_sign_with_a_frame_soon_after_does_nothing() -> None:
+def test_a_number_sign_followed_by_a_frame_is_ignored() -> None:
     bench = MspBench("inav")
     bench.send(b"#")
     bench.run(0.05)
@@ -361,7 +361,7 @@ def test_a_number_sign_within_a_frame_is_data() -> None:
     assert not bench.board.counters.cli_entered
 
 
-def test_a_number_sign_is_not_heard_while_armed() -> None:
+def test_a_number_sign_is_ignored_while_armed() -> None:
     bench = MspBench("inav", faults=Faults(armed=True))
     bench.run(0.2)
     bench.send(b"#")
@@ -370,7 +370,7 @@ def test_a_number_sign_is_not_heard_while_armed() -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_lone_r_is_the_way_into_the_bootloader_up_to_8_0_1(version: str) -> None:
+def test_a_single_r_starts_the_bootloader_up_to_8_0_1(version: str) -> None:
     bench = MspBench("inav", MspOptions(version=version))
     bench.send(b"R")
     bench.run(0.5)
@@ -380,7 +380,7 @@ def test_a_lone_r_is_the_way_into_the_bootloader_up_to_8_0_1(version: str) -> No
 
 
 @given(st.binary(max_size=300))
-def test_no_input_breaks_the_board(data: bytes) -> None:
+def test_the_board_survives_any_input(data: bytes) -> None:
     bench = MspBench("inav")
     bench.send(data)
     bench.run(1.0)

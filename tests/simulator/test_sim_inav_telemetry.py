@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated INAV's telemetry: lengths and signs of the versions, as their own simulators have them."""
+"""The simulated INAV's telemetry: lengths and signs of each version, as observed on INAV's own simulators."""
 
 import struct
 
@@ -37,20 +37,20 @@ def test_lengths(version: str) -> None:
     assert (len(bench.payload(119)), len(bench.payload(116))) == BOXES[version]
 
 
-def test_who_it_is() -> None:
+def test_identity() -> None:
     bench = MspBench("inav", MspOptions(version="7.1.2"))
     assert (bench.payload(1), bench.payload(2), bench.payload(3)) == (b"\x00\x02\x05", b"INAV", b"\x07\x01\x02")
 
 
 @pytest.mark.parametrize("command", [100, 112, 122, 199, 253])
-def test_what_inav_does_not_know_is_an_error(command: int) -> None:
+def test_unknown_requests_are_errors(command: int) -> None:
     frame = MspBench("inav").ask(command)
     assert frame is not None
     assert (frame.direction, frame.command, frame.payload) == ("!", command, b"")
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_the_names_of_the_modes_need_a_jumbo_frame(version: str) -> None:
+def test_the_mode_names_need_a_jumbo_frame(version: str) -> None:
     bench = MspBench("inav", MspOptions(version=version))
     names = bench.payload(116).split(b";")
     assert bytes(bench.heard[3:5]) == b"\xff\x74"
@@ -66,7 +66,7 @@ def test_channels(version: str, receiver: bool, channels: int) -> None:
 
 
 def test_msp_v2_alongside_v1() -> None:
-    """Lengths as INAV 9.1.0's own simulator has them."""
+    """Lengths as observed on INAV 9.1.0's own simulator."""
     bench = MspBench("inav", MspOptions(platform=1, pitot=True), Faults(arming_blockers=1 << 18))
     lengths = {command: len(bench.payload_v2(command)) for command in (0x2000, 0x2002, 0x2009, 0x2010)}
     assert lengths == {0x2000: 22, 0x2002: 24, 0x2009: 4, 0x2010: 9}
@@ -75,7 +75,7 @@ def test_msp_v2_alongside_v1() -> None:
     assert bench.payload(2) == b"INAV"
 
 
-def test_a_cut_v2_frame_swallows_the_next_request() -> None:
+def test_a_truncated_v2_frame_swallows_the_next_request() -> None:
     bench = MspBench("inav")
     bench.send(request(0x2000)[:8])
     assert bench.ask(2) is None
@@ -83,26 +83,26 @@ def test_a_cut_v2_frame_swallows_the_next_request() -> None:
 
 
 @pytest.mark.parametrize("armed", [False, True])
-def test_the_arm_flag_is_where_the_box_ids_have_0(armed: bool) -> None:
+def test_the_arm_flag_is_at_the_index_of_box_id_0(armed: bool) -> None:
     bench = MspBench("inav", faults=Faults(armed=armed))
     bench.run(0.2)
     flags = struct.unpack_from("<I", bench.payload(101), 6)[0]
     assert bool(flags >> bench.payload(119).index(0) & 1) is armed
 
 
-def test_a_box_whose_bit_is_beyond_the_32_is_not_told() -> None:
+def test_boxes_beyond_bit_32_are_not_reported() -> None:
     bench = MspBench("inav", faults=Faults(boxes=1 << 36 | 1 << 4))
     assert struct.unpack_from("<I", bench.payload(101), 6)[0] == 1 << 4
 
 
-def test_home_and_the_present_place_are_reported_with_their_altitude_above_the_sea() -> None:
+def test_home_and_position_have_their_altitude_above_sea_level() -> None:
     bench = MspBench("inav")
     for number in (0, 255):
         place = bench.read(number)
         assert (place.lat_e7, place.lon_e7, place.alt_cm) == (453838000, 84733000, 13100)
 
 
-def test_home_stays_where_it_armed() -> None:
+def test_home_is_the_place_of_arming() -> None:
     bench = MspBench("inav", faults=Faults(boxes=0))
     bench.upload([waypoint(100)])
     bench.faults.armed, bench.faults.boxes = True, 1 << 13
@@ -111,12 +111,12 @@ def test_home_stays_where_it_armed() -> None:
     assert bench.read(255).lat_e7 > 453838000 + 10000
 
 
-def test_a_question_for_a_waypoint_without_its_number_is_answered_with_home() -> None:
+def test_a_waypoint_request_without_a_number_returns_home() -> None:
     assert MspBench("inav").payload(118)[0] == 0
 
 
-def test_a_paced_line_takes_its_time() -> None:
+def test_replies_arrive_at_line_rate() -> None:
     bench = MspBench("inav", MspOptions(baud=9600, serial_task_ms=10))
     bench.payload(106)
-    # 6 bytes there, the task's turn, 24 bytes back.
+    # 6 bytes out, the task's delay, 24 bytes back.
     assert bench.now == pytest.approx(30 * 10 / 9600, abs=0.011)

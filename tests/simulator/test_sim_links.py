@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated Naze on real descriptors: a socket pair, and a pty in a process of its own."""
+"""The simulated Naze on real descriptors: a socket pair, and a pty in a separate process."""
 
 import asyncio
 import json
@@ -24,7 +24,7 @@ from tests.support.naze_bench import mission
 from tests.support.programs import PATIENCE, control, until
 
 IDENT = request(100)
-#: Silence that lasts so long is no answer to come.
+#: After this much silence no answer is expected.
 SILENCE_S = 1.0
 
 
@@ -37,7 +37,7 @@ async def ask_socket(far: socket.socket, frame: bytes) -> MspFrame:
                 return frames[0]
 
 
-async def test_the_pipe_answers_at_once_and_keeps_the_board_over_an_unplugging() -> None:
+async def test_the_pipe_answers_at_once_and_the_board_survives_unplugging() -> None:
     link = SimLink(SimulatedNaze(), asyncio.get_running_loop())
     with await link.start() as far:
         assert (await ask_socket(far, IDENT)).payload[0] == 211
@@ -52,7 +52,7 @@ async def test_the_pipe_answers_at_once_and_keeps_the_board_over_an_unplugging()
 
 
 @pytest.mark.parametrize("turns", [0, 3])
-async def test_a_client_that_goes_away_can_come_back(turns: int) -> None:
+async def test_a_client_can_reconnect(turns: int) -> None:
     link = SimLink(SimulatedNaze(), asyncio.get_running_loop())
     (await link.start()).close()
     for _ in range(turns):
@@ -63,7 +63,7 @@ async def test_a_client_that_goes_away_can_come_back(turns: int) -> None:
 
 
 class Simulator:
-    """`naze-bridge sim` as its own process."""
+    """`naze-bridge sim` as a separate process."""
 
     def __init__(self, directory: Path, *options: str) -> None:
         self.link = directory / "naze"
@@ -124,7 +124,7 @@ def test_the_port_answers_at_the_boards_speed_only(start: Callable[..., Simulato
         port.baudrate = 115200
         assert ask(port, IDENT, SILENCE_S) is None
         port.baudrate = 57600
-        # What was heard at the wrong speed may have begun a frame; the receiver forgets it.
+        # Bytes received at the wrong speed may have begun a frame; the receiver drops it after a while.
         until(lambda: ask(port, IDENT, SILENCE_S), "an answer")
 
 
@@ -139,7 +139,7 @@ def test_the_speed_changes_with_arming(start: Callable[..., Simulator]) -> None:
         until(lambda: b"\xfe\x1c" in port.read(200), "an attitude")
 
 
-def test_unplugging_ends_the_port_and_plugging_brings_it_back(start: Callable[..., Simulator]) -> None:
+def test_unplugging_removes_the_port_and_plugging_restores_it(start: Callable[..., Simulator]) -> None:
     simulator = start()
     port = simulator.open()
     assert ask(port, IDENT) is not None
@@ -153,7 +153,7 @@ def test_unplugging_ends_the_port_and_plugging_brings_it_back(start: Callable[..
         assert ask(again, IDENT) is not None
 
 
-def test_the_flash_outlives_a_kill(start: Callable[..., Simulator], tmp_path: Path) -> None:
+def test_the_flash_survives_a_kill(start: Callable[..., Simulator], tmp_path: Path) -> None:
     state, records = str(tmp_path / "flash"), mission(20)
     simulator = start("--state", state, "--flash-stall", "5")
     with simulator.open() as port:
@@ -200,7 +200,7 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
         (["--link", "{}/naze", "--state", "{}/file"], "Error: The state file {}/file has 4 bytes, but this board's"),
     ],
 )
-def test_what_is_in_the_way_is_named(tmp_path: Path, options: list[str], complaint: str) -> None:
+def test_obstacles_at_start_are_reported(tmp_path: Path, options: list[str], complaint: str) -> None:
     (tmp_path / "file").write_text("mine")
     (tmp_path / "link").symlink_to("file")
     program = "from simulator.command import sim; sim()"
@@ -212,7 +212,7 @@ def test_what_is_in_the_way_is_named(tmp_path: Path, options: list[str], complai
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_a_link_that_a_killed_one_left_behind_is_replaced(start: Callable[..., Simulator]) -> None:
+def test_the_link_of_a_killed_simulator_is_replaced(start: Callable[..., Simulator]) -> None:
     killed = start()
     killed.end(signal.SIGKILL)
     assert os.path.islink(killed.link)
@@ -220,7 +220,7 @@ def test_a_link_that_a_killed_one_left_behind_is_replaced(start: Callable[..., S
         assert ask(port, IDENT) is not None
 
 
-def test_a_link_that_another_one_has_taken_over_is_left_to_it(start: Callable[..., Simulator]) -> None:
+def test_a_link_taken_over_by_another_simulator_is_not_removed(start: Callable[..., Simulator]) -> None:
     first = start()
     first.link.unlink()
     second = start()
@@ -229,7 +229,7 @@ def test_a_link_that_another_one_has_taken_over_is_left_to_it(start: Callable[..
     assert second.link.readlink() == second_terminal
 
 
-def test_a_second_one_leaves_the_link_of_a_running_one_alone(start: Callable[..., Simulator], tmp_path: Path) -> None:
+def test_the_link_of_a_running_simulator_is_not_replaced(start: Callable[..., Simulator], tmp_path: Path) -> None:
     first = start()
     with serial.Serial(str(first.link), 115200, timeout=PATIENCE, exclusive=True) as port:
         program = "from simulator.command import sim; sim()"
@@ -239,7 +239,7 @@ def test_a_second_one_leaves_the_link_of_a_running_one_alone(start: Callable[...
         assert second.returncode == 1
         assert f"{first.link} belongs to a running simulator" in second.stderr
         assert "Traceback" not in second.stderr
-        # A look at the lock does not take it away.
+        # Checking the lock does not release it.
         again = subprocess.run([sys.executable, "-c", program, "--link", str(first.link)], timeout=PATIENCE)
         assert again.returncode == 1
         assert ask(port, IDENT) is not None

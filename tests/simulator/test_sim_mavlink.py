@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When the board speaks MAVLink, what it says, and at which speed (pymavlink reads it)."""
+"""The board's MAVLink: when it is spoken, its contents, and the speed (decoded with pymavlink)."""
 
 from collections import Counter
 
@@ -17,7 +17,7 @@ IDENT = request(100)
 
 
 def decode(data: bytes) -> list[mavlink1.MAVLink_message]:
-    """Every byte must belong to a MAVLink 1 frame of exactly the length that version 1 gives it."""
+    """Decode bytes, all of which must belong to MAVLink 1 frames of the exact length of version 1."""
     parser = mavlink1.MAVLink(None)
     messages = parser.parse_buffer(data) or []
     assert sum(len(message.get_msgbuf()) for message in messages) == len(data)
@@ -31,7 +31,7 @@ def ground_station_heartbeat(version: int = 1) -> bytes:
     return bytes(message.pack(sender))
 
 
-def test_autosense_sends_heartbeats_of_an_ardupilot_once_a_second() -> None:
+def test_autosense_sends_ardupilot_heartbeats_once_a_second() -> None:
     bench = Bench()
     messages = decode(bench.run(10.2))
     assert len(messages) == 10
@@ -43,11 +43,11 @@ def test_autosense_sends_heartbeats_of_an_ardupilot_once_a_second() -> None:
 
 
 def protocol(bench: Bench) -> Protocol | None:
-    """Of this moment; mypy takes a property for a constant."""
+    """The current protocol; a function because mypy narrows a property to a constant."""
     return bench.naze.protocol
 
 
-def test_msp_ends_the_heartbeats_until_four_seconds_of_silence() -> None:
+def test_msp_stops_the_heartbeats_until_four_seconds_of_silence() -> None:
     bench = Bench()
     assert bench.ask(IDENT) is not None
     assert protocol(bench) is Protocol.MSP
@@ -56,7 +56,7 @@ def test_msp_ends_the_heartbeats_until_four_seconds_of_silence() -> None:
     assert protocol(bench) is Protocol.AUTOSENSE
 
 
-def test_a_mavlink_1_frame_switches_and_msp_is_dead_then() -> None:
+def test_a_mavlink_1_frame_switches_the_board_away_from_msp() -> None:
     bench = Bench()
     bench.send(ground_station_heartbeat())
     bench.run(0.05)
@@ -64,7 +64,7 @@ def test_a_mavlink_1_frame_switches_and_msp_is_dead_then() -> None:
     assert bench.ask(IDENT, timeout=0.5) is None
 
 
-def test_a_mavlink_2_frame_is_nothing_to_it() -> None:
+def test_a_mavlink_2_frame_is_ignored() -> None:
     bench = Bench()
     bench.send(ground_station_heartbeat(version=2))
     bench.run(0.1)
@@ -89,7 +89,7 @@ def test_the_stream_has_the_firmwares_rates() -> None:
     assert rates == pytest.approx(expected, rel=0.06)
 
 
-def test_the_stream_tells_of_a_flight() -> None:
+def test_the_stream_matches_a_flight() -> None:
     bench = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), Faults(armed=True))
     messages = decode(bench.run(60))
     fixes = [message for message in messages if message.get_type() == "GPS_RAW_INT"]
@@ -124,7 +124,7 @@ def test_nose_down_is_positive_in_msp_and_negative_in_mavlink() -> None:
         (TelemetryProtocol.MAVLINK_57600, 57600, Protocol.MAVLINK),
     ],
 )
-def test_arming_chooses_protocol_and_speed(tele_prot: TelemetryProtocol, baud: int, protocol: Protocol) -> None:
+def test_arming_selects_protocol_and_speed(tele_prot: TelemetryProtocol, baud: int, protocol: Protocol) -> None:
     bench = Bench(SimOptions(tele_prot=tele_prot))
     assert bench.ask(IDENT) is not None
     bench.naze.faults.armed = True
@@ -135,7 +135,7 @@ def test_arming_chooses_protocol_and_speed(tele_prot: TelemetryProtocol, baud: i
     bench.naze.faults.armed = False
     bench.run(0.5)
     assert (bench.naze.armed, bench.naze.baud) == (False, 115200)
-    # Nothing valid was heard for four seconds: AUTOSENSE, where MSP is found again.
+    # After four seconds without valid input: AUTOSENSE, where MSP is found again.
     bench.run(4.1)
     assert bench.ask(IDENT) is not None
 
@@ -147,7 +147,7 @@ def test_frsky_is_sent_at_9600_eight_times_a_second() -> None:
     heard = bench.run(4.0)
     assert bench.naze.baud == 9600
     assert heard[:2] == b"\x5e\x24"
-    # A frame ends with a lone mark, the next begins with one.
+    # A frame ends with a single mark byte, and the next begins with one.
     assert heard.count(b"\x5e\x5e\x24") in (30, 31, 32)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The patched firmware's own MAVLink upload, in the model; tests/real_board says the same of the image."""
+"""The patched firmware's own MAVLink upload, in the model; tests/real_board checks the image."""
 
 from simulator.options import Faults, SimOptions, TelemetryProtocol
 from tests.support import mavlink_missions as page
@@ -10,7 +10,7 @@ def test_an_upload_becomes_the_stored_list() -> None:
     page.an_upload_becomes_the_stored_list(Bench())
 
 
-def test_an_upload_that_breaks_off_leaves_what_was_there() -> None:
+def test_an_interrupted_upload_keeps_the_old_list() -> None:
     page.an_upload_that_breaks_off_leaves_what_was_there(Bench())
 
 

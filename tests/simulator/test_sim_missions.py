@@ -57,7 +57,7 @@ def info(bench: Bench) -> Info:
 
 
 def in_use(options: SimOptions | None = None) -> Bench:
-    """A board on which no slot is blank."""
+    """A board with no blank slot."""
     bench = Bench(options)
     for seed in (3, 4):
         bench.push(mission(146, seed))
@@ -65,11 +65,11 @@ def in_use(options: SimOptions | None = None) -> Bench:
 
 
 def raw(command: MissionCommand, body: bytes, mask: int = 0x41) -> bytes:
-    """A request that the encoders would not make."""
+    """A request that the encoders would not produce."""
     return request(command, bytes((mask,)) + apply_mask(body, mask))
 
 
-def test_info_tells_the_boards_limits() -> None:
+def test_info_has_the_boards_limits() -> None:
     assert info(Bench()) == Info(
         version=1,
         flags=InfoFlag(0),
@@ -95,7 +95,7 @@ def test_without_the_extension_its_commands_are_unknown() -> None:
 
 @settings(max_examples=40)
 @given(st.lists(records_of_any_kind, max_size=146))
-def test_a_pushed_list_comes_back_identical(records: list[WpRecord]) -> None:
+def test_a_pushed_list_reads_back_identical(records: list[WpRecord]) -> None:
     bench = Bench()
     if records:
         assert bench.push(records) == Stored(ReplyStatus.OK, identify(records))
@@ -115,7 +115,7 @@ def test_a_full_list_survives_a_power_cycle() -> None:
     assert info(bench).flash_writes == 1
 
 
-def test_the_newer_of_two_lists_counts_after_boot() -> None:
+def test_the_newer_of_two_lists_is_valid_after_boot() -> None:
     bench = Bench()
     for seed in range(5):
         bench.push(mission(10 + seed, seed))
@@ -158,7 +158,7 @@ def test_begin_stalls_for_the_erase_and_commit_does_not() -> None:
     assert bench.now - before < 0.030
 
 
-def test_what_comes_during_the_erase_laps_the_receive_ring() -> None:
+def test_input_during_the_erase_overflows_the_receive_ring() -> None:
     bench = in_use(SimOptions(flash_erase_ms=100))
     bench.send(encode_begin(identify(mission(2))))
     bench.run(0.01)
@@ -168,7 +168,7 @@ def test_what_comes_during_the_erase_laps_the_receive_ring() -> None:
 
 
 def test_a_window_of_two_chunks_fills_the_line() -> None:
-    """What the benchmark relies on: from the first CHUNK to COMMIT's answer within 1.10 of the bare line time."""
+    """From the first CHUNK to COMMIT's reply within 1.10 of the bare line time; the benchmark relies on it."""
     bench, records = Bench(), mission(146)
     bench.progress(encode_begin(identify(records)))
     start, first, outstanding, following = bench.now, 0, 0, 0
@@ -197,7 +197,7 @@ def test_begin_of_the_same_list_continues_and_of_another_starts_again() -> None:
     assert bench.progress(encode_begin(identify(mission(20, 1)))) == Staged(ReplyStatus.OK, 0, 0)
 
 
-def test_a_repeated_chunk_stores_nothing_and_tells_where_the_transfer_stands() -> None:
+def test_a_repeated_chunk_is_ignored_and_its_reply_has_the_progress() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
     standing = bench.progress(encode_chunk(records, 0, 10).frame)
@@ -213,7 +213,7 @@ def test_a_chunk_beyond_the_next_is_a_gap() -> None:
     assert bench.progress(encode_chunk(records, 5, 3).frame) == expected
 
 
-def test_a_repeated_commit_and_abort_are_well() -> None:
+def test_a_repeated_commit_and_abort_succeed() -> None:
     bench, records = Bench(), mission(4)
     bench.push(records)
     assert bench.stored(encode_commit(identify(records))) == Stored(ReplyStatus.OK, identify(records))
@@ -242,7 +242,7 @@ def test_five_seconds_of_silence_end_a_transfer() -> None:
     assert bench.progress(encode_chunk(records, 1, 1).frame).status is ReplyStatus.NO_TRANSFER
 
 
-def test_more_than_fits_is_refused() -> None:
+def test_a_list_over_the_capacity_is_refused() -> None:
     bench = Bench(SimOptions(capacity=5))
     assert bench.progress(encode_begin(ListIdentity(6, 1))).status is ReplyStatus.NO_SPACE
     assert bench.push(mission(5)).status is ReplyStatus.OK
@@ -257,7 +257,7 @@ def test_commit_of_an_incomplete_list_keeps_the_transfer() -> None:
     assert bench.stored(encode_commit(identify(records))).status is ReplyStatus.OK
 
 
-def test_a_list_of_another_checksum_is_not_committed() -> None:
+def test_a_list_with_another_checksum_is_not_committed() -> None:
     bench = Bench()
     bench.push(mission(3))
     records = mission(4, 1)
@@ -268,7 +268,7 @@ def test_a_list_of_another_checksum_is_not_committed() -> None:
     assert bench.progress(encode_chunk(records, 0, 4).frame).status is ReplyStatus.NO_TRANSFER
 
 
-def test_a_record_of_an_unknown_command_drops_the_transfer() -> None:
+def test_a_record_with_an_unknown_command_drops_the_transfer() -> None:
     bench = Bench()
     records = [*mission(3), WpRecord(1, 2, 3, 0, 0, 2, 0, 8)]
     bench.progress(encode_begin(identify(records)))
@@ -276,7 +276,7 @@ def test_a_record_of_an_unknown_command_drops_the_transfer() -> None:
     assert bench.progress(encode_chunk(records, 0, 3).frame).status is ReplyStatus.NO_TRANSFER
 
 
-def test_flash_that_fails_drops_the_transfer_and_keeps_the_list() -> None:
+def test_failing_flash_drops_the_transfer_and_keeps_the_list() -> None:
     for failing in ("begin", "chunk", "commit"):
         bench, records = in_use(), mission(3, 1)
         bench.push(mission(2))
@@ -297,7 +297,7 @@ def test_flash_that_fails_drops_the_transfer_and_keeps_the_list() -> None:
         assert bench.push(records).status is ReplyStatus.OK
 
 
-def test_arming_drops_the_transfer_and_refuses_writers_but_not_readers() -> None:
+def test_arming_drops_the_transfer_and_refuses_writes_but_not_reads() -> None:
     bench, records = Bench(), mission(4)
     bench.push(records)
     bench.progress(encode_begin(identify(mission(4, 1))))
@@ -324,7 +324,7 @@ def test_a_short_arming_drops_the_transfer_too() -> None:
 
 
 @pytest.mark.parametrize("busy", [False, True])
-def test_a_busy_board_says_so(busy: bool) -> None:
+def test_a_busy_board_replies_busy(busy: bool) -> None:
     bench = Bench(faults=Faults(busy=busy))
     assert bool(info(bench).flags & InfoFlag.WRITE_PENDING) is busy
     status = bench.progress(encode_begin(identify(mission(1)))).status
@@ -345,11 +345,11 @@ def test_a_busy_board_says_so(busy: bool) -> None:
     raw(MissionCommand.RADIUS, struct.pack("<HH", 300, 300)),
     raw(MissionCommand.RADIUS, bytes(2)),
 ])  # fmt: skip
-def test_what_is_not_of_the_form_is_a_bad_request(frame: bytes) -> None:
+def test_a_malformed_request_is_a_bad_request(frame: bytes) -> None:
     assert Bench().payload(frame)[0] == ReplyStatus.BAD_REQUEST
 
 
-def test_a_chunk_of_more_records_than_the_board_takes_is_a_bad_request() -> None:
+def test_a_chunk_with_too_many_records_is_a_bad_request() -> None:
     bench, records = Bench(SimOptions(chunk_records=15)), mission(20)
     small = Bench(SimOptions(chunk_records=4))
     for board, status in ((bench, ReplyStatus.OK), (small, None)):
@@ -370,7 +370,7 @@ def test_reading_past_the_end_is_out_of_range() -> None:
 # -- gps_wp_radius -------------------------------------------------------------------------------------------
 
 
-def test_a_radius_is_written_in_the_next_loop_which_takes_a_while() -> None:
+def test_a_radius_is_written_in_the_next_loop_which_stalls() -> None:
     bench = Bench()
     radius = decode_radius(bench.payload(encode_radius(350)))
     assert radius is not None
@@ -384,7 +384,7 @@ def test_a_radius_is_written_in_the_next_loop_which_takes_a_while() -> None:
     assert info(bench).wp_radius_cm == 350
 
 
-def test_writing_a_radius_leaves_an_open_transfer() -> None:
+def test_writing_a_radius_keeps_an_open_transfer() -> None:
     bench = Bench()
     bench.progress(encode_begin(identify(mission(3))))
     bench.payload(encode_radius(350))
@@ -392,7 +392,7 @@ def test_writing_a_radius_leaves_an_open_transfer() -> None:
     assert info(bench).flags == InfoFlag.TRANSFER_OPEN
 
 
-def test_a_radius_that_was_not_yet_written_goes_with_the_power() -> None:
+def test_a_radius_not_yet_written_is_lost_in_a_power_cut() -> None:
     bench = Bench(SimOptions(config_write_delay_ms=1000))
     bench.payload(encode_radius(350))
     bench.run(0.9)
@@ -421,7 +421,7 @@ def test_the_same_radius_is_not_written_again() -> None:
 
 @pytest.mark.parametrize(("old", "operations"), [(0, 20 + 2), (9, 3 + 20 + 2)])
 def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(old: int, operations: int) -> None:
-    """Each erase, each record, the header: cut in the middle of it, boot, look; then push again."""
+    """Cut the power during each erase, each record and the header; boot, check, and push again."""
     new = mission(20, 1)
     outcomes = []
     for operation in count(1):
@@ -445,13 +445,13 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
         outcomes.append(bench.pull())
         assert bench.push(new).status is ReplyStatus.OK
         assert bench.pull() == new
-    # Three pages that are not blank, twenty records, the header, its seal: without it the new list does not count.
+    # Three erased pages, twenty records, the header, and its seal, which makes the new list valid.
     assert outcomes == [mission(old) if old else []] * operations
     assert bench.pull() == new
 
 
 def test_a_power_cut_in_the_configuration_loses_it_but_not_the_list() -> None:
-    """Harakiri has one copy of its configuration; the slots are not in it."""
+    """Harakiri has one copy of its configuration, apart from the slots."""
     bench = Bench()
     bench.push(mission(7))
     bench.payload(encode_radius(350))
@@ -468,14 +468,14 @@ def test_a_power_cut_in_the_configuration_loses_it_but_not_the_list() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), size=st.integers(1, 60))
-def test_a_stubborn_client_gets_a_list_through_a_bad_line(seed: int, size: int) -> None:
-    """Repeat until answered, begin again when told to: never a wrong list, and in the end the right one."""
+def test_a_persistent_client_gets_a_list_through_a_bad_line(seed: int, size: int) -> None:
+    """It repeats until answered and restarts when told to: never a wrong list, and finally the right one."""
     faults = Faults(bit_error_rate=2e-4, lost_byte_rate=1e-3)
     bench, records = Bench(SimOptions(seed=seed), faults), mission(size, seed)
     identity = identify(records)
     for _ in range(600):
         if bench.naze.power is Power.CLI or bench.naze.counters.resets:
-            return  # a flipped bit completed a run: the line's doing, and rare
+            return  # rare: the line flipped a bit that completed a run
         bench.run(0.08)
         standing = info_or_none(bench)
         if standing is None:

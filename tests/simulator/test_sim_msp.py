@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MSP as Harakiri answers it: lengths, oddities, and a receiver that never looks back."""
+"""MSP as Harakiri implements it: lengths, peculiarities, and a receiver that never resynchronises."""
 
 import struct
 
@@ -32,14 +32,14 @@ def test_ident_is_a_quad_x_of_version_211() -> None:
 
 
 @pytest.mark.parametrize("command", [0, 1, 2, 3, 99, 119, 190, 199, 209, 253])
-def test_what_the_stock_firmware_does_not_know_is_an_error_of_size_0(command: int) -> None:
+def test_requests_unknown_to_stock_firmware_are_errors_of_size_0(command: int) -> None:
     answer = Bench(faults=Faults(extension=False)).ask(request(command))
     assert answer is not None
     assert (answer.direction, answer.command, answer.payload) == (Direction.ERROR, command, b"")
 
 
 @pytest.mark.parametrize("armed", [False, True])
-def test_the_arm_bit_of_status_is_where_boxnames_has_arm(armed: bool) -> None:
+def test_the_arm_bit_of_status_is_at_the_index_of_arm_in_boxnames(armed: bool) -> None:
     bench = Bench(faults=Faults(armed=armed))
     bench.run(0.01)
     names = bench.payload(request(116)).split(b";")
@@ -53,7 +53,7 @@ def test_pid_names_match_the_pids() -> None:
     assert bench.payload(request(117)).count(b";") * 3 == len(bench.payload(request(112)))
 
 
-def test_settings_are_kept_until_power_goes() -> None:
+def test_settings_are_kept_until_a_power_cut() -> None:
     bench = Bench()
     assert bench.ask(request(204, b"1234567")) is not None
     assert bench.payload(request(111)) == b"1234567"
@@ -72,7 +72,7 @@ def test_waypoint_0_is_home_while_armed_and_16_the_hold_position() -> None:
     assert direction == pytest.approx(-152, abs=2)  # north-north-east of home, so home is south-south-west
 
 
-def test_the_truth_is_what_the_sensors_say() -> None:
+def test_the_truth_matches_the_sensors() -> None:
     bench = Bench(faults=Faults(armed=True, boxes=0b101))
     bench.run(20)
     truth = bench.naze.truth(bench.now)
@@ -106,19 +106,19 @@ def test_a_request_with_a_bad_checksum_is_ignored() -> None:
     assert Bench().ask(IDENT[:-1] + b"\x00", timeout=0.3) is None
 
 
-def test_after_a_cut_frame_the_stock_receiver_swallows_the_next_ones() -> None:
+def test_after_a_truncated_frame_the_stock_receiver_swallows_the_next_ones() -> None:
     bench = Bench(faults=Faults(extension=False))
     bench.send(request(200, bytes(16))[:9])
     bench.run(1.0)
     assert bench.ask(IDENT, timeout=0.3) is None
-    # 12 payload bytes and a checksum were owed: two IDENTs pay 12 of them, the third's first byte is the last.
+    # 12 payload bytes and a checksum are missing: two IDENTs supply 12, the first byte of the third the last.
     assert bench.ask(IDENT, timeout=0.3) is None
     assert bench.ask(IDENT, timeout=0.3) is None
     assert bench.ask(IDENT, timeout=0.3) is not None
 
 
 @pytest.mark.parametrize(("silence", "answers"), [(0.03, False), (0.08, True)])
-def test_the_extension_forgets_a_cut_frame_after_50_ms(silence: float, answers: bool) -> None:
+def test_the_extension_drops_a_truncated_frame_after_50_ms(silence: float, answers: bool) -> None:
     bench = Bench()
     assert bench.ask(IDENT) is not None
     bench.send(request(200, bytes(16))[:9])
@@ -132,11 +132,11 @@ def test_the_extension_forgets_a_cut_frame_after_50_ms(silence: float, answers: 
 def test_the_receive_buffer_bounds_the_payload(extension: bool, size: int, answers: bool) -> None:
     bench = Bench(faults=Faults(extension=extension))
     assert bench.ask(IDENT) is not None
-    # No '$' in the payload: a refused frame's bytes must not look like another one.
+    # No '$' in the payload, so that a refused frame's bytes do not look like another frame.
     assert (bench.ask(request(205, b"\x11" * size), timeout=0.2) is not None) is answers
 
 
-def test_a_reply_takes_its_time_on_the_line() -> None:
+def test_a_reply_arrives_at_line_rate() -> None:
     bench = Bench(SimOptions(baud=9600))
     bench.send(IDENT)
     up, loop, down = 6 * 10 / 9600, 0.003, 13 * 10 / 9600
@@ -155,7 +155,7 @@ def test_the_main_loop_answers_at_most_every_looptime() -> None:
     assert 0.04 < bench.now - before < 0.06
 
 
-def test_a_hang_answers_nothing_and_continues_when_released() -> None:
+def test_a_hung_board_answers_nothing_until_released() -> None:
     bench = Bench()
     bench.naze.faults.hang = True
     assert bench.ask(IDENT, timeout=3.0) is None
@@ -163,7 +163,7 @@ def test_a_hang_answers_nothing_and_continues_when_released() -> None:
     assert bench.next_frame(0.1) is not None
 
 
-def test_what_came_during_a_hang_laps_the_ring() -> None:
+def test_input_during_a_hang_overflows_the_ring() -> None:
     bench = Bench()
     bench.naze.faults.hang = True
     bench.send(IDENT * 50)
@@ -174,7 +174,7 @@ def test_what_came_during_a_hang_laps_the_ring() -> None:
 
 
 def test_too_many_requests_at_once_corrupt_the_replies() -> None:
-    """Why a client bounds what is outstanding: three BOXNAMES are more than the ring holds."""
+    """Three replies to BOXNAMES exceed the ring, so a client has to limit pending replies."""
     bench = Bench(SimOptions(looptime_ms=9.0))
     bench.send(request(116) * 4)
     bench.run(0.5)
@@ -183,7 +183,7 @@ def test_too_many_requests_at_once_corrupt_the_replies() -> None:
     assert bench.heard.count(b"ANGLE;HORIZON;BARO;") < 4
 
 
-def test_without_power_nothing_is_heard_or_answered() -> None:
+def test_without_power_nothing_is_received_or_answered() -> None:
     bench = Bench()
     bench.naze.power_off(bench.now)
     assert bench.ask(IDENT, timeout=5.0) is None
@@ -191,7 +191,7 @@ def test_without_power_nothing_is_heard_or_answered() -> None:
     assert bench.naze.power is Power.OFF
 
 
-def test_what_comes_while_it_boots_is_answered_in_one_burst_but_for_the_first_half_second() -> None:
+def test_requests_during_boot_are_answered_in_a_burst_afterwards() -> None:
     bench = Bench()
     bench.naze.power_off(bench.now)
     bench.naze.power_on(bench.now)
@@ -203,7 +203,7 @@ def test_what_comes_while_it_boots_is_answered_in_one_burst_but_for_the_first_ha
     assert bench.heard.count(b"$M>") == 13
 
 
-def test_more_than_the_ring_holds_is_lost_while_it_boots() -> None:
+def test_input_beyond_the_ring_is_lost_during_boot() -> None:
     bench = Bench()
     bench.naze.power_off(bench.now)
     bench.naze.power_on(bench.now)
@@ -214,7 +214,7 @@ def test_more_than_the_ring_holds_is_lost_while_it_boots() -> None:
     assert bench.ask(IDENT) is not None
 
 
-def test_waypoint_without_a_payload_is_answered_from_what_the_buffer_held() -> None:
+def test_a_waypoint_request_without_a_payload_uses_old_buffer_contents() -> None:
     bench = Bench()
     bench.payload(request(118, b"\x10"))
     assert bench.payload(request(118))[0] == 16
@@ -253,8 +253,8 @@ def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:
         max_size=25,
     )
 )
-def test_a_caller_who_comes_late_changes_nothing(schedule: list[tuple[bytes, float]]) -> None:
-    """Collected at each wake-up or once at the end: the same bytes."""
+def test_late_reading_changes_nothing(schedule: list[tuple[bytes, float]]) -> None:
+    """Read at each wake-up or once at the end, the bytes are the same."""
     punctual, late = Bench(), Bench()
     for data, pause in schedule:
         for bench in (punctual, late):
@@ -267,7 +267,7 @@ def test_a_caller_who_comes_late_changes_nothing(schedule: list[tuple[bytes, flo
 
 
 @given(st.binary(max_size=400))
-def test_any_bytes_at_all_are_survived(data: bytes) -> None:
+def test_the_board_survives_any_bytes(data: bytes) -> None:
     bench = Bench()
     bench.send(data)
     bench.run(0.2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated MultiWii 2.4.1 with navigation: waypoints go straight into the EEPROM, one by one."""
+"""The simulated MultiWii 2.4.1 with navigation: each waypoint is written directly to the EEPROM."""
 
 import struct
 
@@ -34,23 +34,23 @@ def test_lengths(command: int, length: int) -> None:
     assert len(MspBench("multiwii").payload(command)) == length
 
 
-def test_it_says_that_it_can_navigate() -> None:
+def test_the_capability_of_navigation_is_reported() -> None:
     version, _, _, capability = struct.unpack("<BBBI", MspBench("multiwii").payload(100))
     assert (version, capability >> 4 & 1) == (241, 1)
 
 
 @pytest.mark.parametrize("command", [1, 2, 3, 18, 19, 20])
-def test_what_only_inav_knows_is_an_error(command: int) -> None:
+def test_requests_only_inav_knows_are_errors(command: int) -> None:
     frame = MspBench("multiwii").ask(command, b"\0")
     assert frame is not None
     assert frame.direction == "!"
 
 
-def test_the_capacity_is_in_the_navigations_settings() -> None:
+def test_the_capacity_is_in_the_navigation_settings() -> None:
     assert MspBench("multiwii", MspOptions(capacity=30)).payload(122)[-2] == 30
 
 
-def test_a_waypoint_outlives_a_restart() -> None:
+def test_a_waypoint_survives_a_restart() -> None:
     bench = MspBench("multiwii")
     bench.upload([waypoint(1), waypoint(2)])
     bench.restart()
@@ -58,13 +58,13 @@ def test_a_waypoint_outlives_a_restart() -> None:
     assert len(bench.board.stored_records) == 2
 
 
-def test_a_place_that_was_never_written_has_a_wrong_checksum() -> None:
+def test_a_record_never_written_has_a_wrong_checksum() -> None:
     bench = MspBench("multiwii", MspOptions(capacity=30))
     bench.write(31, waypoint(1))
     assert {bench.read(number).flag for number in (1, 30, 31)} == {CRC_ERROR}
 
 
-def test_waypoints_may_be_written_in_any_order_and_shorter_lists_leave_the_rest() -> None:
+def test_waypoints_may_be_written_in_any_order_and_the_rest_is_kept() -> None:
     bench = MspBench("multiwii")
     for number in (3, 1, 2, 1):
         bench.write(number, waypoint(number))
@@ -98,7 +98,7 @@ def status(bench: MspBench) -> tuple[int, ...]:
     return struct.unpack("<5Bh", bench.payload(121))[:5]
 
 
-def test_a_mission_is_flown_home_and_landed() -> None:
+def test_a_mission_ends_with_a_landing_at_home() -> None:
     bench = flying()
     numbers = []
     while status(bench)[1] != 10:
@@ -110,7 +110,7 @@ def test_a_mission_is_flown_home_and_landed() -> None:
 
 
 @pytest.mark.parametrize(("p1", "state"), [(0, 3), (7, 10)])
-def test_a_return_home_by_the_switch_lands_if_the_waypoint_last_read_has_p1(p1: int, state: int) -> None:
+def test_a_return_home_lands_if_the_waypoint_read_last_has_p1(p1: int, state: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
     bench.upload([waypoint(1, Action.POSHOLD_TIME, p1=p1), waypoint(2)])
     assert bench.read(1).p1 == p1
@@ -119,7 +119,7 @@ def test_a_return_home_by_the_switch_lands_if_the_waypoint_last_read_has_p1(p1: 
     assert status(bench)[:2] == (2, state)
 
 
-def test_while_a_mission_is_flown_a_waypoint_gets_no_answer_and_none_is_reported() -> None:
+def test_in_a_mission_writes_get_no_reply_and_reads_are_empty() -> None:
     bench = flying()
     assert status(bench)[:2] == (3, 5)
     assert bench.ask(SET_WP, waypoint(9).pack(1)) is None
@@ -140,7 +140,7 @@ def test_a_jump_goes_back_or_ends_the_mission(target: int, error: int) -> None:
 
 
 def flown_numbers(bench: MspBench, seconds: float) -> list[int]:
-    """The waypoints in the order in which they were active."""
+    """The waypoint numbers in the order they were active."""
     bench.faults.armed, bench.faults.boxes = True, MISSION
     numbers: list[int] = []
     end = bench.now + seconds
@@ -166,7 +166,7 @@ def test_a_hold_is_counted_in_16_bits(hold: int, seconds: float) -> None:
 
 
 @pytest.mark.parametrize("action", [Action.SET_POI, Action.SET_HEAD])
-def test_the_end_is_overlooked_on_what_is_not_a_place(action: int) -> None:
+def test_the_end_is_missed_on_a_record_without_a_position(action: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
     bench.upload([waypoint(number) for number in range(1, 6)])
     bench.upload([waypoint(1), waypoint(2), waypoint(3, action)])
@@ -181,7 +181,7 @@ def test_a_jump_within_a_jump_never_ends() -> None:
 
 
 @pytest.mark.parametrize(("alt_cm", "height_m"), [(0, 20), (5000, 50)])
-def test_the_way_home_has_a_least_height(alt_cm: int, height_m: int) -> None:
+def test_a_return_home_has_a_minimum_height(alt_cm: int, height_m: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))
     bench.upload([waypoint(5, alt_cm=1000), waypoint(action=Action.RTH, alt_cm=alt_cm)])
     flown_numbers(bench, 120)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim --kind`: other flight controllers on a pseudo-terminal and on a socket, as programs."""
+"""`naze-bridge sim --kind`: other flight controllers on a pseudo-terminal and on a socket, as processes."""
 
 import json
 import signal
@@ -18,7 +18,7 @@ from tests.support.programs import NAZE_BRIDGE, PATIENCE, REPOSITORY, control, f
 
 
 class Simulator:
-    """A simulator of its own; on a socket at `port` unless it has a link."""
+    """A simulator process, on a socket at `port` unless it has a link."""
 
     def __init__(self, directory: Path, *options: str, link: Path | None = None) -> None:
         self.port = free_port(socket.SOCK_STREAM)
@@ -41,7 +41,7 @@ class Simulator:
 
 
 class Client:
-    """A TCP client that asks one question at a time."""
+    """A TCP client that sends one request at a time."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port), PATIENCE)
@@ -53,7 +53,7 @@ class Client:
         self.socket.close()
 
     def ask(self, command: int, payload: bytes = b"", timeout: float = PATIENCE) -> Frame | None:
-        """None after the timeout; ConnectionError if it was disconnected."""
+        """The reply; None after the timeout, ConnectionError if disconnected."""
         self.socket.sendall(request(command, payload))
         self.socket.settimeout(timeout)
         heard = b""
@@ -85,7 +85,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
     yield make
     for simulator in started:
         simulator.process.kill()
-        # Closes its output, too.
+        # Also closes its output.
         simulator.process.communicate()
 
 
@@ -116,11 +116,11 @@ def test_a_second_client_waits_for_its_turn(start: Callable[..., Simulator]) -> 
         assert first.payload(2) == b"INAV"
         assert second.ask(2, timeout=0.3) is None
         first.socket.close()
-        # The answer to the first question comes now.
+        # Now the first request is answered.
         assert second.payload(3) == b"INAV"
 
 
-def test_a_crash_takes_the_port_away_until_the_power_was_switched(start: Callable[..., Simulator]) -> None:
+def test_after_a_crash_the_port_is_gone_until_a_power_cycle(start: Callable[..., Simulator]) -> None:
     simulator = start("--kind", "inav")
     with simulator.client() as client:
         client.payload(209, waypoint(1).pack(1))
@@ -131,7 +131,7 @@ def test_a_crash_takes_the_port_away_until_the_power_was_switched(start: Callabl
         simulator.client()
     assert json.loads(simulator.line("stats"))["power"] == "CRASHED"
     assert [simulator.line("power off"), simulator.line("power on")] == ["ok", "ok"]
-    # Until it has booted nothing is heard.
+    # During boot nothing is received.
     with simulator.client() as client:
         assert until(lambda: client.ask(20, timeout=0.5), "an answer") == (">", 20, bytes((0, 120, 0, 0)))
 

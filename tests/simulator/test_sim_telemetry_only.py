@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated Betaflight and baseflight: their own lengths, and no missions."""
+"""The simulated Betaflight and baseflight: their reply lengths, and no missions."""
 
 import struct
 
@@ -22,7 +22,7 @@ def test_lengths(kind: str) -> None:
 
 
 @pytest.mark.parametrize("command", [106, 107])
-def test_a_betaflight_without_gps_has_no_messages_about_one(command: int) -> None:
+def test_a_betaflight_without_gps_has_no_gps_messages(command: int) -> None:
     frame = MspBench("betaflight").ask(command)
     assert frame is not None
     assert frame.direction == "!"
@@ -30,13 +30,13 @@ def test_a_betaflight_without_gps_has_no_messages_about_one(command: int) -> Non
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("command", "payload"), [(18, b"\0"), (19, b"\0"), (20, b""), (121, b""), (122, b"")])
-def test_questions_about_missions_are_errors(kind: str, command: int, payload: bytes) -> None:
+def test_mission_requests_are_errors(kind: str, command: int, payload: bytes) -> None:
     frame = MspBench(kind).ask(command, payload)
     assert frame is not None
     assert frame.direction == "!"
 
 
-def test_betaflight_refuses_a_waypoint_and_baseflight_takes_any_for_its_hold_position() -> None:
+def test_betaflight_refuses_waypoints_and_baseflight_holds_at_any() -> None:
     refused, taken = (MspBench(kind).ask(209, waypoint(1).pack(1)) for kind in KINDS)
     assert refused is not None
     assert taken is not None
@@ -46,7 +46,7 @@ def test_betaflight_refuses_a_waypoint_and_baseflight_takes_any_for_its_hold_pos
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("armed", [False, True])
-def test_the_arm_flag_is_where_the_names_have_arm(kind: str, armed: bool) -> None:
+def test_the_arm_flag_is_at_the_index_of_arm_in_the_names(kind: str, armed: bool) -> None:
     bench = MspBench(kind, faults=Faults(armed=armed))
     bench.run(0.5)
     names = bench.payload(116).split(b";")
@@ -56,7 +56,7 @@ def test_the_arm_flag_is_where_the_names_have_arm(kind: str, armed: bool) -> Non
 
 
 @pytest.mark.parametrize(("kind", "lowest"), [("betaflight", 0), ("baseflight", -180)])
-def test_the_heading_goes_round_in_flight(kind: str, lowest: int) -> None:
+def test_the_heading_turns_in_flight(kind: str, lowest: int) -> None:
     bench = MspBench(kind, faults=Faults(armed=True))
     headings = []
     for _ in range(80):

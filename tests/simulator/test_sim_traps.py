@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The byte runs on which Harakiri acts outside of any protocol (serialCom), with its counters' exact habits."""
+"""The byte runs on which Harakiri acts outside any protocol (serialCom), with the exact behaviour of its counters."""
 
 import pytest
 
@@ -12,7 +12,7 @@ from simulator.simulated_board import Power
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 IDENT = request(100)
-# A frame that ends in one 0D: size 1 ^ command 108 ^ payload 60.
+# A frame that ends in a single 0D: size 1 ^ command 108 ^ payload 60.
 ENDS_IN_CR = request(108, b"\x60")
 
 
@@ -21,7 +21,7 @@ def speaks_msp(bench: Bench) -> bool:
 
 
 def stock() -> Bench:
-    """A board without the patch, which counts the bytes of frames, too."""
+    """A board without the patch, which also counts bytes within frames."""
     return Bench(faults=Faults(extension=False))
 
 
@@ -40,7 +40,7 @@ def test_three_returns_spread_over_frames_enter_the_cli() -> None:
     assert bench.naze.counters.hazard_runs == 1
 
 
-def test_three_returns_inside_of_a_frame_enter_the_cli() -> None:
+def test_three_returns_within_a_frame_enter_the_cli() -> None:
     bench = stock()
     assert speaks_msp(bench)
     assert bench.ask(request(250, b"\r\r\r"), timeout=0.1) is None
@@ -48,7 +48,7 @@ def test_three_returns_inside_of_a_frame_enter_the_cli() -> None:
 
 
 @pytest.mark.parametrize("run", [b"\r\r\r", b"###", b"RRR"])
-def test_with_the_patch_a_run_inside_of_a_frame_is_only_counted(run: bytes) -> None:
+def test_with_the_patch_a_run_within_a_frame_is_only_counted(run: bytes) -> None:
     bench = Bench()
     assert bench.ask(request(109, run)) is not None
     bench.send(run[:2])
@@ -58,7 +58,7 @@ def test_with_the_patch_a_run_inside_of_a_frame_is_only_counted(run: bytes) -> N
 
 
 @pytest.mark.parametrize("data", [b"\r\rx\r\r", b"\r\r$\r"])
-def test_a_byte_between_the_returns_disarms_the_trap(data: bytes) -> None:
+def test_a_byte_between_the_returns_resets_the_count(data: bytes) -> None:
     bench = Bench()
     bench.send(data)
     bench.run(0.1)
@@ -123,8 +123,8 @@ def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
     assert not info.flags
 
 
-def test_the_counters_for_autosense_stand_still_outside_of_it() -> None:
-    """Two '#' before MSP was found and one four seconds after it was lost are three for the firmware."""
+def test_the_autosense_counters_are_kept_outside_of_it() -> None:
+    """Two '#' before MSP is found and one four seconds after it is lost count as three."""
     bench = stock()
     bench.send(b"##")
     bench.run(0.01)
@@ -133,21 +133,21 @@ def test_the_counters_for_autosense_stand_still_outside_of_it() -> None:
     bench.run(4.5)
     assert bench.naze.protocol is Protocol.AUTOSENSE
     assert not bench.naze.counters.cli_entered
-    # The MSP frame's first byte was still read in AUTOSENSE and cleared the count.
+    # The MSP frame's first byte was read in AUTOSENSE and cleared the count.
     bench.send(b"#")
     bench.run(0.1)
     assert not bench.naze.counters.cli_entered
 
     bench = stock()
-    bench.send(IDENT[:-1] + b"##")  # a broken frame: AUTOSENSE goes on, and counts
+    bench.send(IDENT[:-1] + b"##")  # a broken frame: AUTOSENSE continues and counts
     bench.run(0.01)
     bench.send(b"#")
     bench.run(0.01)
     assert bench.naze.counters.cli_entered
 
 
-def test_a_run_that_begins_in_autosense_is_finished_four_seconds_later() -> None:
-    """The byte that completes the frame switches to MSP; a count begun by it waits there for AUTOSENSE."""
+def test_a_run_begun_in_autosense_can_complete_four_seconds_later() -> None:
+    """The byte that completes the frame switches to MSP; a count it began is kept until AUTOSENSE returns."""
     ends_in_sign = request(108, bytes((0x23 ^ 1 ^ 108,)))
     assert ends_in_sign[-1] == 0x23
     bench = stock()
@@ -160,7 +160,7 @@ def test_a_run_that_begins_in_autosense_is_finished_four_seconds_later() -> None
 
 
 def test_signs_act_on_an_armed_craft_that_never_left_autosense() -> None:
-    """With tele_prot 1 arming does not choose a protocol."""
+    """With tele_prot 1 arming does not select a protocol."""
     options = SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600)
     bench = Bench(options, Faults(armed=True))
     bench.run(0.5)
@@ -170,7 +170,7 @@ def test_signs_act_on_an_armed_craft_that_never_left_autosense() -> None:
     assert bench.naze.counters.cli_entered
 
 
-def test_the_cli_echoes_and_a_power_cycle_leads_out_of_it() -> None:
+def test_the_cli_echoes_and_a_power_cycle_ends_it() -> None:
     bench = Bench()
     bench.send(b"\r\r\r")
     bench.run(0.1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The board's UART: line rate both ways, and rings that overflow as the DMA's do."""
+"""The board's UART: line rate both ways, and rings that overflow like the DMA's."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -41,8 +41,8 @@ def test_later_bytes_queue_behind_earlier_ones_on_the_wire() -> None:
 
 
 @given(count=st.integers(0, 1200), read_before=st.integers(0, 255))
-def test_an_unread_ring_shows_the_newest_lap_only(count: int, read_before: int) -> None:
-    """Against a ring with positions, as drv_uart.c has it."""
+def test_an_unread_ring_holds_only_the_newest_bytes(count: int, read_before: int) -> None:
+    """Compared with a ring with positions, as in drv_uart.c."""
     uart, counters = make()
     uart.receive(b"." * read_before, 0.0)
     assert drain(uart, 1.0) == b"." * read_before
@@ -66,7 +66,7 @@ def test_sent_bytes_leave_at_line_rate() -> None:
 
 
 @given(st.lists(st.tuples(st.binary(min_size=1, max_size=100), st.floats(0.0005, 0.03)), max_size=30))
-def test_nothing_is_lost_while_the_ring_is_not_lapped(writes: list[tuple[bytes, float]]) -> None:
+def test_nothing_is_lost_unless_the_ring_overflows(writes: list[tuple[bytes, float]]) -> None:
     uart, counters = make()
     sent, now, outstanding = b"", 0.0, 0.0
     received = b""
@@ -93,11 +93,11 @@ def test_more_than_255_outstanding_bytes_corrupt_each_other() -> None:
     assert counters.tx_overflows == 1
     assert counters.max_outstanding_reply_bytes == 300
     out = uart.transmitted(1.0)
-    # The head has passed the tail by 44: the driver sees no more than these, and what it sends is the newer bytes.
+    # The head has passed the tail by 44: the driver sees only these, and sends the newer bytes.
     assert out == b"b" * 44
 
 
-def test_a_departure_is_announced_for_the_end_of_a_burst() -> None:
+def test_the_end_of_a_burst_is_its_departure_time() -> None:
     uart, _ = make()
     uart.write(b"q" * 90, 1.0)
     departure = uart.next_departure()
@@ -107,7 +107,7 @@ def test_a_departure_is_announced_for_the_end_of_a_burst() -> None:
     assert uart.next_departure() is None
 
 
-def test_bursts_that_end_soon_after_each_other_are_announced_together() -> None:
+def test_bursts_that_end_close_together_depart_together() -> None:
     uart, _ = make()
     for _ in range(3):
         uart.write(b"q" * 12, 0.0)
@@ -116,7 +116,7 @@ def test_bursts_that_end_soon_after_each_other_are_announced_together() -> None:
     assert uart.transmitted(departure) == b"q" * 36
 
 
-def test_another_speed_drops_what_is_in_the_rings() -> None:
+def test_changing_the_speed_clears_the_rings() -> None:
     uart, _ = make()
     uart.receive(b"r" * 20, 0.0)
     assert uart.read(20 * BYTE) == ord("r")
@@ -128,7 +128,7 @@ def test_another_speed_drops_what_is_in_the_rings() -> None:
     assert uart.transmitted(1.0 + 5.5 * 10 / 9600) == b"n" * 5
 
 
-def test_equal_speeds_change_nothing() -> None:
+def test_at_equal_speeds_bytes_are_unchanged() -> None:
     assert garble(bytes(range(256)), 57600, 57600) == bytes(range(256))
 
 
@@ -137,7 +137,7 @@ def test_half_the_speed_doubles_each_bit() -> None:
     assert garble(b"U", 9600, 19200)[0] == 0x66
 
 
-def test_a_hung_up_port_carries_nothing() -> None:
+def test_a_disconnected_port_carries_nothing() -> None:
     assert garble(b"hello", 0, 115200) == b""
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions come out of the store as they went in, and lookups do not slow down as it fills."""
+"""Missions are stored unchanged, and lookups do not slow down as the store fills."""
 
 import math
 import sqlite3
@@ -50,7 +50,7 @@ def store(tmp_path: Path) -> Any:
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(received=RECEIVED, outcome=TEXT, detail=TEXT, at=TIME)
-def test_any_mission_comes_back_as_it_went_in(
+def test_any_mission_is_stored_unchanged(
     store: MissionStore, received: ReceivedMission, outcome: str, detail: str, at: float
 ) -> None:
     number = store.add(received)
@@ -66,7 +66,7 @@ def test_any_mission_comes_back_as_it_went_in(
     assert (concluded.outcome, concluded.detail, concluded.concluded_at) == (outcome, detail, at)
 
 
-def test_parameters_that_were_not_given_stay_not_given(store: MissionStore) -> None:
+def test_unset_parameters_stay_unset(store: MissionStore) -> None:
     number = store.add(replace(mission(1), items=[{"p4": math.nan, "alt_m": -math.inf}]))
     stored = store.get(number)
     assert stored is not None
@@ -75,14 +75,14 @@ def test_parameters_that_were_not_given_stay_not_given(store: MissionStore) -> N
     assert item["alt_m"] == -math.inf
 
 
-def test_a_file_name_that_is_not_a_utf8_does_not_keep_a_mission_out(store: MissionStore) -> None:
+def test_a_file_name_that_is_not_utf8_is_stored(store: MissionStore) -> None:
     number = store.add(replace(mission(1), source="file caf\udce9.plan"))
     stored = store.get(number)
     assert stored is not None
     assert stored.received.source == r"file caf\udce9.plan"
 
 
-def test_the_list_shows_the_youngest_first(store: MissionStore) -> None:
+def test_the_list_shows_the_newest_first(store: MissionStore) -> None:
     numbers = [store.add(mission(tag, items=tag)) for tag in (1, 2, 3)]
     store.conclude(numbers[1], "REFUSED", "armed", 1_700_000_009.5)
     youngest, second = store.list(2)
@@ -101,7 +101,7 @@ def test_the_list_shows_the_youngest_first(store: MissionStore) -> None:
     assert [summary.number for summary in store.list(99)] == numbers[::-1]
 
 
-def test_numbers_grow_over_restarts(tmp_path: Path) -> None:
+def test_numbers_increase_across_restarts(tmp_path: Path) -> None:
     path = tmp_path / "missions.db"
     numbers = []
     for tag in range(3):
@@ -110,7 +110,7 @@ def test_numbers_grow_over_restarts(tmp_path: Path) -> None:
     assert numbers == [1, 2, 3]
 
 
-def test_only_a_verified_mission_answers_for_the_flight_controller(store: MissionStore) -> None:
+def test_only_verified_missions_are_found_by_checksum(store: MissionStore) -> None:
     sent = mission(7)
     first, second, refused, pending = (store.add(sent) for _ in range(4))
     other = store.add(mission(8))
@@ -139,7 +139,7 @@ def test_a_closed_store_says_so(tmp_path: Path) -> None:
         store.list(1)
 
 
-def test_finding_missions_takes_the_same_steps_however_many_there_are(store: MissionStore) -> None:
+def test_lookups_take_the_same_steps_at_any_size(store: MissionStore) -> None:
     wanted = mission(999)
     store.conclude(store.add(wanted), "VERIFIED", "", 1.0)
 
@@ -148,7 +148,7 @@ def test_finding_missions_takes_the_same_steps_however_many_there_are(store: Mis
             store.conclude(store.add(mission(tag, items=1)), "VERIFIED", "", 1.0)
 
     def steps(search: Callable[[], object]) -> int:
-        """How many instructions SQLite's machine runs: what a clock would tell, without its noise."""
+        """The number of SQLite VM instructions: like a timing, without the noise."""
         count = 0
 
         def tick() -> int:
@@ -172,8 +172,8 @@ def test_finding_missions_takes_the_same_steps_however_many_there_are(store: Mis
     assert [steps(search) for search in searches] == few
 
 
-def test_a_store_of_the_first_release_is_taken_over(tmp_path: Path) -> None:
-    """Its lines had no checksum."""
+def test_a_store_of_the_first_release_is_migrated(tmp_path: Path) -> None:
+    """Its rows had no checksum."""
     with sqlite3.connect(tmp_path / "missions.db") as first:
         first.executescript(files("storage").joinpath("schema", "0001_missions.sql").read_text())
         first.execute("PRAGMA user_version = 1")

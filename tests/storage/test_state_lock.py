@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One daemon per state directory, also after a crash of the last one."""
+"""One daemon per state directory, also after a crash of the previous one."""
 
 import os
 import subprocess
@@ -45,7 +45,7 @@ def said_by(daemon: subprocess.Popen[str]) -> str:
     return daemon.stdout.readline().strip()
 
 
-def test_the_second_daemon_is_told_who_the_first_is(tmp_path: Path) -> None:
+def test_the_second_daemon_is_told_the_first_ones_process_id(tmp_path: Path) -> None:
     directory = tmp_path / "state"
     with start(directory) as first:
         assert said_by(first) == "1"
@@ -56,13 +56,13 @@ def test_the_second_daemon_is_told_who_the_first_is(tmp_path: Path) -> None:
             )
         assert first.poll() is None
         first.kill()
-    with start(directory) as third:  # the dead one's lock is not a lock
+    with start(directory) as third:  # a dead process's lock does not count
         assert said_by(third) == "2"
     with StateLock(directory), open_store(directory / "missions.db", now=0.0).store as store:
         assert [summary.number for summary in store.list(9)] == [2, 1]
 
 
-def test_of_many_that_start_at_once_one_gets_it(tmp_path: Path) -> None:
+def test_of_many_processes_started_at_once_one_gets_the_lock(tmp_path: Path) -> None:
     daemons = [start(tmp_path) for _ in range(5)]
     said = [said_by(daemon) for daemon in daemons]
     for daemon in daemons:
@@ -71,7 +71,7 @@ def test_of_many_that_start_at_once_one_gets_it(tmp_path: Path) -> None:
     assert sum("is in use by" in line for line in said) == 4
 
 
-def test_it_can_be_released_and_held_again(tmp_path: Path) -> None:
+def test_the_lock_can_be_released_and_taken_again(tmp_path: Path) -> None:
     lock = StateLock(tmp_path)
     for _ in range(2):
         with lock, pytest.raises(StoreError, match=f"in use by process {os.getpid()}"):
@@ -79,14 +79,14 @@ def test_it_can_be_released_and_held_again(tmp_path: Path) -> None:
     lock.release()
 
 
-def test_a_file_in_the_directorys_place(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_directory(tmp_path: Path) -> None:
     (tmp_path / "state").touch()
     with pytest.raises(StoreError, match=r"cannot use the state directory .*/state: .*use another with --state-dir"):
         StateLock(tmp_path / "state").acquire()
 
 
 def test_without_the_lock_two_writers_take_turns(tmp_path: Path) -> None:
-    """The lock is the rule, but a store shared against it still loses nothing."""
+    """A store shared despite the rule still loses nothing."""
     path = tmp_path / "missions.db"
     with open_store(path, now=0.0).store as one, open_store(path, now=0.0).store as other:
         numbers = [store.add(mission(tag)) for tag in range(10) for store in (one, other)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A store that is full, and what a damaged one still gives."""
+"""A full store, and salvage from damaged ones."""
 
 import os
 import random
@@ -12,7 +12,7 @@ import pytest
 from storage.mission_store import DAMAGED, VERIFIED, StoreError, open_store
 from tests.support.sample_missions import mission
 
-#: `make soak` does it 300 times.
+#: `make soak` repeats it 300 times.
 DAMAGES = int(os.environ.get("STORE_DAMAGES", "20"))
 
 
@@ -28,8 +28,8 @@ def test_a_full_store_loses_rejected_lists_first(tmp_path: Path) -> None:
     assert (tmp_path / "missions.db").stat().st_size < 2 << 20
 
 
-def test_what_is_whole_in_a_damaged_store_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Sectors and bytes changed at random. No mission and no line of the list comes back changed."""
+def test_intact_missions_in_a_damaged_store_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Sectors and bytes are changed at random; no mission and no row of the list reads back changed."""
     path = tmp_path / "missions.db"
     with open_store(path, 0.0).store as store:
         for tag in range(1, 61):

@@ -22,7 +22,7 @@ NOTHING: Mapping[int, ReceivedMission] = {}
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A store with MISSIONS missions, numbered from 1, closed in peace."""
+    """A cleanly closed store with MISSIONS missions, numbered from 1."""
     path = tmp_path_factory.mktemp("sound") / "missions.db"
     with open_store(path, NOW).store as store:
         for tag in range(1, MISSIONS + 1):
@@ -55,7 +55,7 @@ def assert_nothing_false(store: MissionStore) -> None:
 
 
 def assert_kept_aside(path: Path, damaged: bytes, *, salvaged: Mapping[int, ReceivedMission] = NOTHING) -> None:
-    """The damaged file is kept byte for byte; the new store holds exactly the missions `salvaged`, by number."""
+    """The damaged file is kept byte for byte; the new store holds exactly the missions numbered `salvaged`."""
     opened = open_store(path, NOW)
     with opened.store as store:
         assert opened.set_aside == path.with_name(ASIDE)
@@ -77,14 +77,14 @@ def test_random_bytes(path: Path, size: int) -> None:
 
 
 @pytest.mark.parametrize("size", [16, 99, 100, 512, 2048, 4095, 4096, 4097, 8192, 12_288, 20_480, 50_000])
-def test_a_file_cut_short(path: Path, sound: Path, size: int) -> None:
+def test_a_truncated_file(path: Path, sound: Path, size: int) -> None:
     path.write_bytes(sound.read_bytes()[:size])
     assert_kept_aside(path, sound.read_bytes()[:size])
 
 
 @pytest.mark.parametrize("content", [b"", b"S"])
-def test_an_empty_file_is_a_new_one(path: Path, content: bytes) -> None:
-    """To SQLite one byte is nothing, too."""
+def test_an_empty_file_becomes_a_new_store(path: Path, content: bytes) -> None:
+    """SQLite also treats a file of one byte as empty."""
     path.write_bytes(content)
     opened = open_store(path, NOW)
     with opened.store as store:
@@ -93,7 +93,7 @@ def test_an_empty_file_is_a_new_one(path: Path, content: bytes) -> None:
 
 
 def test_pages_overwritten_with_other_pages(path: Path, sound: Path) -> None:
-    """As a card's worn-out address table does it."""
+    """As a card with a damaged address table does."""
     content = sound.read_bytes()
     pages = [content[at : at + 4096] for at in range(0, len(content), 4096)]
     damaged = b"".join([pages[0], *pages[:0:-1]])
@@ -108,7 +108,7 @@ def test_pages_overwritten_with_other_pages(path: Path, sound: Path) -> None:
 def test_flipped_bits_are_noticed_or_harmless(
     sound: Path, tmp_path_factory: pytest.TempPathFactory, flips: list[tuple[int, int]]
 ) -> None:
-    """With any damage the store opens or gives the reason, and a mission reads back unchanged or not at all."""
+    """The store opens or gives the reason; a mission reads back unchanged or not at all."""
     path = tmp_path_factory.mktemp("flip") / "missions.db"
     rotten = bytearray(sound.read_bytes())
     for at, bits in flips:  # half of them hit the file's header
@@ -117,7 +117,7 @@ def test_flipped_bits_are_noticed_or_harmless(
     try:
         opened = open_store(path, NOW)
     except StoreError as error:
-        # The very bytes that say so were hit; a person reads what to do.
+        # The bytes that identify the file were hit; the message says what to do.
         assert str(error).endswith("or move the file away") or "or move it away" in str(error)  # noqa: PT017
         return
     with opened.store as store:
@@ -127,15 +127,15 @@ def test_flipped_bits_are_noticed_or_harmless(
 
 
 @pytest.mark.parametrize("missing", [1, 2, 100, 3000])
-def test_an_end_cut_off_is_noticed_or_harmless(path: Path, sound: Path, missing: int) -> None:
-    """SQLite reads zeros there, which are a sound page's end as often as not."""
+def test_a_missing_end_is_noticed_or_harmless(path: Path, sound: Path, missing: int) -> None:
+    """SQLite reads zeros there, and many intact pages end with zeros."""
     path.write_bytes(sound.read_bytes()[:-missing])
     with open_store(path, NOW).store as store:
         assert_nothing_false(store)
         assert_works(store)
 
 
-def test_a_rotten_mission_does_not_hide_the_others(path: Path, sound: Path) -> None:
+def test_a_damaged_mission_does_not_hide_the_others(path: Path, sound: Path) -> None:
     records = mission(3, items=40).records
     assert sound.read_bytes().count(records[:160]) == 1
     path.write_bytes(sound.read_bytes().replace(records[:160], b"?" + records[1:160]))
@@ -149,7 +149,7 @@ def test_a_rotten_mission_does_not_hide_the_others(path: Path, sound: Path) -> N
 
 
 @pytest.mark.parametrize("rotten", [b"\xff", b"U"])
-def test_a_rotten_line_does_not_hide_the_list(path: Path, sound: Path, rotten: bytes) -> None:
+def test_a_damaged_row_does_not_hide_the_list(path: Path, sound: Path, rotten: bytes) -> None:
     source = mission(3).source.encode()
     path.write_bytes(sound.read_bytes().replace(source, rotten + source[1:]))
     with open_store(path, NOW).store as store:
@@ -166,7 +166,7 @@ def test_a_rotten_line_does_not_hide_the_list(path: Path, sound: Path, rotten: b
 
 @pytest.fixture
 def killed(path: Path, sound: Path) -> bytes:
-    """Leave what a kill -9 leaves, a main file and a log with commits of its own; return the log."""
+    """Leave the files of a killed process, a main file and a log with further commits; return the log."""
     path.write_bytes(sound.read_bytes())
     store = open_store(path, NOW).store
     store.add(mission(50))
@@ -178,7 +178,7 @@ def killed(path: Path, sound: Path) -> bytes:
     return log
 
 
-def test_a_sound_log_is_taken_up(path: Path, killed: bytes) -> None:
+def test_an_intact_log_is_applied(path: Path, killed: bytes) -> None:
     opened = open_store(path, NOW)
     with opened.store as store:
         assert opened.set_aside is None
@@ -186,8 +186,8 @@ def test_a_sound_log_is_taken_up(path: Path, killed: bytes) -> None:
 
 
 @pytest.mark.parametrize("bit", range(0, 32 * 8, 5))
-def test_a_log_with_a_damaged_head_is_not_thrown_away(path: Path, killed: bytes, bit: int) -> None:
-    """SQLite takes such a log for an old one and overwrites it: its commits would be gone without a word."""
+def test_a_log_with_a_damaged_header_is_kept(path: Path, killed: bytes, bit: int) -> None:
+    """SQLite takes such a log for an old one and silently overwrites its commits."""
     log = bytearray(killed)
     log[bit // 8] ^= 1 << bit % 8
     path.with_name("missions.db-wal").write_bytes(log)
@@ -203,7 +203,7 @@ def test_random_bytes_for_a_log(path: Path, killed: bytes) -> None:
 
 
 @pytest.mark.parametrize("remains", [None, b"", b"S"])
-def test_a_log_whose_main_file_is_gone_is_not_thrown_away(path: Path, killed: bytes, remains: bytes | None) -> None:
+def test_a_log_without_its_main_file_is_kept(path: Path, killed: bytes, remains: bytes | None) -> None:
     path.unlink()
     if remains is not None:
         path.write_bytes(remains)
@@ -212,16 +212,16 @@ def test_a_log_whose_main_file_is_gone_is_not_thrown_away(path: Path, killed: by
 
 
 def test_a_damaged_main_file_keeps_its_log(path: Path, killed: bytes) -> None:
-    # Not at its start: the log holds newer copies of the pages there.
+    # Not at its start: for those pages the log holds newer copies.
     damaged = path.read_bytes()[:30_000]
     path.write_bytes(damaged)
-    # Only the pages in the log can be read: those of the two missions that were added last.
+    # Only the pages in the log are readable: those of the last two missions.
     assert_kept_aside(path, damaged, salvaged={MISSIONS + 1: mission(50), MISSIONS + 2: mission(51)})
     assert path.with_name(f"{ASIDE}-wal").read_bytes() == killed
 
 
 def test_the_newest_damaged_files_are_kept(path: Path) -> None:
-    """Each may be as large as the store. None is overwritten, though the clock of a Pi may jump back."""
+    """Each may be as large as the store. None is overwritten, even if the Pi's clock jumps back."""
     kept = []
     for size in (10, 20, 30, 40):
         path.write_bytes(b"x" * size)
@@ -235,7 +235,7 @@ def test_the_newest_damaged_files_are_kept(path: Path) -> None:
     assert sorted(sizes) == [30, 40, 50]
 
 
-def test_what_was_kept_aside_can_be_opened_for_rescue(path: Path, killed: bytes) -> None:
+def test_a_damaged_file_set_aside_can_be_opened(path: Path, killed: bytes) -> None:
     path.with_name("missions.db-wal").write_bytes(b"x" * len(killed))
     opened = open_store(path, NOW)
     opened.store.close()
@@ -248,7 +248,7 @@ def test_what_was_kept_aside_can_be_opened_for_rescue(path: Path, killed: bytes)
 
 
 def test_a_file_of_another_program(path: Path) -> None:
-    """A sound database with a table of our name and no schema number is not ours."""
+    """An intact database with a table named like ours, but without a schema number, is not ours."""
     connection = sqlite3.connect(path)
     connection.execute("CREATE TABLE missions (something TEXT)")
     connection.close()
@@ -261,8 +261,8 @@ def test_a_file_of_another_program(path: Path) -> None:
     connection.close()
 
 
-def test_a_rotten_column_name(path: Path, sound: Path) -> None:
-    """SQLite's own check does not mind."""
+def test_a_damaged_column_name(path: Path, sound: Path) -> None:
+    """SQLite's own check does not find it."""
     content = sound.read_bytes()
     assert content.count(b"received_at   REAL") == 1
     damaged = content.replace(b"received_at   REAL", b"receivef_at   REAL")
@@ -270,13 +270,13 @@ def test_a_rotten_column_name(path: Path, sound: Path) -> None:
     assert_kept_aside(path, damaged)
 
 
-def test_a_schema_that_sqlite_cannot_even_complain_about(path: Path, sound: Path) -> None:
+def test_a_schema_that_is_not_utf8(path: Path, sound: Path) -> None:
     damaged = sound.read_bytes().replace(b"CREATE TABLE missions", b"CREATE TABLE \xffissions")
     path.write_bytes(damaged)
     assert_kept_aside(path, damaged)
 
 
-def test_a_view_of_ones_own_is_no_damage(path: Path, sound: Path) -> None:
+def test_an_added_view_is_not_damage(path: Path, sound: Path) -> None:
     path.write_bytes(sound.read_bytes())
     connection = sqlite3.connect(path)
     connection.execute("CREATE VIEW refused AS SELECT number FROM missions WHERE outcome = 'REFUSED'")

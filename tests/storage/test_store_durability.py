@@ -14,10 +14,10 @@ import pytest
 from storage.mission_store import open_store
 from tests.support.sample_missions import mission
 
-#: `make soak` does it 200 times.
+#: `make soak` repeats it 200 times.
 KILLS = int(os.environ.get("STORE_KILLS", "8"))
 
-# Adds and concludes as fast as it can, and says so only when the store has returned.
+# Adds and concludes missions at full speed; prints each only after the store has returned.
 WRITER = """
 import sys
 from pathlib import Path
@@ -51,7 +51,7 @@ def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, capsys: pyte
             time.sleep(chance.random() * 0.005)  # anywhere within the next write
             writer.kill()
             said += writer.stdout.readlines()
-        # A last line without its end was not said in full.
+        # An incomplete last line does not count.
         acknowledged.update((int(number), outcome) for number, outcome in map(str.split, filter(_whole, said)))
 
         opened = open_store(path, now=0.0)
@@ -62,7 +62,7 @@ def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, capsys: pyte
                 assert stored is not None
                 assert stored.received == mission(number, items=40)
                 assert outcome == "PENDING" or stored.detail == f"answer {number}"
-            assert len(store.list(100_000)) <= len(acknowledged) + kill  # a round's last one may be there unsaid
+            assert len(store.list(100_000)) <= len(acknowledged) + kill  # the last may not be printed yet
     with capsys.disabled():
         print(f"\n{KILLS} x kill -9: all {len(acknowledged)} acknowledged missions are there")  # noqa: T201
 
@@ -72,7 +72,7 @@ def _whole(line: str) -> bool:
 
 
 def test_a_power_cut_tears_only_what_was_not_acknowledged(tmp_path: Path) -> None:
-    """After add() has returned, the log up to there is on the disk; of what follows, any part may be."""
+    """After add() has returned, the log up to that point is on the disk; any part of later writes may be."""
     path = tmp_path / "live" / "missions.db"
     log = path.with_name("missions.db-wal")
     chance = random.Random(5)
@@ -85,7 +85,7 @@ def test_a_power_cut_tears_only_what_was_not_acknowledged(tmp_path: Path) -> Non
     assert len(rest) > 4096
     for trial in range(40):
         torn = bytearray(rest[: chance.randrange(len(rest))])
-        for _ in range(chance.randrange(3)):  # sectors come in any order
+        for _ in range(chance.randrange(3)):  # sectors are written in any order
             hole = chance.randrange(0, max(len(torn), 1), 512)
             torn[hole : hole + 512] = bytes(len(torn[hole : hole + 512]))
         copy = tmp_path / f"cut{trial}" / "missions.db"
@@ -104,7 +104,7 @@ def test_a_power_cut_tears_only_what_was_not_acknowledged(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("size", [0, 1, 31, 32, 4096])
 def test_a_power_cut_before_the_first_commit_is_no_damage(tmp_path: Path, size: int) -> None:
-    """A log that was made but never written: its bytes are zeros."""
+    """The log was created but never written: its bytes are zeros."""
     path = tmp_path / "missions.db"
     with open_store(path, now=0.0).store as store:
         store.add(mission(1))

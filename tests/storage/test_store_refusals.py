@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""If nothing can be stored, one sentence gives the reason, and earlier missions are kept."""
+"""If nothing can be stored, one sentence gives the reason and earlier missions are kept."""
 
 import sqlite3
 import subprocess
@@ -24,7 +24,7 @@ def run(script: str, *arguments: str, cwd: Path | None = None) -> subprocess.Com
     )
 
 
-# A limit on the size of files is the full disk that needs no disk of its own.
+# A limit on file size stands in for a full disk.
 FULL_DISK = """
 import resource, signal, sys
 from pathlib import Path
@@ -54,7 +54,7 @@ print(len(numbers))
 
 
 @pytest.mark.parametrize("limit", [150_000, 400_001])
-def test_a_full_disk_is_reported_and_costs_only_what_it_refused(tmp_path: Path, limit: int) -> None:
+def test_a_full_disk_is_reported_and_keeps_earlier_missions(tmp_path: Path, limit: int) -> None:
     path = tmp_path / "missions.db"
     add_error, conclude_error, listed, added = run(FULL_DISK, str(path), str(limit)).stdout.splitlines()
     assert add_error.startswith(f"cannot store the mission in {path}: the disk is full")
@@ -73,7 +73,7 @@ def test_a_full_disk_is_reported_and_costs_only_what_it_refused(tmp_path: Path, 
         assert (last.outcome, last.detail) == ("VERIFIED", "after")
 
 
-# Root may write anywhere, so the one who tries is no one.
+# Root may write anywhere, so the test runs as the user `nobody`.
 AS_NOBODY = """
 import os, sys
 from pathlib import Path
@@ -94,7 +94,7 @@ except StoreError as error:
 
 
 @pytest.mark.parametrize("with_store", [False, True])
-def test_a_directory_that_may_not_be_written(with_store: bool) -> None:
+def test_a_directory_without_write_permission(with_store: bool) -> None:
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         if with_store:
@@ -111,12 +111,12 @@ def test_a_directory_that_may_not_be_written(with_store: bool) -> None:
 
 
 @pytest.mark.parametrize("path", ["/proc/naze-bridge/missions.db", "/dev/null/missions.db"])
-def test_a_directory_that_cannot_be_made(path: str) -> None:
+def test_a_directory_that_cannot_be_created(path: str) -> None:
     with pytest.raises(StoreError, match=f"cannot open the mission store {path}: its directory cannot be created"):
         open_store(Path(path), now=0.0)
 
 
-def test_a_directory_in_the_files_place(tmp_path: Path) -> None:
+def test_a_directory_in_place_of_the_file(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"cannot open the mission store .*: it cannot be opened"):
         open_store(tmp_path, now=0.0)
 
