@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shared test support: boards, ground stations, worlds in simulated time, programs as a user starts them."""
+"""Shared test support: boards, ground stations, worlds in simulated time, programs as started by a user."""

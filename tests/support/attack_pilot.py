@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pilot under attack, whose heartbeats are counted, and strangers that speak without listening."""
+"""A pilot under attack, whose heartbeats are counted, and attackers that send without reading."""
 
 import socket
 import threading
@@ -24,7 +24,7 @@ LONGEST_GAP_S = 1.1
 
 
 class Stranger:
-    """One socket of an attacker. It reads nothing unless asked to."""
+    """An attacker's socket, which reads only on request."""
 
     def __init__(self, address: tuple[str, int], host: str = "127.0.0.1", sysid: int = 99, key: bytes | None = None):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -56,7 +56,7 @@ class Stranger:
 
 
 class Attack(threading.Thread):
-    """Repeats an action `per_s` times a second until it is left."""
+    """A context in which an action is repeated `per_s` times a second."""
 
     def __init__(self, deed: Callable[[], None], per_s: float) -> None:
         super().__init__(daemon=True)
@@ -85,7 +85,7 @@ class Attack(threading.Thread):
 
 
 class Watch:
-    """Watches the pilot's heartbeats while it is entered; at the end none may have been missing."""
+    """A context that watches the pilot's heartbeats and fails at its end if any is missing."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._stalls = Stalls()
@@ -108,12 +108,12 @@ class Watch:
 
 
 def assert_uploads(pilot: PlainStation, board: Board, plan: Sequence[PlanRow]) -> None:
-    """The pilot's list is accepted, and it is what the board holds."""
+    """The pilot's list is accepted and stored on the board."""
     assert pilot.upload(plan) is MissionResult.ACCEPTED
     assert board.records() == records_of(judge(plan))
 
 
 def sign(codec: Any, passphrase: str) -> None:
-    """Sign what a pymavlink codec packs from now on."""
+    """Let a pymavlink codec sign from now on."""
     codec.signing.secret_key, codec.signing.sign_outgoing = key_from_passphrase(passphrase), True
     codec.signing.timestamp = ticks(time.time())

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Debian root to install into: this machine's own, seen through an overlay that is gone afterwards.
+"""A Debian root to install into: this machine's root under a temporary overlay.
 
-It has namespaces of its own: nothing that is done in it reaches the machine, and it has no network but the loopback.
+It has its own namespaces, so it cannot change the machine, and only a loopback network.
 """
 
 import os
@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 _PATIENCE_S = 300
-#: On a tmpfs of its own, because an overlay cannot lie on an overlay. /run is empty: no systemd runs here.
+#: On a separate tmpfs, because an overlay cannot be on an overlay. /run is empty: no systemd runs here.
 _MAKE = """
 set -e
 mount -t tmpfs none "$0"; cd "$0"; mkdir upper work root
@@ -24,7 +24,7 @@ exec chroot root sh -c 'echo ready; exec cat'
 
 
 class BareRoot:
-    """Runs commands in the root while it is entered."""
+    """A context for running commands in the root."""
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
@@ -60,6 +60,6 @@ class BareRoot:
 
 
 if __name__ == "__main__":
-    # Whether one can be made here: the Makefile asks.
+    # The Makefile checks whether a root can be created here.
     with tempfile.TemporaryDirectory() as folder, BareRoot(Path(folder)) as bare:
         bare.run("true")

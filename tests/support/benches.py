@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test benches: programs that belong together, started for a test and ended with it, however it ends."""
+"""Test benches: programs started for a test and ended with it, also when it fails."""
 
 import signal
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ P = TypeVar("P", bound=Program)
 
 @dataclass(frozen=True)
 class Bench:
-    """A daemon that has found the simulated board on a pty, and the means to join more to it."""
+    """A daemon that has found the simulated board on a pty; more programs can be added."""
 
     board: Board
     daemon: Daemon
@@ -35,7 +35,7 @@ class Bench:
 
 
 class Starter:
-    """Starts programs that keep their files in `directory`."""
+    """Starts programs with their files in `directory`."""
 
     def __init__(self, directory: Path, stack: ExitStack) -> None:
         self.directory = directory
@@ -52,7 +52,7 @@ class Starter:
         return self._ended_at_last(Daemon(self.directory, fc, gcs, state_dir, options))
 
     def program(self, name: str, *arguments: str) -> Program:
-        """Any other subcommand; what it prints goes to a file of that name."""
+        """Start another subcommand; its output goes to a file of that name."""
         return self._ended_at_last(Program(self.directory / name, *arguments))
 
     def bench(self, *options: str, gcs: Sequence[str] = (), daemon_options: Sequence[str] = ()) -> Bench:

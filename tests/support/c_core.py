@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The firmware's mission core, compiled for this machine, on a board of memory (firmware/sim/sim_board.h)."""
+"""The firmware's mission core, compiled for this machine, on a board in memory (firmware/sim/sim_board.h)."""
 
 import ctypes
 import subprocess
@@ -37,12 +37,12 @@ _SIGNATURES = {
 
 
 class PowerCut(Exception):
-    """The power went away in the middle of a flash operation; `power_cycle` starts the board again."""
+    """Power was lost during a flash operation; `power_cycle` restarts the board."""
 
 
 @cache
 def library() -> Path:
-    """Make the shared library, with the core and its board of memory."""
+    """Build the shared library of the core and its board in memory."""
     subprocess.run(["make", "-s", "-C", FIRMWARE, "sim"], check=True)
     return FIRMWARE / "build" / "libnaze_mission.so"
 
@@ -53,7 +53,7 @@ def _functions() -> ctypes.CDLL:
 
 
 class CCore:
-    """One board: flash as delivered, powered up, disarmed."""
+    """A board with new flash, powered up, disarmed."""
 
     def __init__(self) -> None:
         self._c = _functions()
@@ -71,7 +71,7 @@ class CCore:
         return None if length == _NO_COMMAND else bytes(buffer[:length])
 
     def receive(self, data: bytes) -> bytes:
-        """Take bytes as the patched firmware's receiver does; return the reply frames. PowerCut."""
+        """Receive bytes like the patched firmware's receiver; return the reply frames. PowerCut."""
         reply = (c_uint8 * _FRAME_SIZE)()
         replies = bytearray()
         for byte in data:
@@ -82,7 +82,7 @@ class CCore:
         return bytes(replies)
 
     def store(self, records: bytes) -> int:
-        """Let the firmware save a list of its own; return the status. PowerCut."""
+        """Let the firmware save one of its own lists; return the status. PowerCut."""
         buffer = (c_uint8 * max(len(records), 1))(*records)
         status = int(self._c.sim_store(self._board, buffer, len(records) // RECORD_SIZE))
         if status == _POWER_CUT:
@@ -90,19 +90,17 @@ class CCore:
         return status
 
     def advance(self, milliseconds: int) -> None:
-        """Let time pass."""
         self._c.sim_advance(self._board, milliseconds)
 
     def arm(self, armed: bool) -> None:
-        """Arm or disarm."""
         self._c.sim_arm(self._board, armed)
 
     def set_busy(self, busy: bool) -> None:
-        """Schedule a write of the configuration, or let it be done."""
+        """Schedule a write of the configuration, or let it finish."""
         self._c.sim_set_write_pending(self._board, busy)
 
     def power_cycle(self) -> None:
-        """Switch off and on: only the flash and gps_wp_radius stay."""
+        """Switch off and on; only the flash and gps_wp_radius are kept."""
         self._c.sim_power_up(self._board)
 
     def cut_power_at(self, operation: int) -> None:
@@ -115,11 +113,11 @@ class CCore:
 
     @property
     def list(self) -> bytes:
-        """The records that the firmware around the core has in RAM."""
+        """The records that the firmware around the core holds in RAM."""
         buffer = (c_uint8 * (_CAPACITY * RECORD_SIZE))()
         return bytes(buffer[: self._c.sim_list(self._board, buffer) * RECORD_SIZE])
 
     @property
     def sound(self) -> bool:
-        """Whether every flash operation kept the rules and the configuration is untouched."""
+        """True if every flash operation was allowed and the configuration is untouched."""
         return bool(self._c.sim_config_intact(self._board)) and self._c.sim_violations(self._board) == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Debian's Chromium without a window, as a pilot's phone or laptop."""
+"""Debian's Chromium, headless, in place of a pilot's phone or laptop."""
 
 import json
 import shutil
@@ -19,21 +19,21 @@ LAPTOP = (1280, 900)
 
 
 class Browser:
-    """One tab that looks at the page of a daemon."""
+    """One tab with a daemon's page."""
 
     def __init__(self, driver: Chrome, port: int) -> None:
         self.driver = driver
         self.url = f"http://127.0.0.1:{port}/"
 
     def open(self) -> None:
-        """Load the page, and wait until it has shown the daemon's state."""
+        """Load the page and wait until it shows the daemon's state."""
         self.driver.get(self.url)
         self.wait_for_looks(1)
 
     def wait_for_looks(self, more: int) -> None:
         """Wait until the page has requested the state this many more times."""
         wanted = self._looks() + more
-        until(lambda: self._looks() >= wanted, "another look of the page at the daemon")
+        until(lambda: self._looks() >= wanted, "another state request from the page")
 
     def _looks(self) -> int:
         return int(self.run("return document.body ? document.body.dataset.looks || 0 : 0"))
@@ -48,7 +48,7 @@ class Browser:
         return self.driver.find_elements(By.CSS_SELECTOR, selector)
 
     def text(self, selector: str) -> str:
-        """What a reader sees there at this moment, even if the page is just being drawn again."""
+        """The visible text, even while the page is being redrawn."""
         script = "const e = document.querySelector(arguments[0]); return e?.innerText ?? e?.textContent ?? ''"
         return str(self.run(script, selector))
 
@@ -56,21 +56,21 @@ class Browser:
         until(lambda: text in self.text(selector), f"{text!r} in {selector}")
 
     def press(self, selector: str) -> None:
-        """Click it wherever it is."""
+        """Scroll it into view and click it."""
         self.run("document.querySelector(arguments[0]).scrollIntoView({block: 'center'})", selector)
         self.find(selector).click()
 
     def value(self, name: str) -> str:
-        """The value that the overview shows under a name."""
+        """The value of a name in the overview."""
         script = "return [...document.querySelectorAll('dt')].find(e => e.innerText === arguments[0])"
         return str(self.run(f"{script}?.nextElementSibling.innerText ?? ''", name))
 
     def complaints(self) -> list[str]:
-        """Errors and refusals (Content-Security-Policy) that the browser has noted since the last time."""
+        """Errors and Content-Security-Policy violations that the browser logged since the last call."""
         return [entry["message"] for entry in self._log("browser") if entry["level"] in ("SEVERE", "WARNING")]
 
     def traffic(self) -> tuple[set[str], int]:
-        """The addresses that were asked for since the last time, and how many bytes came over the wire."""
+        """The URLs requested since the last call, and the number of bytes received."""
         addresses, size = set(), 0
         for entry in self._log("performance"):
             event = json.loads(entry["message"])["message"]
@@ -105,7 +105,7 @@ def browser(port: int, size: tuple[int, int] = LAPTOP, *, dark: bool = False) ->
     try:
         driver.set_page_load_timeout(PATIENCE * 2)
         width, height = size
-        # The window's own size has a least width; a phone's is narrower.
+        # The window has a minimum width, and a phone is narrower.
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
         driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         yield Browser(driver, port)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station's upload and download, with the client's own repeats."""
+"""A ground station's upload and download, with its own repeats."""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ _LAT_E7, _LON_E7 = 453838000, 84733000
 
 
 def waypoints(count: int, seed: int = 0) -> list[MissionItem]:
-    """Home and `count - 1` waypoints that are stored as they are; another `seed` gives another list."""
+    """Home and `count - 1` waypoints that are stored unchanged; each `seed` gives a different list."""
     return [
         MissionItem(
             seq=number,
@@ -37,7 +37,7 @@ def waypoints(count: int, seed: int = 0) -> list[MissionItem]:
 
 
 def records_of(items: Sequence[MissionItem]) -> tuple[WpRecord, ...]:
-    """What the flight controller is to hold of them."""
+    """The records of them that the flight controller must hold."""
     return check_list(items, HarakiriRules()).records
 
 
@@ -81,7 +81,7 @@ def item_message(seq: int, sent: MissionItem, *, as_int: bool = True, mission_ty
 
 
 class Upload:
-    """A ground station that writes a mission: it answers each request, and repeats itself while nothing comes."""
+    """A ground station that uploads a mission: it answers each request and repeats its last message while it waits."""
 
     def __init__(
         self,
@@ -108,12 +108,12 @@ class Upload:
         return self.result is not None or self.gave_up
 
     def run(self, seconds: float = 60.0) -> MissionResult | None:
-        """Let the world continue until the upload has ended."""
+        """Run the world until the upload has ended."""
         self.station.world.run_until(lambda _: self.is_over, seconds)
         return self.result
 
     def stop(self) -> None:
-        """Fall silent forever, as a crashed ground station does."""
+        """Fall silent forever, like a crashed ground station."""
         self.gave_up = True
 
     def _count(self) -> None:
@@ -154,7 +154,7 @@ class Upload:
 
 
 class Download:
-    """A ground station that reads the mission."""
+    """A ground station that downloads the mission."""
 
     def __init__(self, station: GroundStation, *, as_int: bool = True, repeat_s: float = 0.7, tries: int = 7) -> None:
         self.station, self.as_int = station, as_int

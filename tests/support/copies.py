@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work on a copy of everything in memory, so that one preparation serves many tries."""
+"""Run code in a copy of the process, so that one preparation serves many runs."""
 
 from collections.abc import Callable
 from multiprocessing import get_context
@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 def in_a_copy(work: Callable[[], T]) -> T:
-    """What `work` returns in a child process that is a copy of this one. EOFError if it raises."""
+    """The result of `work` in a child process forked from this one. EOFError if it raises."""
     context = get_context("fork")
     near, far = context.Pipe(duplex=False)
     child = context.Process(target=lambda: far.send(work()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real DroneKit 2.9, imported from here because it was written for a Python before 3.10."""
+"""The real DroneKit 2.9, adapted here because it was written for Python before 3.10."""
 
 import collections
 import collections.abc
@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 collections.MutableMapping = collections.abc.MutableMapping  # type: ignore[attr-defined]
-# Of the package `future`, which it does not require, it needs one name.
+# It needs one name from the package `future`, but does not require it.
 _PAST = ModuleType("past.builtins")
 _PAST.basestring = str  # type: ignore[attr-defined]
 sys.modules.setdefault("past", ModuleType("past"))
@@ -21,7 +21,7 @@ from dronekit import Command, connect  # noqa: E402
 
 @contextmanager
 def vehicle_at(port: int) -> Iterator[Any]:
-    """Connect as its examples do; the Vehicle."""
+    """Connect as in DroneKit's examples; return the Vehicle."""
     vehicle = connect(f"udpout:127.0.0.1:{port}", wait_ready=True, timeout=60)
     try:
         yield vehicle
@@ -30,5 +30,5 @@ def vehicle_at(port: int) -> Iterator[Any]:
 
 
 def command(number: int, lat_deg: float, lon_deg: float, height_m: float) -> Any:
-    """A Command relative to home."""
+    """A Command with altitude relative to home."""
     return Command(0, 0, 0, 3, number, 0, 0, 0, 0, 0, 0, lat_deg, lon_deg, height_m)

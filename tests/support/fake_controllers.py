@@ -19,7 +19,7 @@ def ident(version: int, capability: int) -> bytes:
 
 
 class DeafWhileArmed(SimulatedNaze):
-    """FrSky with the receiver's wire cut while armed: nothing is answered."""
+    """FrSky with the RX wire cut while armed: no replies."""
 
     def receive(self, data: bytes, now: float) -> None:
         if not self.armed:
@@ -27,7 +27,7 @@ class DeafWhileArmed(SimulatedNaze):
 
 
 class QuietLine:
-    """Nothing ever comes. The others build on it: what they put into `outgoing` arrives at once."""
+    """A silent line. The other fakes extend it: bytes put into `outgoing` arrive at once."""
 
     def __init__(self, baud: int = 115200) -> None:
         self.baud = baud
@@ -35,10 +35,10 @@ class QuietLine:
         self.outgoing = bytearray()
 
     def power_on_booted(self, now: float) -> None:
-        """It has no switch."""
+        """Nothing to switch on."""
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes from the bridge."""
+        """Receive bytes from the bridge."""
 
     def advance(self, now: float) -> bytes:
         """Return the bytes for the bridge."""
@@ -58,7 +58,7 @@ class Loopback(QuietLine):
 
 
 class MspFake(QuietLine):
-    """Answers MSP from a table; what is not in it is an error, or nothing if `silent_on_unknown`."""
+    """Answers MSP from a table; other requests get an error, or no reply if `silent_on_unknown`."""
 
     def __init__(self, answers: Mapping[int, bytes], *, silent_on_unknown: bool = False) -> None:
         super().__init__()
@@ -78,7 +78,7 @@ class MspFake(QuietLine):
 
 
 class MavlinkOnly(QuietLine):
-    """A flight controller with nothing but a heartbeat a second."""
+    """A flight controller that sends only a heartbeat a second."""
 
     def __init__(self, version: int = 2, sysid: int = 1) -> None:
         super().__init__()
@@ -91,7 +91,7 @@ class MavlinkOnly(QuietLine):
             self._due += 1.0
             message = messages.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3)
             self.outgoing += bytes(message.pack(self._mavlink, force_mavlink1=self._version == 1))
-            # Other messages in between, which are not heard here.
+            # The gaps are other messages, which are not received.
             self._mavlink.seq = (self._mavlink.seq + 7) % 256
         return super().advance(now)
 
@@ -100,11 +100,11 @@ class MavlinkOnly(QuietLine):
 
 
 class Noise(QuietLine):
-    """Random bytes without end; `alphabet` makes some of them as likely as a test wants."""
+    """Endless random bytes, drawn from `alphabet`."""
 
     def __init__(self, seed: int, alphabet: bytes = bytes(range(256)), chunk: int = 512) -> None:
         super().__init__()
-        # One long pool, read from random places: noise must cost less than what it tests.
+        # One long pool, read at random positions, so that noise costs less CPU than the code under test.
         self._random = random.Random(seed)
         self._pool = bytes(self._random.choices(alphabet, k=1 << 18))
         self._chunk = chunk

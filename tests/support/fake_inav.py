@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A minimal INAV or MultiWii NAV as a `peer` of the world, with faults that real ones do not have.
+"""A minimal INAV or MultiWii NAV as a `peer` of the world, for misbehaviour and losses.
 
-Real behaviour is in simulator/; this is for wrong behaviour and losses.
+Real behaviour is in simulator/.
 """
 
 import random
@@ -18,7 +18,7 @@ HOME = struct.pack("<ii", 453838000, 84733000)
 
 
 class FakeInav(MspFake):
-    """An INAV in whose `records` the 20 bytes of each record are. `drop(frame)`: this request or its answer is lost."""
+    """An INAV; `records` has the 20 bytes of each record. `drop(frame)`: this request or its reply is lost."""
 
     def __init__(self, capacity: int = 120, drop: Callable[[MspFrame], str] = lambda _frame: "") -> None:
         super().__init__({1: b"\0\2\5", 2: b"INAV", 119: bytes((0, 51, 1, 2, 10, 28))})
@@ -34,7 +34,7 @@ class FakeInav(MspFake):
         self._frames = MspParser()
 
     def power_off(self, now: float) -> None:
-        """RAM is lost; here the saved list is not loaded either: LOAD is the pilot's."""
+        """RAM is lost. The saved list is not loaded at boot; only the pilot's LOAD does that."""
         self.records, self.is_valid = [], False
 
     def receive(self, data: bytes, now: float) -> None:
@@ -90,7 +90,7 @@ class FakeInav(MspFake):
 
 
 class FakeMultiwii(FakeInav):
-    """A MultiWii 2.4.1 with NAV: every number is a place of its own, and there is no SAVE."""
+    """A MultiWii 2.4.1 with NAV: each record is stored separately, and there is no SAVE."""
 
     erased = bytes(19) + b"\xfe"
 
@@ -115,7 +115,7 @@ class FakeMultiwii(FakeInav):
 
     @property
     def flown(self) -> list[bytes]:
-        """The list that it would fly: the records up to the last one."""
+        """The list that it would fly: the records up to the flag LAST."""
         flown: list[bytes] = []
         for number in range(1, self.capacity + 1):
             if number not in self.places:

@@ -13,7 +13,7 @@ _HEADER = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when re
 
 
 class FaultyMachine(Host):
-    """Begins as a Pi on which all is well; /dev/serial0 leads to ttyAMA0."""
+    """Initially a Pi without problems; /dev/serial0 is a link to ttyAMA0."""
 
     def __init__(self, root: Path) -> None:
         super().__init__(root)
@@ -30,19 +30,19 @@ class FaultyMachine(Host):
         self.sockets()
 
     def write(self, path: str, text: str = "") -> Path:
-        """Make a file of the machine."""
+        """Create a file of the machine."""
         file = self.path(path)
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
         return file
 
     def owned_by(self, path: str, group: str) -> None:
-        """Give a file to a group: really, and so as root; as another program the group is one's own."""
+        """Give a file to a group. Only root can; other users keep their own group."""
         if os.geteuid() == 0:
             os.chown(self.path(path), 0, grp.getgrnam(group).gr_gid)
 
     def runs(self, pid: int, *arguments: str, has_open: str = "") -> None:
-        """Let a program run, with a file or socket open."""
+        """Add a running program with an open file or socket."""
         self.write(f"/proc/{pid}/cmdline", "\0".join(arguments) + "\0")
         self.path(f"/proc/{pid}/fd").mkdir()
         if has_open:

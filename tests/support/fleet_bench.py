@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fleet of real daemons behind a real router, each a process of its own."""
+"""A fleet of real daemons behind a real router, all separate processes."""
 
 import json
 import signal
@@ -16,7 +16,7 @@ Vehicle = dict[str, Any]
 
 
 class Fleet:
-    """A router, and the vehicles that were started, by the names of their folders."""
+    """A router and the started vehicles, by folder name."""
 
     def __init__(self, folder: Path, stack: ExitStack) -> None:
         self.folder = folder
@@ -28,7 +28,7 @@ class Fleet:
     def start(
         self, folder: str, *, name: str = "", fc: str = "sim:", commands: str = I_KNOW, encoding: str = "json"
     ) -> Daemon:
-        """Start a vehicle; `name`: another one than that of its folder."""
+        """Start a vehicle; `name` if it differs from its folder's."""
         own = self.folder / folder
         own.mkdir(exist_ok=True)
         config = own / "config.toml"
@@ -42,7 +42,7 @@ class Fleet:
         return daemon
 
     def board(self, folder: str, *options: str) -> Board:
-        """Start a simulated Naze as a program of its own, which can be told to arm."""
+        """Start a simulated Naze as a separate process, so that it can be armed."""
         own = self.folder / folder
         own.mkdir(exist_ok=True)
         board = Board(own, *options)
@@ -62,7 +62,7 @@ class Fleet:
         return {vehicle["name"]: vehicle for vehicle in json.loads(listed.stdout)["vehicles"]}
 
     def wait(self, *names: str) -> None:
-        """Wait until vehicles are seen, and know what their flight controllers hold."""
+        """Wait until vehicles are seen and have read their flight controllers' missions."""
 
         def ready() -> bool:
             vehicles = self.listed()

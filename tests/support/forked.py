@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge` as a process forked from one that has imported it: imports are most of what a short command costs.
+"""`naze-bridge` as a process forked from one that has imported it, because imports dominate short commands.
 
-It has its own pid, exit status, environment and output, like any other program. What depends on a fresh interpreter
-(memory, which modules are loaded) is tested with `programs.NAZE_BRIDGE`.
+It has its own pid, exit status, environment and output. Tests that need a fresh interpreter (memory, loaded modules)
+use `programs.NAZE_BRIDGE`.
 """
 
 import multiprocessing
@@ -42,7 +42,7 @@ _context.set_forkserver_preload(list(PRELOADED))
 
 
 class Forked:
-    """A running `naze-bridge`, with the methods of subprocess.Popen. What it prints is appended to files."""
+    """A running `naze-bridge`, with the methods of subprocess.Popen. Its output is appended to files."""
 
     def __init__(self, arguments: Sequence[str], directory: Path, output: Path, error: Path) -> None:
         self._arguments = arguments

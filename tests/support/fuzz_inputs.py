@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random inputs for all interfaces, from one seed: whole ones, damaged ones and noise."""
+"""Random inputs for all interfaces from one seed: valid, damaged, and noise."""
 
 import random
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 from protocols.msp.frame import Direction, MspFrame
 
-#: Those that ground stations send; the others are sent less often.
+#: Messages that ground stations send; others are drawn less often.
 _OURS = [
     m.MAVLINK_MSG_ID_HEARTBEAT,
     m.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
@@ -28,13 +28,13 @@ _BYTES = (b"\0", b"\1", b"\xff", b"\x80", b"\x7f")
 
 
 class FuzzInputs:
-    """Everything is drawn from `seed`."""
+    """A generator of inputs, determined by `seed`."""
 
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
 
     def from_a_ground_station(self) -> bytes:
-        """A MAVLink frame of any known message (ids of three bytes, too), or something like it."""
+        """A MAVLink frame of any known message (ids above 255 included), or something similar."""
         msgid = self.random.choice(_OURS if self.random.random() < 0.5 else list(MESSAGE_FORMATS))
         payload = self._payload(MESSAGE_FORMATS[msgid].full_size)
         sysid, version = self.random.choice((1, 250, 255, self.random.randrange(256))), self.random.choice((1, 2, 2))
@@ -42,7 +42,7 @@ class FuzzInputs:
         return self.damaged(frame)
 
     def from_the_uart(self) -> bytes:
-        """An MSP frame, a MAVLink frame, or something like them."""
+        """An MSP frame, a MAVLink frame, or something similar."""
         if self.random.random() < 0.2:
             return self.from_a_ground_station()
         reply = MspFrame(
@@ -51,14 +51,14 @@ class FuzzInputs:
         return self.damaged(reply.encode())
 
     def like(self, examples: Sequence[bytes]) -> bytes:
-        """A file like one of these."""
+        """A file similar to one of these."""
         data = self.random.choice(examples)
         for _ in range(self.random.randrange(1, 5)):
             data = self.damaged(data)
         return data
 
     def damaged(self, data: bytes) -> bytes:
-        """The data as it is, cut, changed, with a part elsewhere, or behind noise."""
+        """The data unchanged, truncated, altered, with a part moved, or after noise."""
         draw = self.random
         at, end = sorted((draw.randrange(len(data) + 1), draw.randrange(len(data) + 1)))
         match draw.randrange(12):

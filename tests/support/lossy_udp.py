@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bad radio link between a UDP client and the daemon: loses, repeats, delays and so reorders datagrams."""
+"""A bad radio link between a UDP client and the daemon: loses, duplicates, delays and reorders datagrams."""
 
 import heapq
 import random
@@ -18,18 +18,18 @@ _LONGEST_SLEEP_S = 0.2
 
 
 class Way(Enum):
-    """Where a datagram is going."""
+    """The direction of a datagram."""
 
     TO_DAEMON = auto()
     TO_CLIENT = auto()
 
 
 class LossyUdp:
-    """Clients talk to `address`; the daemon sees each as a client of its own.
+    """Clients send to `address`; the daemon sees each as a separate client.
 
-    loss, repeats: probability that a datagram vanishes, or comes twice. delay_s, jitter_s: each datagram (and each
-    copy) takes delay_s and up to jitter_s more, which is what reorders them. `swallow` may be set to a function that
-    says which datagrams vanish besides.
+    loss, repeats: probability that a datagram is lost or duplicated. delay_s, jitter_s: each datagram (and each copy)
+    takes delay_s and up to jitter_s more, which reorders them. `swallow` may be set to a function that selects further
+    datagrams to lose.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station at a board's UART: Harakiri's own MAVLink upload."""
+"""A ground station directly on a board's UART, for Harakiri's own MAVLink upload."""
 
 from protocols.mavlink.codec import FrameWriter, MavlinkDecoder, pack
 from protocols.mavlink.dialect import Message
@@ -18,7 +18,7 @@ def item(seq: int) -> Message:
 
 
 class MavlinkGround:
-    """Speaks MAVLink 1 over a bench."""
+    """A MAVLink 1 ground station on a bench."""
 
     def __init__(self, bench: WireBench) -> None:
         self._bench = bench
@@ -39,7 +39,7 @@ class MavlinkGround:
         return None
 
     def upload(self, count: int, stop_after: int | None = None) -> int | None:
-        """Upload waypoints; the result of the ACK, or None if it was left off before."""
+        """Upload waypoints; return the result of the ACK, None if the upload was broken off."""
         self.send(m.MAVLink_mission_count_message(*_BOARD, count))
         for _ in range(count + 1):
             asked = self.wait(m.MAVLINK_MSG_ID_MISSION_REQUEST, m.MAVLINK_MSG_ID_MISSION_ACK)

@@ -13,7 +13,7 @@ _AUTOSENSE_S = 5.0
 
 
 def count(bench: WireBench) -> int:
-    """How many records the extension says are stored, once the board takes MSP again."""
+    """The number of stored records reported by the extension once the board accepts MSP again."""
     bench.run(_WRITTEN_S + _AUTOSENSE_S)
     info = decode_info(bench.payload(INFO_REQUEST, 3.0))
     assert info is not None
@@ -27,7 +27,7 @@ def an_upload_becomes_the_stored_list(bench: WireBench) -> None:
     assert [record.height_m for record in bench.pull()] == [20, 21, 22, 23]
 
 
-def an_upload_that_breaks_off_leaves_what_was_there(bench: WireBench) -> None:
+def an_interrupted_upload_keeps_the_old_list(bench: WireBench) -> None:
     bench.run(_AUTOSENSE_S)
     assert MavlinkGround(bench).upload(4, stop_after=2) is None
     assert count(bench) == 0

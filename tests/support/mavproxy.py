@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real MAVProxy, driven by lines on its standard input."""
+"""The real MAVProxy, driven through its standard input."""
 
 import os
 import re
@@ -21,7 +21,7 @@ _LISTED = re.compile(
 
 
 class MavProxy:
-    """Connected to `port` when made; keeps its files in `directory`."""
+    """Connects to `port` when created; keeps its files in `directory`."""
 
     def __init__(self, directory: Path, port: int, *options: str) -> None:
         self._directory = directory
@@ -54,13 +54,13 @@ class MavProxy:
         self._process.wait(PATIENCE)
 
     def type(self, line: str) -> None:
-        """Type a line; only later output counts from now on."""
+        """Type a line; earlier output is ignored from now on."""
         assert self._process.stdin is not None
         self._seen = len(self._printed())
         self._process.stdin.write(f"{line}\n")
 
     def wait_for(self, part: str) -> str:
-        """Wait until `part` is printed; return all that was since the last line that was typed."""
+        """Wait until `part` is printed; return all output since the last typed line."""
         text = self._answer(part, PATIENCE)
         assert part in text, f"{part!r} was not printed, but:\n{text}"
         return text
@@ -79,7 +79,7 @@ class MavProxy:
     def list(self, count: int) -> list[tuple[float, ...]]:
         """`wp list`: seq, command, frame, param1..4, lat_e7, lon_e7, height of each item.
 
-        It asks for the list once; where that was lost its user types it again.
+        MAVProxy requests the list once; if that is lost, its user types the command again.
         """
         for _ in range(3):
             self.type("wp list")
@@ -95,7 +95,7 @@ class MavProxy:
         return items
 
     def _answer(self, part: str, seconds: float) -> str:
-        """Return the output since the last typed line, as soon as it contains `part`."""
+        """The output since the last typed line, once it contains `part`."""
         comes(lambda: part in self._printed()[self._seen :], seconds)
         return self._printed()[self._seen :]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flight controllers that must behave identically: the firmware's C core, and the simulated Naze's."""
+"""Flight controllers that must behave identically: the firmware's C core and the simulated Naze."""
 
 from typing import Protocol
 
@@ -16,19 +16,16 @@ class Device(Protocol):
     """A flight controller without its serial port."""
 
     def request(self, command: int, payload: bytes) -> bytes | None:
-        """Return the reply's payload; None if the command is none of the extension's. PowerCut."""
+        """Return the reply's payload; None if the command does not belong to the extension. PowerCut."""
 
-    def advance(self, milliseconds: int) -> None:
-        """Let time pass."""
+    def advance(self, milliseconds: int) -> None: ...
 
-    def arm(self, armed: bool) -> None:
-        """Arm or disarm."""
+    def arm(self, armed: bool) -> None: ...
 
     def set_busy(self, busy: bool) -> None:
-        """Schedule a write of the configuration, or let it be done."""
+        """Schedule a write of the configuration, or let it finish."""
 
-    def power_cycle(self) -> None:
-        """Switch off and on."""
+    def power_cycle(self) -> None: ...
 
     def cut_power_at(self, operation: int) -> None:
         """Cut the power within the n-th flash operation from now on; 0: never."""
@@ -38,7 +35,7 @@ class Device(Protocol):
 
     @property
     def list(self) -> bytes:
-        """The records that the firmware works with."""
+        """The records that the firmware uses."""
 
 
 class Simulated:
@@ -50,7 +47,7 @@ class Simulated:
         self._faults = Faults()
         size = flash_size(self._options)
         self._flash = NorFlash(memoryview(bytearray((ERASED,)) * size), self._faults)
-        # The configuration has a chip of its own, so that no fault meant for the list hits it.
+        # The configuration has separate flash, so that faults meant for the list do not hit it.
         config_flash = NorFlash(memoryview(bytearray((ERASED,)) * size), Faults())
         self._config = StoredConfig(config_flash, self._options)
         self.power_cycle()
@@ -70,7 +67,7 @@ class Simulated:
 
     def arm(self, armed: bool) -> None:
         self._board.armed = armed
-        self._missions.drop_stale(self._now)  # as the main loop does
+        self._missions.drop_stale(self._now)  # like the main loop
 
     def set_busy(self, busy: bool) -> None:
         self._faults.busy = busy

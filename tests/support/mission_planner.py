@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission Planner as a scripted client: its messages, waits and timeouts (docs/ground-stations.md).
 
-Only its behaviour on the link is here. Its timers may be scaled down (`pace`); everything else is as in the original,
-quirks included: it takes any ack to MISSION_COUNT for "continue", it understands only MISSION_REQUEST (40) while
-it sends MISSION_ITEM_INT, and its own loops eat each other's packets (`appetite`).
+Only its behaviour on the link. Its timers may be scaled down (`pace`); everything else is as in the original,
+quirks included: it takes any ack to MISSION_COUNT for "continue", understands only MISSION_REQUEST (40) while
+sending MISSION_ITEM_INT, and its loops take each other's packets (`appetite`).
 """
 
 import random
@@ -24,12 +24,12 @@ from tests.support.programs import PATIENCE
 SYSID, COMPID = 255, 190
 _DATAGRAM_SIZE = 2048
 _INT_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-#: Stream and rate, as it asks for them at the first heartbeat.
+#: Its requests at the first heartbeat: stream and rate.
 _STREAMS = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
 
 
 class UploadFailed(Exception):
-    """The dialogue that its user sees. `result` is the code that its logic went by, None for a timeout."""
+    """The error dialogue its user sees. `result` is the result code that caused it, None for a timeout."""
 
     def __init__(self, text: str, result: MissionResult | None = None) -> None:
         super().__init__(text)
@@ -41,10 +41,10 @@ class TimedOut(UploadFailed):
 
 
 class MissionPlanner:
-    """A ground station at a UDP client link to `address`; with `listen` it waits there to be spoken to instead.
+    """A ground station with a UDP client link to `address`; with `listen` it waits for the vehicle there instead.
 
-    pace: factor on all of its timers. appetite: probability that a packet goes to another of its loops than the one
-    that waits for it. mavlink_1_only: an old one, which never takes MAVLink 2 up.
+    pace: factor on all of its timers. appetite: probability that a packet is taken by a loop other than the one
+    waiting for it. mavlink_1_only: an old version, which never switches to MAVLink 2.
     """
 
     def __init__(
@@ -76,10 +76,10 @@ class MissionPlanner:
         self._parameter_count = 0
         self.texts: list[str] = []
         self.armed = False
-        #: Everything that came, whether one of its loops was waiting for it or not.
+        #: Every received message, whether a loop was waiting for it or not.
         self.heard: list[Message] = []
         self.unacked_commands: list[int] = []
-        # What "Write Fast" looks at; no loop can eat it.
+        # Read by "Write Fast"; no loop can take it away.
         self._requested, self._answer = 0, MissionResult.ACCEPTED
 
     def __enter__(self) -> Self:
@@ -103,14 +103,14 @@ class MissionPlanner:
             self._socket.sendto(frame, self._peer)
 
     def _send_signed(self, message: Message) -> None:
-        """Sign with the key of zeros that it has before a passphrase is set."""
+        """Sign with the all-zero key it has before a passphrase is set."""
         signing = self._codec.signing
         signing.secret_key, signing.link_id, signing.sign_outgoing = bytes(32), 1, True
         self._send_bytes(bytes(message.pack(self._codec)))
         signing.secret_key, signing.sign_outgoing = None, False
 
     def _packets(self, seconds: float) -> Iterator[Message]:
-        """Yield what comes to the loop that waits, until `seconds` of its own time are over."""
+        """Yield the packets that reach the waiting loop within `seconds` of its own time."""
         deadline = time.monotonic() + seconds * self._pace
         while True:
             while self._router:
@@ -119,7 +119,7 @@ class MissionPlanner:
                 return
 
     def _receive(self, deadline: float) -> bool:
-        """Take one datagram; False at the deadline."""
+        """Receive one datagram; False at the deadline."""
         now = time.monotonic()
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + 1.0
@@ -138,7 +138,7 @@ class MissionPlanner:
         return True
 
     def _note(self, message: Message) -> None:
-        """What every packet does on its way, whichever loop gets it."""
+        """Process a packet before any loop gets it."""
         self.heard.append(message)
         self._sees_mavlink_2 |= message.get_msgbuf()[0] == 0xFD
         match message.get_type():
@@ -168,28 +168,27 @@ class MissionPlanner:
         return self.vehicle
 
     def look_around(self, seconds: float) -> None:
-        """Do nothing but listen, for real seconds."""
+        """Only listen, for a time in real seconds."""
         for _ in self._packets(seconds / self._pace):
             pass
 
     def said(self) -> str:
-        """Return all texts of the vehicle in one; long ones come in pieces."""
+        """All texts of the vehicle joined, because long ones arrive in pieces."""
         return " ".join(self.texts)
 
     def wait_for_text(self, part: str) -> None:
-        """Wait until the vehicle has said `part`."""
+        """Wait until `part` occurs in the vehicle's texts."""
         self.wait_until(lambda: part in self.said(), f"the text {part!r}")
 
     def wait_for_ack(self, result: MissionResult) -> None:
-        """Wait until a MISSION_ACK with `result` has come."""
+        """Wait for a MISSION_ACK with `result`."""
         self.wait_until(lambda: result in self.acks(), result.name)
 
     def wait_for_armed(self, armed: bool) -> None:
-        """Wait for heartbeats that say so."""
+        """Wait for heartbeats with this armed state."""
         self.wait_until(lambda: self.armed is armed, f"armed {armed}")
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Listen until something is so."""
         deadline = time.monotonic() + PATIENCE
         while not condition():
             assert self._receive(deadline), f"{what} did not come, but {self.texts}, {self.acks()}"
@@ -197,7 +196,7 @@ class MissionPlanner:
     # -- connecting ------------------------------------------------------------------------------------------
 
     def meet(self) -> None:
-        """Wait for two heartbeats of an autopilot's component 1: nothing is addressed to anybody before."""
+        """Wait for two heartbeats of an autopilot's component 1; until then nothing is sent to a vehicle."""
         seen = 0
         for message in self._packets(PATIENCE / self._pace):
             if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1 and message.type != 6:
@@ -208,12 +207,12 @@ class MissionPlanner:
         raise TimedOut("No Heartbeat Packets Received")
 
     def be_connected(self) -> None:
-        """Go on as one that met the daemon's vehicle some time ago."""
+        """Continue as if it had met the daemon's vehicle some time ago."""
         self.vehicle = (1, 1)
         self._sees_mavlink_2 = True
 
     def connect(self) -> None:
-        """All that it asks of a vehicle in its first seconds."""
+        """All of its requests in the first seconds."""
         m = messages
         self.meet()
         system, component = self._target
@@ -236,7 +235,7 @@ class MissionPlanner:
         self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, 271)
 
     def command(self, command: int, param1: float = 0.0, tries: int = 1) -> int | None:
-        """COMMAND_LONG, 2 s a try; the MAV_RESULT, None if no ack came."""
+        """COMMAND_LONG, 2 s a try; return the MAV_RESULT, None without an ack."""
         for confirmation in range(tries):
             self.send(
                 messages.MAVLink_command_long_message(*self._target, command, confirmation, param1, 0, 0, 0, 0, 0, 0)
@@ -249,11 +248,11 @@ class MissionPlanner:
         return None
 
     def arm(self) -> int | None:
-        """The Arm button; its user sees the texts that come meanwhile."""
+        """The Arm button; texts received meanwhile are shown to the user."""
         return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def request_version(self) -> None:
-        """AUTOPILOT_VERSION_REQUEST, 500 ms x 3; without an answer it continues with no capabilities."""
+        """AUTOPILOT_VERSION_REQUEST, 500 ms x 3; without a reply it assumes no capabilities."""
         for _ in range(3):
             self.send(messages.MAVLink_autopilot_version_request_message(*self._target))
             for message in self._packets(0.5):
@@ -261,10 +260,10 @@ class MissionPlanner:
                     return
 
     def _request_parameters(self) -> None:
-        """The list every 4 s, forever if none comes; then the gaps, by index."""
+        """Request the list every 4 s until it arrives; then missing parameters by index."""
         deadline = time.monotonic() + PATIENCE
         while not self._parameter_count:
-            assert time.monotonic() < deadline, "it would ask for parameters for ever"
+            assert time.monotonic() < deadline, "it would request parameters forever"
             self.send(messages.MAVLink_param_request_list_message(*self._target))
             for _ in self._packets(4.0):
                 if len(self.parameters) == self._parameter_count:
@@ -278,7 +277,7 @@ class MissionPlanner:
                         break
 
     def _ask_for_files(self) -> None:
-        """FTP: open a file to read, and look at the vehicle's NAK (opcode 129)."""
+        """FTP: open a file to read, and expect the vehicle's NAK (opcode 129)."""
         payload = bytes([1, 0, 0, 4, 15, 0, 0, 0, 0, 0, 0, 0]) + b"@PARAM/param.pck"
         self.send(messages.MAVLink_file_transfer_protocol_message(0, *self._target, list(payload.ljust(251, b"\0"))))
         for message in self._packets(2.0):
@@ -289,7 +288,7 @@ class MissionPlanner:
     # -- writing ---------------------------------------------------------------------------------------------
 
     def write(self, rows: Sequence[PlanRow], *, use_int: bool = True) -> None:
-        """Its Write button: rows[0] is home. UploadFailed is the dialogue that its user would see."""
+        """Its Write button; rows[0] is home. UploadFailed is the dialogue its user would see."""
         self._start_upload(len(rows))
         self.go_on(rows, 0, use_int=use_int)
 
@@ -312,13 +311,13 @@ class MissionPlanner:
         self._send_ack()
 
     def after_write(self, radius_m: float | None = None) -> None:
-        """What follows a Write that went well: home, and the radius of its text box if the vehicle's differs."""
+        """Its requests after a successful Write: home, and the radius in its text box if the vehicle's differs."""
         self.get_home()
         if radius_m is not None:
             self.set_parameter("WPNAV_RADIUS", radius_m * 100)
 
     def get_home(self) -> None:
-        """Command 410, 700 ms a try; without an answer it reads item 0 instead."""
+        """Command 410, 700 ms a try; without a reply it reads item 0 instead."""
         for _ in range(4):
             self.send(
                 messages.MAVLink_command_long_message(
@@ -344,7 +343,7 @@ class MissionPlanner:
     def write_fast(self, rows: Sequence[PlanRow], *, cancel_at: int | None = None) -> None:
         """Its "Write Fast": bursts of ten. With `cancel_at` its user presses Cancel before that item is sent.
 
-        It does not wait after the last item, whatever becomes of it.
+        It does not wait for a result after the last item.
         """
         self._start_upload(len(rows))
         self._requested, self._answer = 0, MissionResult.ACCEPTED
@@ -366,11 +365,11 @@ class MissionPlanner:
         self._send_ack()
 
     def cancel(self) -> None:
-        """Its Cancel button: a count of nothing."""
+        """Its Cancel button: a count of 0."""
         self.send(messages.MAVLink_mission_count_message(*self._target, 0, 0))
 
     def write_begun(self, rows: Sequence[PlanRow], count: int) -> None:
-        """Write the first `count` items of a list and then nothing: its user has pulled the plug, say."""
+        """Write only the first `count` items of a list, as if unplugged then."""
         self._start_upload(len(rows))
         for at in range(count):
             self._write_item(rows, at, use_int=True)
@@ -388,10 +387,10 @@ class MissionPlanner:
         raise TimedOut("Timeout on read - setWPTotal")
 
     def _write_item(self, rows: Sequence[PlanRow], at: int, use_int: bool) -> MissionResult:
-        """One item, 450 ms x 11. A request for another seq than the next costs one of the tries, at once."""
+        """One item, 450 ms x 11. A request for a seq other than the next uses up a try at once."""
         row = rows[at]
         message_of = row.int_message if use_int else row.float_message
-        # While it sends MISSION_ITEM_INT it does not understand MISSION_REQUEST_INT.
+        # While sending MISSION_ITEM_INT it does not understand MISSION_REQUEST_INT.
         understood = ("MISSION_REQUEST",) if use_int else ("MISSION_REQUEST", "MISSION_REQUEST_INT")
         for _ in range(11):
             self.send(message_of(*self._target, at))
@@ -405,7 +404,7 @@ class MissionPlanner:
         raise TimedOut("Timeout on read - setWP")
 
     def _requested_seq(self, at: int) -> int:
-        """After INVALID_SEQUENCE: continue where the vehicle asks next; if it asks for nothing, skip silently."""
+        """After INVALID_SEQUENCE continue with the next requested item; without a request, skip silently."""
         for message in self._packets(1.5):
             if message.get_type() == "MISSION_REQUEST":
                 seq: int = message.seq
@@ -418,13 +417,13 @@ class MissionPlanner:
     # -- reading ---------------------------------------------------------------------------------------------
 
     def read(self) -> list[Message]:
-        """Its Read button: REQUEST_LIST 700 ms x 7, then item by item. A MISSION_ACK error is not looked at."""
+        """Its Read button: REQUEST_LIST 700 ms x 7, then item by item. It ignores MISSION_ACK errors."""
         items = [self.read_item(seq) for seq in range(self.read_count())]
         self._send_ack()
         return items
 
     def read_item(self, seq: int) -> Message:
-        """One item, 2.5 s x 6, in the form that the capabilities lead to. Another item is answered by asking again."""
+        """One item, 2.5 s x 6, in the form given by the capabilities. On another item it repeats the request."""
         as_int = bool(self.capabilities & _INT_CAPABILITY)
         m = messages
         request = (m.MAVLink_mission_request_int_message if as_int else m.MAVLink_mission_request_message)(
@@ -448,24 +447,24 @@ class MissionPlanner:
                     return count
         raise TimedOut("Timeout on read - getWPCount")
 
-    # -- what a test may look at -----------------------------------------------------------------------------
+    # -- inspection by tests -----------------------------------------------------------------------------
 
     def heard_of(self, kind: str) -> list[Any]:
-        """Return all messages of one type that came, eaten ones included."""
+        """All received messages of one type, whichever loop took them."""
         return [message for message in self.heard if message.get_type() == kind]
 
     def heard_in(self, version: int) -> list[Any]:
-        """Return all messages that came in one version of MAVLink."""
+        """All messages received in one version of MAVLink."""
         magic = 0xFD if version == 2 else 0xFE
         return [message for message in self.heard if message.get_msgbuf()[0] == magic]
 
     def acks(self) -> list[MissionResult]:
-        """Return the results of all MISSION_ACKs that came."""
+        """The results of all received MISSION_ACKs."""
         return [MissionResult(message.type) for message in self.heard_of("MISSION_ACK")]
 
 
 def _has_the_right_size(message: Message) -> bool:
-    """MAVLink 1 frames of another size than the table's are dropped; MAVLink 2 may be cut or extended."""
+    """MAVLink 1 frames must have the table's size; MAVLink 2 frames may be truncated or extended."""
     frame = message.get_msgbuf()
     known = mavlink_1.mavlink_map.get(message.get_msgId())
     return frame[0] == 0xFD or known is None or frame[1] == known.unpacker.size

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A test bench: a simulated board that is not a Naze, a client at its port, and a clock that only the test moves."""
+"""A test bench: a simulated board other than a Naze, a client on its port, and a clock moved only by the test."""
 
 from dataclasses import replace
 from functools import reduce
@@ -24,7 +24,7 @@ class Frame(NamedTuple):
 
 
 class MspBench:
-    """The board has just booted at time 0. `heard` keeps all bytes that came from it."""
+    """A board that has just booted at time 0. `heard` has all bytes received from it."""
 
     def __init__(
         self, kind: str, options: MspOptions | None = None, faults: Faults | None = None, eeprom: bytes | None = None
@@ -43,14 +43,14 @@ class MspBench:
         self.board.receive(data, self.now)
 
     def run(self, seconds: float) -> bytes:
-        """Let time pass as a link would; return the received bytes."""
+        """Let time pass; return the received bytes."""
         end, before = self.now + seconds, len(self.heard)
         while self.now < end:
             self._step(end)
         return bytes(self.heard[before:])
 
     def ask(self, command: int, payload: bytes = b"", timeout: float = 0.5) -> Frame | None:
-        """Send a request and return the next frame that comes; None after `timeout` seconds."""
+        """Send a request and return the next frame; None after `timeout` seconds."""
         before, end = len(self.heard), self.now + timeout
         self.send(request(command, payload))
         while self.now < end:
@@ -61,14 +61,14 @@ class MspBench:
         return None
 
     def payload(self, command: int, payload: bytes = b"") -> bytes:
-        """The payload of a reply that is no error."""
+        """The payload of a reply, which must not be an error."""
         frame = self.ask(command, payload)
         assert frame is not None
         assert (frame.direction, frame.command) == (">", command)
         return frame.payload
 
     def payload_v2(self, command: int, payload: bytes = b"") -> bytes:
-        """The payload of a reply in MSP v2."""
+        """The payload of an MSP v2 reply."""
         self.send(request(command, payload))
         (frame,) = MspParser().feed(self.run(0.2))
         assert (frame.direction, frame.command) == (Direction.REPLY, command)
@@ -83,12 +83,12 @@ class MspBench:
         return waypoint
 
     def info(self) -> tuple[int, bool, int]:
-        """Capacity, valid, count."""
+        """The mission's capacity, validity and count."""
         _, capacity, valid, count = self.payload(GETINFO)
         return capacity, bool(valid), count
 
     def upload(self, waypoints: list[NavWaypoint]) -> None:
-        """Write a list, stop and wait, the last with its flag."""
+        """Write a list one record at a time, the last with its flag."""
         for number, waypoint in enumerate(waypoints, 1):
             self.write(number, replace(waypoint, flag=FLAG_LAST if number == len(waypoints) else waypoint.flag))
 
@@ -103,7 +103,7 @@ class MspBench:
 
 
 def take_apart(data: bytes) -> list[Frame]:
-    """Return the whole frames, jumbo ones too; each must be sound."""
+    """The complete frames, jumbo frames included; all must be intact."""
     frames = []
     while len(data) >= 6:
         assert data[:2] == b"$M", data.hex()
@@ -119,6 +119,6 @@ def take_apart(data: bytes) -> list[Frame]:
 
 
 def waypoint(index: int = 0, action: int = Action.WAYPOINT, **fields: int) -> NavWaypoint:
-    """A waypoint near the field, another one for each index."""
+    """A waypoint near the field, different for each index."""
     usual = {"lat_e7": 453838000 + 900 * index, "lon_e7": 84733000 + 700 * (index % 7), "alt_cm": 2000, "flag": 0}
     return NavWaypoint(action, **usual | fields)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table of docs/inav.md: what becomes of each command on INAV and on MultiWii, and how the board then flies it.
+"""The table of docs/inav.md: the records of each command on INAV and MultiWii, and how the board flies them.
 
-`make inav-page` writes it into the page. Records and findings come from the rules; how a row is flown is written here,
-and test_nav_flights flies it on the simulated board.
+`make inav-page` writes it into the page. Records and findings come from the rules; the flights are written here, and
+test_nav_flights compares them with the simulated board.
 """
 
 import sys
@@ -19,18 +19,18 @@ from protocols.msp.nav import NavAction, NavRecord
 
 RULES = {"inav": NavRules(inav_profile()), "multiwii": NavRules(multiwii_profile())}
 LAT, LON = 453838000, 84733000
-#: Some 20 m to the north.
+#: About 20 m to the north.
 STEP = 1800
 
 
 def leg(place: int, command: int = Command.NAV_WAYPOINT, **fields: float) -> MissionItem:
-    """An item 20 m further north for each place, at 20 m."""
+    """An item at 20 m height, each index 20 m further north."""
     at = MissionItem(0, command, 3, 0, 0, 0, 0, LAT + place * STEP, LON, 20.0)
     return replace(at, **fields)  # type: ignore[arg-type]
 
 
 def act(command: int, p1: float = 0, p2: float = 0, p4: float = 0) -> MissionItem:
-    """An item without a place."""
+    """An item without a position."""
     return MissionItem(0, command, 3, float(p1), float(p2), 0, float(p4), 0, 0, 0.0)
 
 
@@ -40,9 +40,9 @@ ONE, TWO, THREE = leg(1), leg(2), leg(3)
 
 @dataclass(frozen=True)
 class Row:
-    """`name` as a pilot reads it. `items` without home. `inav`, `multiwii`: how it is flown, "" if it is rejected.
+    """`name` as a pilot reads it. `items` without home. `inav`, `multiwii`: the flight, "" if rejected.
 
-    A flight is told as the records that are flown to, with what happens there, and how it ends.
+    A flight is the records flown to, each with its effects, and how it ends.
     """
 
     name: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A test bench: a simulated Naze, a client at its UART, and a clock that only the test moves."""
+"""A test bench: a simulated Naze, a client on its UART, and a clock moved only by the test."""
 
 from collections.abc import Sequence
 
@@ -26,7 +26,7 @@ BOOT_SECONDS = SimOptions().boot_ms / 1000
 
 
 class WireBench:
-    """A client at the UART of a board that is supplied and booted. `heard` keeps all bytes that came from it."""
+    """A client on the UART of a given, booted board. `heard` has all bytes received from it."""
 
     def __init__(self, board: FarEnd, now: float = 0.0) -> None:
         self._board = board
@@ -39,7 +39,7 @@ class WireBench:
         self._board.receive(data, self.now)
 
     def run(self, seconds: float) -> bytes:
-        """Let time pass as a link would; return the received bytes."""
+        """Let time pass; return the received bytes."""
         end = self.now + seconds
         before = len(self.heard)
         while self.now < end:
@@ -48,7 +48,7 @@ class WireBench:
         return bytes(self.heard[before:])
 
     def ask(self, frame: bytes, timeout: float = 1.0) -> MspFrame | None:
-        """Send a request and return the first frame that comes; None after `timeout` seconds."""
+        """Send a request and return the first frame received; None after `timeout` seconds."""
         self._frames.clear()
         self.send(frame)
         return self.next_frame(timeout)
@@ -83,7 +83,7 @@ class WireBench:
             progress = self.progress(encode_chunk(records, progress.next, 15).frame)
 
     def push(self, records: Sequence[WpRecord]) -> Stored:
-        """A whole upload; returns the answer to COMMIT."""
+        """A complete upload; returns the reply to COMMIT."""
         self.stage(records)
         return self.stored(encode_commit(identify(records)))
 
@@ -115,7 +115,7 @@ class Bench(WireBench):
 
 
 def mission(count: int, seed: int = 0) -> list[WpRecord]:
-    """A list of plain waypoints that differ; another `seed` gives another list."""
+    """A list of distinct plain waypoints; each `seed` gives a different list."""
     return [
         WpRecord(473_977_000 + seed * 977 + 31 * i, 85_456_000 - 17 * i, 20 + i % 50, 0, i % 2, 2, 0, 0)
         for i in range(count)

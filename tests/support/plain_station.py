@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station that keeps to MAVLink's mission protocol, over any socket and with any of pymavlink's dialects."""
+"""A ground station that follows MAVLink's mission protocol, on any socket, with any pymavlink dialect."""
 
 import select
 import socket
@@ -18,9 +18,9 @@ _RETRY_S = 0.5
 
 
 class PlainStation:
-    """Speaks through a connected socket, which becomes its own. `dialect` None: MAVLink 2.
+    """A station on a connected socket, which it then owns. `dialect` None: MAVLink 2.
 
-    `heard` has what came but was not waited for, too.
+    `heard` has every received message, also those not waited for.
     """
 
     def __init__(
@@ -56,18 +56,18 @@ class PlainStation:
         self.send(self._dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
 
     def has_data(self) -> bool:
-        """True if anything came that was not read yet."""
+        """True if there is unread data."""
         return bool(select.select([self._socket], [], [], 0)[0])
 
     def wait_for(self, *kinds: str) -> Any:
-        """Return the next message of one of these types."""
+        """The next message of one of these types."""
         for message in self._messages(PATIENCE):
             if message.get_type() in kinds:
                 return message
         raise AssertionError(f"no {kinds} came")
 
     def upload(self, plan: Sequence[PlanRow]) -> MissionResult:
-        """Give a list, item by item as it is asked for; the final ack."""
+        """Upload a list, item by item as requested; return the final ack."""
         is_asked = False
         for _ in range(20 * len(plan)):
             if not is_asked:
@@ -93,7 +93,7 @@ class PlainStation:
         return MissionResult(self.wait_for("MISSION_ACK").type)
 
     def download(self) -> list[tuple[float, ...]]:
-        """Return seq, command, frame, param1..4, lat_e7, lon_e7 and height of each item."""
+        """Download seq, command, frame, param1..4, lat_e7, lon_e7 and height of each item."""
         self.send(self._dialect.MAVLink_mission_request_list_message(1, 1))
         count = self.wait_for("MISSION_COUNT").count
         items: list[tuple[float, ...]] = []
@@ -121,12 +121,12 @@ class PlainStation:
 def udp_station(
     address: tuple[str, int], dialect: ModuleType | None = None, sysid: int = SYSID, compid: int = COMPID
 ) -> PlainStation:
-    """A station that speaks to a daemon's udpin."""
+    """A station on a daemon's udpin."""
     connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     connection.connect(address)
     return PlainStation(connection, dialect, sysid, compid)
 
 
 def tcp_station(port: int) -> PlainStation:
-    """A station that is connected to a daemon's tcpin."""
+    """A station on a daemon's tcpin."""
     return PlainStation(socket.create_connection(("127.0.0.1", port), PATIENCE))

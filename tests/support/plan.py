@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission lists as a ground station's plan screen holds them, and what the rules say that becomes of them."""
+"""Mission lists as in a ground station's plan screen, and the lists that the rules make of them."""
 
 import struct
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ PROFILE = HarakiriRules(capacity=146, wp_radius_cm=200)
 
 @dataclass(frozen=True)
 class PlanRow:
-    """One row, degrees and metres; the first row of a plan is home."""
+    """One row, in degrees and metres; the first row of a plan is home."""
 
     command: int
     lat: float = 0.0
@@ -43,7 +43,7 @@ class PlanRow:
         return (sysid, compid, seq, self.frame, self.command, 0, 1, self.p1, self.p2, self.p3, self.p4)
 
     def as_sent(self, seq: int, *, use_int: bool) -> MissionItem:
-        """Return the item that leaves the ground station."""
+        """The item as the ground station sends it."""
         if use_int:
             lat_e7, lon_e7 = int(self.lat * 1e7), int(self.lng * 1e7)
         else:
@@ -53,18 +53,18 @@ class PlanRow:
 
 
 def single(value: float) -> float:
-    """Return a number rounded to a 32-bit float."""
+    """A number rounded to a 32-bit float."""
     number: float = struct.unpack("<f", struct.pack("<f", value))[0]
     return number
 
 
 def judge(rows: Sequence[PlanRow], *, use_int: bool = True, profile: HarakiriRules = PROFILE) -> Verdict[WpRecord]:
-    """What the rules make of a list; the board holds its records and a reader gets its items."""
+    """The rules' verdict on a list: the board's records and the items that read back."""
     return check_list([row.as_sent(seq, use_int=use_int) for seq, row in enumerate(rows)], profile)
 
 
 def stored_fields(item: MissionItem) -> tuple[float, ...]:
-    """What a reader must get of a stored item: seq, command, frame, param1..4, lat_e7, lon_e7, height."""
+    """A stored item as it must read back: seq, command, frame, param1..4, lat_e7, lon_e7, height."""
     assert item.lat_e7 is not None
     assert item.lon_e7 is not None
     return (
@@ -82,12 +82,12 @@ def stored_fields(item: MissionItem) -> tuple[float, ...]:
 
 
 def expected_fields(plan: Sequence[PlanRow], *, use_int: bool = True) -> list[tuple[float, ...]]:
-    """What a reader must get after `plan` was written."""
+    """The items that must read back after `plan` was written."""
     return [stored_fields(item) for item in judge(plan, use_int=use_int).items]
 
 
 def records_of(verdict: Verdict[WpRecord]) -> list[str]:
-    """Return a verdict's records in hex, as the simulated board tells its own."""
+    """A verdict's records in hex, like those of the simulated board."""
     return [pack_records([record]).hex() for record in verdict.records]
 
 
@@ -95,26 +95,26 @@ HOME = PlanRow(Command.NAV_WAYPOINT, 45.3838, 8.4733, 131.0, frame=Frame.GLOBAL)
 
 
 def waypoint(number: int, **fields: float) -> PlanRow:
-    """One waypoint of a grid; each number has another place and height."""
+    """One waypoint of a grid; position and height differ for each number."""
     lat, lng = 45.3840123 + number % 12 * 3.7e-4, 8.4735432 + number // 12 * 5.3e-4
     row = {"lat": lat, "lng": lng, "alt": 12.0 + number % 30, "p2": 3.0} | fields
     return PlanRow(Command.NAV_WAYPOINT, **row)  # type: ignore[arg-type]
 
 
 def plain_plan(count: int, start: int = 0) -> list[PlanRow]:
-    """Home and waypoints that are stored as they are; another `start` gives another list of the same length."""
+    """Home and waypoints that are stored unchanged; each `start` gives a different list of the same length."""
     return [HOME, *(waypoint(start + number) for number in range(1, count))]
 
 
 def mixed_plan(count: int) -> list[PlanRow]:
-    """A list with every command that is stored, a dropped one, and values that are changed (at least 12 items)."""
+    """A list with every command that is stored, a dropped one, and changed values (at least 12 items)."""
     head = [
         HOME,
         PlanRow(Command.NAV_TAKEOFF, alt=20.0),
         PlanRow(Command.DO_SET_ROI, 45.3843398, 8.4742597),
         waypoint(1, p1=1.0, p4=1.0),
         PlanRow(Command.NAV_LOITER_TURNS, 45.3845001, 8.4745002, 18.0, p1=-3.0, p2=4.0),
-        PlanRow(178, p2=5.0),  # DO_CHANGE_SPEED: not known to the flight controller
+        PlanRow(178, p2=5.0),  # DO_CHANGE_SPEED: unknown to the flight controller
         PlanRow(Command.NAV_LOITER_TIME, 45.3846003, 8.4746004, 19.5, p1=700.0, p2=1.0, p4=1.0),
         PlanRow(Command.DO_SET_ROI_NONE),
         waypoint(2, p4=1.0, alt=0.0),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon and the simulated Naze as programs of their own, as a user starts them."""
+"""The daemon and the simulated Naze as processes, as started by a user."""
 
 import asyncio
 import json
@@ -18,7 +18,7 @@ from service.control.client import ControlError, ask_daemon
 from tests.support.forked import Forked
 from tests.support.plan import PlanRow
 
-#: Seconds after which something that must come at all counts as not coming.
+#: The general timeout, s, for anything that a test waits for.
 PATIENCE = 50.0
 REPOSITORY = Path(__file__).resolve().parents[2]
 NAZE_BRIDGE = [sys.executable, "-c", "from service.cli.main import main; main(prog_name='naze-bridge')"]
@@ -26,14 +26,14 @@ T = TypeVar("T")
 
 
 def until(condition: Callable[[], T | None], what: str) -> T:
-    """Wait for something to be there (true), and return it."""
+    """Wait for a true value and return it."""
     found = comes(condition)
     assert found, f"{what} did not come"
     return found
 
 
 def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | None:
-    """Return the value as soon as it is true; its last value after a timeout."""
+    """Wait for a true value; return the last value after a timeout."""
     deadline = time.monotonic() + seconds
     while True:
         found = condition()
@@ -43,7 +43,7 @@ def comes(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T | N
 
 
 async def until_async(condition: Callable[[], T | None], what: str) -> T:
-    """The same in an event loop, which runs meanwhile."""
+    """`until` in a running event loop."""
     deadline = time.monotonic() + PATIENCE
     while not (found := condition()):
         assert time.monotonic() < deadline, f"{what} did not come"
@@ -52,7 +52,7 @@ async def until_async(condition: Callable[[], T | None], what: str) -> T:
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = "127.0.0.1") -> int:
-    """A port of `host` that is free at this moment."""
+    """A currently free port of `host`."""
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind) as probe:
         probe.bind((host, 0))
         port: int = probe.getsockname()[1]
@@ -60,7 +60,7 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = "127.0.0.
 
 
 def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run a subcommand to its end; with `options`, those of subprocess.run, in an interpreter of its own."""
+    """Run a subcommand to its end; with `options` (of subprocess.run), in a new interpreter."""
     words = list(map(str, arguments))
     ended: subprocess.CompletedProcess[str]
     if options:
@@ -78,7 +78,7 @@ def run_naze_bridge(*arguments: str | Path, **options: Any) -> subprocess.Comple
 
 
 class Program:
-    """One `naze-bridge` that continues until it is told to end; what it prints is kept in a file."""
+    """A `naze-bridge` that runs until it is ended; its output goes to a file."""
 
     def __init__(self, output: Path, *arguments: str) -> None:
         self._output = output
@@ -110,7 +110,7 @@ class Program:
 
 
 def control(address: Path, line: str) -> str:
-    """The reply of a simulated board's control socket to one line."""
+    """Send a line to a simulated board's control socket; return the reply."""
     with socket.socket(socket.AF_UNIX) as connection:
         connection.connect(str(address))
         connection.sendall(f"{line}\n".encode())
@@ -119,9 +119,9 @@ def control(address: Path, line: str) -> str:
 
 
 class Board(Program):
-    """`naze-bridge sim`. `line` obeys its control socket (simulator/control.py).
+    """`naze-bridge sim`. `line` sends commands to its control socket (simulator/control.py).
 
-    `fc` is what a daemon's --fc takes. With `tcp` that is a socket instead of a pseudo-terminal.
+    `fc` is the value for a daemon's --fc: a socket with `tcp`, else a pseudo-terminal.
     """
 
     def __init__(self, directory: Path, *options: str, tcp: bool = False) -> None:
@@ -130,7 +130,7 @@ class Board(Program):
         self.fc = f"tcp:{address}" if tcp else str(self.link)
         self._control = directory / "naze.sock"
         place = ("--tcp", address) if tcp else ("--link", str(self.link))
-        # A boot takes 7 s, for which no test here needs to wait.
+        # A boot takes 7 s, which no test here needs.
         super().__init__(
             directory / "board.log", "sim", *place, "--boot", "2000", "--control", str(self._control), *options
         )
@@ -151,12 +151,12 @@ class Board(Program):
         return found
 
     def records(self) -> list[str]:
-        """Return the stored list, each record in hex."""
+        """The stored list, each record in hex."""
         records: list[str] = self.stats()["records"]
         return records
 
     def assert_was_treated_well(self) -> None:
-        """Assert that nothing was ever sent to the board that a real one would have suffered from."""
+        """Assert that nothing was sent to the board that would have harmed a real one."""
         stats = self.stats()
         assert stats["hazard_runs"] == stats["rx_overflows"] == stats["tx_overflows"] == 0, stats
         assert stats["max_outstanding_reply_bytes"] <= 255, stats
@@ -188,7 +188,7 @@ class Daemon(Program):
         return ask_daemon(self.state_dir, request)
 
     def status(self) -> dict[str, Any] | None:
-        """Return the status; None if the daemon does not answer (yet)."""
+        """The status; None if the daemon does not answer (yet)."""
         try:
             return self.ask({"do": "status"})
         except (ControlError, OSError):
@@ -205,7 +205,7 @@ class Daemon(Program):
         until(arrived, f"a daemon in state {state}")
 
     def wait_up(self) -> None:
-        """Wait until the daemon runs, flight controller or not."""
+        """Wait until the daemon runs, with or without a flight controller."""
         until(lambda: self.status() or not self.is_alive, "the daemon")
         assert self.is_alive, self.printed
 
@@ -219,12 +219,12 @@ class Daemon(Program):
         return self.ask({"do": "pull"})
 
     def push(self, plan: Sequence[PlanRow]) -> None:
-        """Bring a list to the board, as `naze-bridge push` does."""
+        """Write a list to the board like `naze-bridge push`."""
         answer = self._pushes(plan)
         assert answer["ack"] == "MAV_MISSION_ACCEPTED", answer
 
     def clears(self) -> bool:
-        """Clear the board; tell whether the daemon did so, which it does not while a transfer is running."""
+        """Clear the board; False if the daemon refused because a transfer is running."""
         return bool(self._pushes([])["ack"] == "MAV_MISSION_ACCEPTED")
 
     def _pushes(self, plan: Sequence[PlanRow]) -> dict[str, Any]:
@@ -232,16 +232,15 @@ class Daemon(Program):
         return self.ask({"do": "push", "source": "test", "items": items})
 
     def kill_and_restart(self) -> None:
-        """Die as by a power cut, and start again as by systemd."""
+        """Kill the daemon, as in a power cut, and start it again."""
         self.process.kill()
         self.process.wait()
         self.process = self._start()
 
     def events(self) -> list[dict[str, Any]]:
-        """Return the log."""
         return [json.loads(line) for line in self.printed.splitlines() if line.startswith("{")]
 
     def has_logged(self, event: str) -> dict[str, Any] | None:
-        """Return the last event of that name."""
+        """The last event of that name, None without one."""
         found = [entry for entry in self.events() if entry["event"] == event]
         return found[-1] if found else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission items for the rule tests: a plain one of each kind, changed where a test says so."""
+"""Mission items for the rule tests: a plain one of each kind, with changes given by the test."""
 
 from typing import Any
 
@@ -10,11 +10,11 @@ HERE = {"lat_e7": LAT, "lon_e7": LON}
 
 WAYPOINT, UNLIM, TURNS, TIME, RTL, LAND, TAKEOFF = 16, 17, 18, 19, 20, 21, 22
 ROI, ROI_LOCATION, ROI_NONE, SET_ROI = 80, 195, 197, 201
-SPEED = 178  # DO_CHANGE_SPEED: nothing that Harakiri knows
+SPEED = 178  # DO_CHANGE_SPEED: unknown to Harakiri
 
 
 def item(command: int, **changed: Any) -> MissionItem:
-    """An item that the rules leave as it is (if it stands in the right place and a radius of 2 m is enough)."""
+    """An item that the rules do not change (in a valid position of the list, with a radius of 2 m)."""
     at_a_place = command in (WAYPOINT, UNLIM, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI)
     plain: dict[str, Any] = {
         "seq": 0,
@@ -35,5 +35,5 @@ HOME = item(WAYPOINT, frame=0)
 
 
 def mission(*items: MissionItem) -> list[MissionItem]:
-    """The items after a home point."""
+    """Home, then these items."""
     return [HOME, *items]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules once more, written from docs/mission-rules.md and as differently as possible: no table, no records type.
+"""A second implementation of docs/mission-rules.md, as different as possible: no table, no record type.
 
-What comes first of several faults is not the document's business, so a rejection is the set of codes that would do.
+The document does not say which of several faults is reported, so a rejection is the set of acceptable codes.
 """
 
 import math
@@ -16,7 +16,7 @@ INVALID_FRAME, NO_SPACE, INVALID, BAD_LAT, BAD_LON, BAD_HEIGHT = 2, 4, 5, 10, 11
 def expected(
     items: Sequence[MissionItem], capacity: int, radius_cm: int, takeoff_max: int, fallback: tuple[int, int] | None
 ) -> set[int] | list[bytes]:
-    """Codes of which one must be answered, or the records; no records: the list is cleared."""
+    """The acceptable codes, or the records; without records the list is cleared."""
     if len(items) == 0:
         return []
     if len(items) == 1:

@@ -8,7 +8,7 @@ from storage.mission_store import ReceivedMission
 
 
 def mission(tag: int, items: int = 3) -> ReceivedMission:
-    """A mission that differs from that of every other tag in every part."""
+    """A mission in which every part depends on `tag`."""
     records = random.Random(tag).randbytes(16 * items)
     return ReceivedMission(
         received_at=1_700_000_000.25 + tag,

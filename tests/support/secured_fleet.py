@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The examples for a fleet behind a router, copied to where a test can use them, and the router itself."""
+"""The examples for a fleet behind a router, copied for a test, and the router itself."""
 
 import shutil
 import socket
@@ -19,13 +19,13 @@ _ELSEWHERE = "/etc/naze-bridge"
 
 @dataclass(frozen=True)
 class Fleet:
-    """A router, and the folder with everyone's files. `endpoint` is what the examples call router.local."""
+    """A router and the folder with all files. `endpoint` replaces router.local in the examples."""
 
     folder: Path
     endpoint: str
 
     def config(self, of: str, name: str) -> Path:
-        """The example `of` (vehicle or pilot) as `name` would have it."""
+        """The example `of` (vehicle or pilot) with the files of `name`."""
         path = self.folder / f"{name}-{of}.json5"
         text = (self.folder / f"{of}.json5").read_text()
         path.write_text(text.replace({"vehicle": "naze-1", "pilot": "pilot"}[of], name) if of != name else text)
@@ -39,7 +39,7 @@ class Fleet:
 
 
 def example(folder: Path, of: str, endpoint: str) -> None:
-    """Copy an example to where it will be used; only places are changed."""
+    """Copy an example; only paths and addresses are changed."""
     shutil.copytree(EXAMPLES / of, folder, dirs_exist_ok=True)
     scheme, _, port = endpoint.partition("/")[0], None, endpoint.rpartition(":")[2]
     for path in folder.glob("*.json5"):
@@ -49,7 +49,7 @@ def example(folder: Path, of: str, endpoint: str) -> None:
 
 
 def tls_fleet(folder: Path, stack: ExitStack) -> Fleet:
-    """Everybody shows a certificate."""
+    """A fleet whose members have certificates."""
     endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
     example(folder, "zenoh-tls", endpoint)
     script = [sys.executable, str(folder / "make_certificates.py"), str(folder), "localhost,127.0.0.1"]
@@ -62,7 +62,7 @@ def tls_fleet(folder: Path, stack: ExitStack) -> Fleet:
 
 
 def password_fleet(folder: Path, stack: ExitStack) -> Fleet:
-    """Everybody has a name and a password."""
+    """A fleet whose members have user names and passwords."""
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     example(folder, "zenoh-password", endpoint)
     stack.enter_context(running_router(folder, endpoint, folder / "router.json5"))

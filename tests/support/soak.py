@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The events of a soak and its monitors. All random choices come from a seed."""
+"""The events of a soak test and its monitors. All random choices come from a seed."""
 
 import os
 import random
@@ -28,12 +28,12 @@ VEHICLE = 1
 #: Linux; Python has no name for it.
 _SO_TIMESTAMPNS = 35
 _MAX_STALLED = 5
-#: Half a step of a MAVLink float at 45 degrees is 19e-7.
+#: Half a step of a single-precision float at 45 degrees is 19e-7.
 _ROUNDING_E7 = 40
 
 
 class Stalls(threading.Thread):
-    """Watches how long the machine lets no one run: what happens then is no fault of the daemon's."""
+    """Measures how long the machine ran no process at all; gaps then are not the daemon's fault."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
@@ -49,7 +49,7 @@ class Stalls(threading.Thread):
                 self._stalls.append((before, after))
 
     def seconds(self, since: float, until: float) -> float:
-        """Return the stalled share of that time."""
+        """The stalled time in that interval."""
         return sum(max(0.0, min(after, until) - max(before, since)) for before, after in self._stalls if after > since)
 
     def end(self) -> None:
@@ -66,7 +66,7 @@ class Witness(threading.Thread):
         self._queued_s = 0.0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
-        # When it came, and not when this thread was woken for it.
+        # The time of arrival, not of this thread's wake-up.
         self._socket.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         self._socket.connect(address)
         self._stalls = stalls
@@ -75,8 +75,8 @@ class Witness(threading.Thread):
         self._beat_at: float | None = None
         self.damaged: list[bytes] = []
         self.frames: Counter[int] = Counter()
-        #: Gaps between two heartbeats of the vehicle, without the time that the machine stalled or that the daemon
-        #: could have run in, but had to leave to other programs.
+        #: Gaps between two heartbeats of the vehicle, less the time in which the machine stalled or the daemon waited
+        #: for a processor.
         self.gaps_s: list[float] = []
 
     def run(self) -> None:
@@ -85,7 +85,7 @@ class Witness(threading.Thread):
             if time.monotonic() >= beat_due:
                 beat_due += 1.0
                 self._send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-                # Each time: requests are forgotten with a peer that others have displaced.
+                # Repeated because the daemon forgets the requests of a displaced peer.
                 self._send(m.MAVLink_command_long_message(VEHICLE, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             if select.select([self._socket], [], [], 0.1)[0]:
                 data, extra, _, _ = self._socket.recvmsg(2048, 64)
@@ -114,19 +114,19 @@ class Witness(threading.Thread):
                 self._beat_at, self._queued_s = at, queued_s
 
     def _queued(self) -> float:
-        """How long the daemon's threads have waited for a processor, in seconds (proc_pid_schedstat).
+        """The time that the daemon's threads have waited for a processor, s (/proc/PID/schedstat).
 
-        Of all threads: one that waits may hold the interpreter's lock.
+        Summed over all threads, because a waiting one may hold the interpreter's lock.
         """
         waited_s = 0.0
         for thread in self._threads.glob("*/schedstat"):
-            with suppress(OSError, IndexError):  # it has ended
+            with suppress(OSError, IndexError):  # the thread has ended
                 waited_s += int(thread.read_text().split()[1]) / 1e9
         return waited_s or self._queued_s
 
 
 class Weather(threading.Thread):
-    """What happens to the flight controller: of all kinds, drawn like cards, and each has ended after a while."""
+    """Events at the flight controller, drawn like cards from all kinds; each ends after a while."""
 
     def __init__(self, board: Board, chance: random.Random) -> None:
         super().__init__(daemon=True)
@@ -159,7 +159,7 @@ class Weather(threading.Thread):
         self._board.set("plug")
 
     def _move(self) -> None:
-        """Plugged in again, it has another name behind the same link, because another program has its own."""
+        """Unplug it; plugged in again, the port behind the same link has another name because the old one is in use."""
         self._board.set("unplug")
         taken = os.openpty()
         self._board.set("plug")
@@ -192,7 +192,7 @@ class Weather(threading.Thread):
 
 
 class Crowd:
-    """Ground stations that come, go, stall, move, send garbage and write missions; and attackers."""
+    """Ground stations that come and go, stall, move, send garbage and write missions; and attackers."""
 
     def __init__(self, daemon: Daemon, udp_port: int, tcp_port: int, chance: random.Random) -> None:
         self._daemon = daemon
@@ -214,14 +214,14 @@ class Crowd:
         self.happened[kind.__name__.strip("_")] += 1
 
     def leave(self) -> None:
-        """All who hold a connection hang up."""
+        """Close all connections."""
         for client in (*self._stalled, *self._dawdlers):
             client.close()
         self._stalled.clear()
         self._dawdlers.clear()
 
     def writes(self, board: Board) -> bool:
-        """Write a mission; if it is accepted (true), it is what the board holds."""
+        """Write a mission; True if accepted, after checking that the board holds it."""
         plan = plain_plan(self._chance.randrange(2, 80), start=self._chance.randrange(100))
         by_tcp = self._chance.random() < 0.5
         with tcp_station(self._tcp_port) if by_tcp else udp_station(self._address) as station:
@@ -230,7 +230,7 @@ class Crowd:
         if result is MissionResult.ACCEPTED:
             assert _near(board.records(), records_of(judge(plan))), f"{len(plan)} accepted items are not there"
         else:
-            # Refused at once while there is no flight controller: not ten times a second.
+            # Refused at once without a flight controller; not ten times a second.
             self._rest()
         self.uploads[result.name] += 1
         return result is MissionResult.ACCEPTED
@@ -239,7 +239,7 @@ class Crowd:
         self.writes(board)
 
     def _download(self, board: Board) -> None:
-        """Ask for the list and some of its items, and never thank."""
+        """Request the list and some of its items, without a final ack."""
         with self._udp() as client:
             self._say(client, m.MAVLink_mission_request_list_message(1, 1))
             for seq in range(5):
@@ -252,7 +252,7 @@ class Crowd:
             self._rest()
 
     def _move(self, board: Board) -> None:
-        """One ground station at one address after the other; sometimes it leaves an upload behind."""
+        """One ground station moving between addresses; sometimes it abandons an upload."""
         for _ in range(5):
             with self._udp() as client:
                 self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=77)
@@ -270,7 +270,7 @@ class Crowd:
                 )
 
     def _look_in(self, board: Board) -> None:
-        """Come by TCP, read whole frames for a while, and leave in one of several ways."""
+        """Connect by TCP, read whole frames for a while, and disconnect in one of several ways."""
         with self._tcp() as client:
             self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
             self._rest()
@@ -280,7 +280,7 @@ class Crowd:
                 client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
 
     def _stall(self, board: Board) -> None:
-        """Come by TCP, and read nothing; who did so earlier reads again, or leaves."""
+        """Connect by TCP without reading; earlier such clients resume reading or disconnect."""
         client = self._tcp()
         self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
         self._stalled.append(client)
@@ -291,14 +291,14 @@ class Crowd:
             earlier.close()
 
     def _hammer(self, board: Board) -> None:
-        """Ask for everything over TCP, and never read an answer."""
+        """Request everything over TCP without reading a reply."""
         with self._tcp() as client:
             client.settimeout(0.2)
             for _ in range(300):
                 try:
                     self._say(client, m.MAVLink_param_request_list_message(1, 1))
                 except OSError:
-                    # The daemon does not read on, or has disconnected.
+                    # The daemon has stopped reading or disconnected.
                     return
 
     def _flood(self, board: Board) -> None:
@@ -316,13 +316,13 @@ class Crowd:
                 client.send(frames[number % len(frames)])
 
     def _change_addresses(self, board: Board) -> None:
-        """Speak from hundreds of addresses, once from each."""
+        """Send once from each of hundreds of addresses."""
         for _ in range(300):
             with self._udp() as client:
                 self._say(client, m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), sysid=65)
 
     def _dawdle(self, board: Board) -> None:
-        """Announce a list and give only its first item."""
+        """Announce a list and send only its first item."""
         client = self._udp()
         self._say(client, m.MAVLink_mission_count_message(1, 1, 100), sysid=64)
         self._rest()
@@ -365,7 +365,7 @@ class Crowd:
 
 
 def _near(found: list[str], sent: list[str]) -> bool:
-    """True if the records are the same; those written in MAVLink's floats are up to 0.4 m away."""
+    """True if the records are equal; positions written as single-precision floats may differ by 0.4 m."""
     pairs = list(zip(*(unpack_records(bytes.fromhex("".join(records))) for records in (found, sent)), strict=False))
     return len(found) == len(sent) and all(
         replace(there, lat_e7=wanted.lat_e7, lon_e7=wanted.lon_e7) == wanted

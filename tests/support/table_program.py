@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small ARM program of our own for the emulated board: it carries out a table of loads and stores, and one of
-those in every interrupt."""
+"""A small ARM program for the emulated board: it executes a table of loads and stores, and a second table in every
+interrupt."""
 
 import struct
 from dataclasses import dataclass, field
@@ -35,7 +35,7 @@ _ENTRY, _HANDLER = FLASH + _CODE + 1, FLASH + _CODE + 0x0D
 
 @dataclass(slots=True)
 class Steps:
-    """A table. Every load is logged."""
+    """A table of loads and stores. Every load is logged."""
 
     rows: list[tuple[int, int, int]] = field(default_factory=list)
 
@@ -61,10 +61,10 @@ class Steps:
 
 
 class Rig:
-    """An emulated board that carries out `steps`, and `handler` in every interrupt. Power is on from time 0."""
+    """An emulated board that executes `steps`, and `handler` in every interrupt. Power is on from time 0."""
 
     def __init__(self, steps: Steps, handler: Steps | None = None, flash: memoryview | None = None) -> None:
-        # RAM holds anything at first: before all else, the handler's log begins.
+        # RAM is random at first, so the handler's log is initialised before anything else.
         begun = Steps().store(RAM + _HANDLER_LOG_END, RAM + _HANDLER_LOG)
         begun.rows += steps.rows
         program = bytearray(_END)
@@ -90,11 +90,11 @@ class Rig:
         return self
 
     def log(self, count: int) -> list[int]:
-        """The first values that the table has loaded."""
+        """The first values loaded by the table."""
         return self._words(RAM + _LOG, count)
 
     def handler_log(self) -> list[int]:
-        """All values that the handler has loaded."""
+        """All values loaded by the handler."""
         (end,) = self._words(RAM + _HANDLER_LOG_END, 1)
         return self._words(RAM + _HANDLER_LOG, (end - RAM - _HANDLER_LOG) // 4)
 

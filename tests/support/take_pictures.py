@@ -15,7 +15,7 @@ PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
 
 
 def take_pictures(folder: Path) -> None:
-    """Save the page as a laptop and as a phone shows it, light and dark."""
+    """Save pictures of the page on a laptop and a phone, light and dark."""
     with tempfile.TemporaryDirectory() as name, web_bench(Path(name)) as bench:
         bench.daemon.push(plain_plan(9))
         bench.push_example()

@@ -19,7 +19,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "naze-field.waypoints"
 
 @dataclass(frozen=True)
 class Answer:
-    """What the page's server has answered."""
+    """A response of the page's server."""
 
     status: int
     headers: Message
@@ -31,7 +31,7 @@ class Answer:
 
 
 class WebBench:
-    """The daemon, its board (None: the one within it), and what a browser does by hand."""
+    """The daemon, its board (None: the built-in one), and a browser's requests."""
 
     def __init__(self, daemon: Daemon, board: Board | None, port: int) -> None:
         self.daemon = daemon
@@ -43,11 +43,11 @@ class WebBench:
         return (self.daemon.state_dir / "web-token").read_text().strip()
 
     def ask(self, path: str, method: str = "GET", **headers: str) -> Answer:
-        """Ask until there is room at the door: tests ask more often than a page."""
+        """Send a request until the server accepts it; tests send more than a page does."""
         return until(lambda: self.ask_once(path, method, **headers), "an answer")
 
     def ask_once(self, path: str, method: str = "GET", **headers: str) -> Answer | None:
-        """Ask; None if the door has no room."""
+        """Send a request; None if the server is at its connection limit."""
         connection = HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
         try:
             connection.request(method, path, None, headers)
@@ -63,7 +63,7 @@ class WebBench:
         return state
 
     def restore(self, number: int) -> dict[str, Any]:
-        """Restore a mission as the page does; return how it ended."""
+        """Restore a mission like the page; return the result."""
         answer = self.ask(f"/api/missions/{number}/restore", "POST", Authorization=f"Bearer {self.token}")
         assert answer.status == 202, answer
         ended: dict[str, Any]
@@ -74,13 +74,13 @@ class WebBench:
         return socket.create_connection(("127.0.0.1", self.port), PATIENCE)
 
     def push_example(self) -> None:
-        """Write a list of which much is changed."""
+        """Write a list with many changed items."""
         ended = run_naze_bridge("push", "--state-dir", self.daemon.state_dir, EXAMPLE)
         assert ended.returncode == 0, ended.stderr
 
 
 def web_daemon(start: Starter, fc: str = "sim:", web: str = "") -> WebBench:
-    """Start a daemon with a page; `web`: more lines of its table."""
+    """Start a daemon with a page; `web`: further lines of its table."""
     port = free_port(socket.SOCK_STREAM)
     config = start.directory / "naze-bridge.toml"
     config.write_text(f'[web]\nlisten = "127.0.0.1:{port}"\n{web}')

@@ -19,14 +19,14 @@ def start(tmp_path: Path) -> Iterator[Starter]:
 
 @pytest.fixture
 def web(tmp_path: Path) -> Iterator[WebBench]:
-    """A daemon with its page and a board, of one test's own."""
+    """A daemon with its page and a board for one test."""
     with web_bench(tmp_path) as bench:
         yield bench
 
 
 @pytest.fixture(scope="module")
 def lasting_web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WebBench]:
-    """The same for all tests of a module that break nothing; one mission is in its store."""
+    """The same, shared by all tests of a module that leave it usable; its store has one mission."""
     with web_bench(tmp_path_factory.mktemp("web")) as bench:
         bench.push_example()
         yield bench

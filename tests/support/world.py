@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole world in simulated time: the bridge, a simulated Naze on a wire, a store, and ground stations over the air.
+"""A world in simulated time: the bridge, a simulated Naze on a wire, a store, and ground stations on a radio link.
 
-Nothing here sleeps, opens a socket or reads a clock. Invariants are asserted at every step: whole frames without
-hazard bytes to the flight controller, deadlines that lie ahead, a bounded queue of conversations.
+Nothing here sleeps, opens a socket or reads a clock. Every step asserts invariants: complete frames without hazard
+bytes to the flight controller, deadlines in the future, a bounded queue of conversations.
 """
 
 import heapq
@@ -45,14 +45,14 @@ from simulator.mission_slots import MissionSlots, flash_size, slot_pages
 from simulator.naze import SimulatedNaze
 from simulator.options import Faults, SimOptions
 
-#: More conversations than this never wait: a ground station that hammers the bridge must not fill its memory.
+#: Limit on waiting conversations: a flood of requests must not fill the bridge's memory.
 MAX_QUEUED = 12
 _MAX_TICKS_AT_ONCE = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What the bridge logged, and when."""
+    """A logged event and its time."""
 
     at: float
     level: Level
@@ -61,7 +61,7 @@ class Event:
 
 
 class MemoryStore:
-    """Answers store effects after `delay_s`; `failing`: as a full disk does."""
+    """Answers store effects after `delay_s`; `failing`: like a full disk."""
 
     def __init__(self) -> None:
         self.missions: list[tuple[ArrivedMission, Conclude | None]] = []
@@ -99,7 +99,7 @@ class MemoryStore:
 
 @dataclass(slots=True)
 class Air:
-    """What UDP does to datagrams, each way: chances of a loss and of a repeat, seconds of delay and its spread."""
+    """Properties of the link, each way: probability of loss and of duplication, delay and its spread in seconds."""
 
     loss: float = 0.0
     repeat: float = 0.0
@@ -108,10 +108,10 @@ class Air:
 
 
 class World:
-    """The board has power and has booted at time 0, and the port opens then, unless told otherwise.
+    """By default the board is powered and booted at time 0, when the port opens.
 
-    `flash`: what its flash holds. `peer`: what is on the line instead of a simulated Naze (fake_controllers).
-    `late_s`: how much later than it asked for a busy machine may wake the bridge. `links`: who may write over which.
+    `flash`: initial contents of its flash. `peer`: a device in place of the simulated Naze (fake_controllers).
+    `late_s`: maximum delay of the bridge's wake-ups, as on a busy machine. `links`: write access per link.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class World:
         if plugged:
             self.plug()
 
-    # What tests do.
+    # Actions for tests.
 
     def plug(self) -> None:
         """Open the port."""
@@ -163,7 +163,7 @@ class World:
         self._flush()
 
     def unplug(self) -> None:
-        """The port is gone; the board keeps its power."""
+        """Remove the port; the board keeps its power."""
         self._plugged = False
         self.bridge.session.closed(self.now, "unplugged")
         self._flush()
@@ -175,7 +175,7 @@ class World:
         self.naze.power_on(self.now)
 
     def at(self, when: float, what: Callable[[], None]) -> None:
-        """Do something at a time to come."""
+        """Schedule a call at a future time."""
         heapq.heappush(self._events, (when, next(self._numbers), what))
 
     def after(self, seconds: float, what: Callable[[], None]) -> None:
@@ -188,7 +188,7 @@ class World:
             self._step(end)
 
     def run_until(self, done: "Callable[[World], bool]", seconds: float) -> bool:
-        """Let time pass until `done`; False if that takes longer than `seconds`."""
+        """Let time pass until `done`; False if that takes more than `seconds`."""
         end = self.now + seconds
         while not done(self):
             if self.now >= end:
@@ -197,7 +197,7 @@ class World:
         return True
 
     def wait_until(self, done: "Callable[[World], bool]", seconds: float) -> float:
-        """The same, but fails on timeout; return the time it took."""
+        """Like `run_until`, but fail on timeout; return the elapsed time."""
         began = self.now
         assert self.run_until(done, seconds), f"not within {seconds} s, state {self.bridge.session.state}"
         return self.now - began
@@ -207,23 +207,23 @@ class World:
         return self.wait_until(lambda world: world.is_found and not world.bridge.runner.is_busy, seconds)
 
     def hear(self, data: bytes) -> None:
-        """Let the bridge read bytes that did not come from the simulated board."""
+        """Let the bridge read bytes that are not from the simulated board."""
         self.bridge.fc_received(data, self.now)
         self._flush()
 
     def spoken_by(self, station: "GroundStation", data: bytes, *, datagram: bool = True) -> None:
-        """Let bytes from a ground station arrive now."""
+        """Let bytes from a ground station arrive at the bridge now."""
         self.bridge.gcs_received(station.peer, data, self.now, datagram=datagram)
         self._flush()
 
     def push(self, items: Sequence[Any]) -> list[Any]:
-        """Push as the command line does; the list gets the outcome."""
+        """Push like the command line; the returned list receives the outcome."""
         outcome: list[Any] = []
         self.bridge.local.push(items, "test", lambda _: None, lambda *args: outcome.append(args), self.now)
         self._flush()
         return outcome
 
-    # What tests look at.
+    # State for tests.
 
     @property
     def kind(self) -> Profile | None:
@@ -236,14 +236,14 @@ class World:
 
     @property
     def stored(self) -> tuple[WpRecord, ...]:
-        """The list in the board's flash, as the next boot would find it."""
+        """The list in the board's flash that the next boot would load."""
         return tuple(unpack_records(self.naze.stored))
 
     def events(self, name: str) -> list[Event]:
         return [event for event in self.log_event if event.name == name]
 
     def assert_line_was_clean(self) -> None:
-        """No trap, no ring lapped. Holds wherever the line itself is sound."""
+        """Assert that no hazard run and no ring overflow occurred. True on any line without damage."""
         counters = self.naze.counters
         assert counters.hazard_runs == 0
         assert counters.tx_overflows == 0
@@ -251,10 +251,10 @@ class World:
         assert not counters.cli_entered
         assert counters.max_outstanding_reply_bytes <= 255
 
-    # How time passes.
+    # Passing time.
 
     def _step(self, end: float) -> None:
-        """Go to the next moment at which anything happens, and let it happen."""
+        """Advance to the next event and execute it."""
         wakeup = max(self.naze.next_wakeup(self.now), self.now + 1e-6)
         wanted = min(self.bridge.next_deadline() + self._lateness_s, wakeup, end)
         if self._events:
@@ -293,11 +293,11 @@ class World:
     def _write(self, data: bytes) -> None:
         assert self._plugged
         if self.kind is other.OTHER_MAVLINK:
-            # What ground stations send to an autopilot that speaks for itself.
+            # Frames from ground stations to an autopilot that speaks MAVLink itself.
             (passed,) = MavlinkSplitter().feed(data)
             assert passed.raw == data
         elif self.kind is harakiri.MAVLINK and data[0] == MAGIC_V1:
-            # Whether it sets off a trap is counted by the board.
+            # The board counts hazard runs.
             (sent,) = MavlinkSplitter().feed(data)
             assert sent.raw == data
         else:
@@ -323,7 +323,7 @@ class World:
 
 
 def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None) -> bytes:
-    """Flash of a board in use: a list is stored, and the other slot holds the remains of an earlier one."""
+    """Flash of a board in use: one slot has a list, the other the remains of an earlier one."""
     options = options or SimOptions()
     memory = bytearray((ERASED,)) * flash_size(options)
     slots = MissionSlots(NorFlash(memoryview(memory), Faults()), options)
@@ -331,13 +331,13 @@ def flash_holding(records: Sequence[WpRecord], options: SimOptions | None = None
         slots.stage(index, record.pack())
     slots.commit(identify(records))
     pages = slot_pages(options.capacity)
-    for page in range(pages, 2 * pages):  # of the second slot: a new flash's first list goes into the first
+    for page in range(pages, 2 * pages):  # of the second slot: the first list on new flash goes into the first slot
         memory[page * PAGE_SIZE + PAGE_SIZE // 2] = 0
     return bytes(memory)
 
 
 class GroundStation:
-    """Speaks MAVLink over the air. `heard` keeps what reaches it; `on_message` reacts to it."""
+    """A MAVLink ground station on a radio link. `heard` has all received messages; `on_message` reacts to them."""
 
     def __init__(
         self,
@@ -357,18 +357,18 @@ class GroundStation:
         self.frames_heard: list[bytes] = []
         self.on_message: list[Callable[[Message], None]] = []
         self._mavlink = messages.MAVLink(None, srcSystem=sysid, srcComponent=compid)
-        #: Of the dialect `all`, which has more messages than the bridge's own.
+        #: Dialect `all`, which has more messages than the bridge's own dialect.
         self._decoder = every_message.MAVLink(None)
         self.sysid, self.compid = sysid, compid
         world.stations[self.peer] = self
 
     def send(self, message: Message) -> None:
-        """Send a message on its way to the bridge."""
+        """Send a message to the bridge."""
         data = self.pack(message)
         self._through_the_air(lambda: self.world.spoken_by(self, data))
 
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
-        """Sign all messages sent from now on."""
+        """Sign all further messages."""
         signing = self._mavlink.signing
         signing.secret_key, signing.timestamp, signing.link_id, signing.sign_outgoing = key, timestamp, link_id, True
 
@@ -378,26 +378,26 @@ class GroundStation:
         return data
 
     def carry(self, frame: bytes) -> None:
-        """Carry a frame from the bridge to here."""
+        """Deliver a frame from the bridge over the link."""
         self._through_the_air(lambda: self._arrived(frame))
 
     def take(self, *types: str) -> list[Message]:
-        """Return the received messages of these types, and clear all received ones."""
+        """Return the received messages of these types and clear all received ones."""
         found = self.said(*types)
         self.heard.clear()
         return found
 
     def said(self, *types: str) -> list[Message]:
-        """Return the received messages of these types."""
+        """The received messages of these types."""
         return [message for _, message in self.heard if not types or message.get_type() in types]
 
     def is_meant(self, message: Message) -> bool:
-        """True if a message is addressed to exactly this one, as Mission Planner wants it."""
+        """True if a message is addressed to exactly this station, as Mission Planner requires."""
         address = (getattr(message, "target_system", None), getattr(message, "target_component", None))
         return address == (self.sysid, self.compid)
 
     def texts(self) -> list[str]:
-        """The pieces of long texts each for itself, without their padding."""
+        """All texts; the pieces of long ones separately, without their padding."""
         return [message.text.rstrip() for message in self.said("STATUSTEXT")]
 
     def _arrived(self, frame: bytes) -> None:
@@ -420,5 +420,5 @@ class GroundStation:
             if delay:
                 self.world.after(delay, arrive)
             else:
-                # At once, but after what is in progress now: a ground station never answers inside of the bridge.
+                # At once, but after the current event: a ground station never replies from within the bridge.
                 self.world.at(self.world.now, arrive)

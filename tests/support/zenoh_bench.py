@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon in zenoh, and the test's own session."""
+"""A daemon on zenoh, and the test's own session."""
 
 import json
 import socket
@@ -67,7 +67,7 @@ class Reader:
         return [body(sample) for sample in self.samples[:] if str(sample.key_expr) == key(suffix, vehicle)]
 
     def wait(self, suffix: str, condition: Callable[[Any], object] = lambda _: True) -> Any:
-        """Return the first sample of a key that fulfils a condition."""
+        """Return the first sample of a key that meets a condition."""
         return until(lambda: next(filter(condition, self.of(suffix)), None), f"{suffix} as it should be")
 
     def events(self, name: str) -> list[Any]:
@@ -77,11 +77,11 @@ class Reader:
 def ask(
     opened: zenoh.Session, suffix: str, payload: bytes | None = None, *, vehicle: str = VEHICLE, **options: Any
 ) -> list[Any]:
-    """Return all that is replied, errors as they come."""
+    """Return all replies, errors included."""
     replies = opened.get(key(suffix, vehicle), payload=payload, timeout=PATIENCE, **options)
     return [body(reply.ok or reply.err) for reply in replies]
 
 
 def ask_surely(opened: zenoh.Session, suffix: str, payload: bytes | None = None, **options: Any) -> Any:
-    """Return the last reply; asked again until the vehicle is there."""
+    """Return the last reply; ask again until the vehicle is present."""
     return until(lambda: ask(opened, suffix, payload, **options), f"an answer to {suffix}")[-1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The router of a fleet as a process of its own: zenohd if ZENOHD names one, else examples/zenoh_router.py."""
+"""The router of a fleet as a separate process: zenohd if ZENOHD names one, else examples/zenoh_router.py."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 class Router(Program):
-    """A router that listens on `endpoint`; `config`: with a zenoh configuration, which must say the same endpoint."""
+    """A router on `endpoint`. `config`: a zenoh configuration with the same endpoint."""
 
     def __init__(self, directory: Path, endpoint: str = "", config: Path | None = None) -> None:
         self.endpoint = endpoint or f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
@@ -38,7 +38,7 @@ class Router(Program):
         assert self.is_alive, self.printed
 
     def stop(self) -> None:
-        """Go away; what is stopped (SIGSTOP) continues first."""
+        """End the router, after SIGCONT in case it is stopped."""
         if self.is_alive:
             self.process.send_signal(signal.SIGCONT)
             self.process.terminate()

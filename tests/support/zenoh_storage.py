@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A zenoh storage on `fleet/**`: a real one if ZENOHD has the storage manager beside it, else one that acts alike."""
+"""A zenoh storage on `fleet/**`: a real one if ZENOHD has the storage manager in its folder, else a model of one."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ from tests.support.programs import until
 from tests.support.zenoh_router import ZENOHD
 
 _PLUGIN = "libzenoh_plugin_storage_manager.so"
-#: In the admin space of the storage's process.
+#: The storage's key in the admin space of its process.
 _STATUS = "@/*/router/status/plugins/storage_manager/storages/fleet"
 
 
@@ -27,7 +27,7 @@ def client(endpoint: str) -> zenoh.Session:
 
 @contextmanager
 def storage(folder: Path, endpoint: str) -> Iterator[zenoh.Session]:
-    """Run a storage behind a router; yields a session that can look into it."""
+    """Run a storage behind a router; yields a session that can query it."""
     with client(endpoint) as looking:
         if ZENOHD is not None and Path(ZENOHD).with_name(_PLUGIN).exists():
             with _zenohd(folder, endpoint, looking):
