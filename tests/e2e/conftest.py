@@ -21,7 +21,7 @@ def start(tmp_path: Path) -> Iterator[Starter]:
 
 @pytest.fixture
 def bench(start: Starter) -> Iterator[Bench]:
-    """A bench for one test, for tests that break things."""
+    """A bench for a single test, which may break it."""
     bench = start.bench()
     yield bench
     bench.board.assert_was_treated_well()
@@ -37,17 +37,17 @@ def lasting_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
 
 @pytest.fixture
 def shared(lasting_bench: Bench) -> Iterator[Bench]:
-    """The bench of all tests of a module that leave no trace but missions; the clients are one test's own.
+    """A bench shared by the tests of a module that leave only missions behind; each test has its own clients.
 
-    Each test finds an empty board, and no transfer that the one before left behind: the daemon waits 5 s for its items.
+    Each test starts with an empty board and after any earlier transfer: the daemon waits 5 s for missing items.
     """
-    until(lasting_bench.daemon.clears, "the end of a transfer that an earlier test began")
+    until(lasting_bench.daemon.clears, "the end of an earlier test's transfer")
     with ExitStack() as stack:
         yield replace(lasting_bench, stack=stack)
 
 
 @pytest.fixture
 def kept(shared: Bench) -> list[str]:
-    """What the shared board holds before a test that must change nothing."""
+    """The shared board's list before a test that must not change it."""
     shared.daemon.push(plain_plan(12))
     return shared.board.records()

@@ -21,14 +21,14 @@ from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import comes, free_port, until
 
 MEGABYTE = 1 << 20
-#: The only bytes that may be sent to an unknown device: complete read requests.
+#: The only bytes that may be sent to an unknown device are complete read requests.
 PROBES = b"(%b)+" % b"|".join(re.escape(request(command)) for command in Msp)
 
 
 def nonsense(seed: int) -> Iterator[bytes]:
-    """Datagrams of noise, a megabyte in all; every other one begins like a MAVLink frame.
+    """Datagrams of noise, a megabyte in total; every other one begins like a MAVLink frame.
 
-    In one of ten megabytes, 16 bits of noise are the right checksum of the noise before them; none of those is used.
+    In one of ten megabytes, 16 bits of noise happen to be a valid checksum; the seeds used have none.
     """
     chance = random.Random(seed)
     left = MEGABYTE
@@ -39,7 +39,7 @@ def nonsense(seed: int) -> Iterator[bytes]:
 
 
 def damaged_frames(seed: int, count: int) -> Iterator[bytes]:
-    """Mission messages for the daemon, each with one bit that is wrong."""
+    """Mission messages for the daemon, each with one flipped bit."""
     chance = random.Random(seed)
     codec = messages.MAVLink(None, srcSystem=255, srcComponent=190)
     originals = [
@@ -63,7 +63,7 @@ def test_a_megabyte_of_noise_on_udp(shared: Bench, kept: list[str]) -> None:
         for number, data in enumerate((*nonsense(3), *damaged_frames(2, 2000))):
             stranger.sendto(data, shared.daemon.address)
             if number % 64 == 0:
-                # Each answer proves that the daemon has read what was sent before: nothing is dropped unread.
+                # Each reply proves that the daemon has read everything sent before.
                 assert planner.command(messages.MAV_CMD_REQUEST_MESSAGE, 148) is not None
     status = shared.daemon.status()
     assert status is not None
@@ -82,7 +82,7 @@ def test_a_megabyte_of_noise_from_a_tcp_client(start: Starter) -> None:
             stranger.sendall(data)
         with PlainStation(socket.create_connection(("127.0.0.1", port))) as station:
             assert station.upload(plain_plan(12)) == 0
-        # The one that made the noise can be understood as soon as it makes sense.
+        # The same client is served as soon as it sends valid frames.
         station = PlainStation(stranger)
         assert station.upload(plain_plan(13)) == 0
     assert bench.board.records() == records_of(judge(plain_plan(13)))
@@ -92,7 +92,7 @@ def test_a_megabyte_of_noise_from_a_tcp_client(start: Starter) -> None:
 
 
 class NoisyWire:
-    """A pty whose far end is the test: `path` is what the daemon opens."""
+    """A pty between the test and the daemon, which opens `path`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -136,11 +136,11 @@ def test_a_megabyte_of_noise_on_the_uart(start: Starter) -> None:
     assert status is not None
     assert (status["state"], status["flight_controller"]) == ("searching", None)
     assert daemon.has_logged("fc.found") is None
-    # It asked, in whole harmless frames and in nothing else, and what was said to it changed nothing of that.
+    # It sent only complete, harmless probes, whatever it received.
     until(lambda: len(wire.listen()) > 100, "probes")
     assert is_clean(bytes(wire.heard))
     assert re.fullmatch(PROBES, wire.heard)
-    # The same daemon finds the real one as soon as it is there.
+    # The same daemon then finds a real board.
     wire.unplug()
     board = start.board()
     daemon.wait()
@@ -162,7 +162,7 @@ def test_messages_for_others_change_nothing(shared: Bench, kept: list[str]) -> N
             station.send(m.MAVLink_mission_request_list_message(system, component, 0))
             station.send(m.MAVLink_param_set_message(system, component, b"WPNAV_RADIUS", 900.0, 9))
             station.send(m.MAVLink_command_long_message(system, component, 400, 0, 1, 0, 0, 0, 0, 0, 0))
-        # What answers the last, honest question has read all of the above.
+        # The reply to this valid request shows that everything above was read.
         station.send(m.MAVLink_param_request_read_message(1, 1, b"WPNAV_RADIUS", -1))
         assert station.wait_for("PARAM_VALUE").param_value == 200
         addressed = {"MISSION_ACK", "MISSION_REQUEST", "MISSION_COUNT", "COMMAND_ACK", "STATUSTEXT"}
@@ -170,8 +170,8 @@ def test_messages_for_others_change_nothing(shared: Bench, kept: list[str]) -> N
     assert shared.board.records() == kept
 
 
-def test_a_vehicle_with_our_own_numbers_is_not_obeyed(shared: Bench, kept: list[str]) -> None:
-    """An echo of our own messages looks like this, too."""
+def test_messages_with_our_own_ids_are_ignored(shared: Bench, kept: list[str]) -> None:
+    """They may be an echo of our own messages."""
     with udp_station(shared.daemon.address, sysid=1, compid=1) as echo, udp_station(shared.daemon.address) as station:
         echo.say_hello()
         echo.send(messages.MAVLink_mission_clear_all_message(1, 1, 0))
@@ -185,8 +185,8 @@ def test_a_vehicle_with_our_own_numbers_is_not_obeyed(shared: Bench, kept: list[
     assert shared.board.records() == kept
 
 
-def test_other_vehicles_on_the_net_disturb_nobody(shared: Bench) -> None:
-    """A second vehicle talks to the same port; its own mission traffic is not ours."""
+def test_other_vehicles_on_the_network_do_not_disturb_an_upload(shared: Bench) -> None:
+    """A second vehicle sends its own mission traffic to the same port."""
     planner = shared.mission_planner()
     with udp_station(shared.daemon.address, sysid=7) as vehicle:
         m = messages

@@ -20,7 +20,7 @@ from tests.support.programs import PATIENCE, free_port, run_naze_bridge, until
 UNKNOWN = {
     "no such device name": (["--fc", "naze"], "/dev/serial0"),
     "a device without its folder": (["--fc", "ttyUSB0,57600"], "did you mean /dev/ttyUSB0,57600?"),
-    "a host that cannot be": (["--fc", "tcp:naze..local:5760"], "not a host name"),
+    "an impossible host name": (["--fc", "tcp:naze..local:5760"], "not a host name"),
     "no speed": (["--fc", "/dev/ttyUSB0,fast"], "not a baud rate"),
     "tcp without a port": (["--fc", "tcp:naze.local"], "needs a host and a port"),
     "no such link": (["--fc", "sim:", "--gcs", "serial:/dev/ttyS0"], "udpin:0.0.0.0:14550"),
@@ -30,7 +30,7 @@ UNKNOWN = {
 
 
 @pytest.mark.parametrize("name", UNKNOWN)
-def test_a_connection_that_cannot_be_understood(tmp_path: Path, name: str) -> None:
+def test_an_invalid_connection(tmp_path: Path, name: str) -> None:
     arguments, hint = UNKNOWN[name]
     ended = run_naze_bridge("run", *arguments, "--state-dir", str(tmp_path))
     assert ended.returncode == 2
@@ -60,13 +60,13 @@ def test_two_daemons_on_one_port(start: Starter, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("link", "advice"),
     [
-        # No name server is needed to say that there is no such network card.
+        # An unknown network interface is found without a name server.
         ("udpin:[fe80::1%no-card]:14550", "check the name and the network"),
         ("tcpin:[fe80::1%no-card]:5760", "check the name and the network"),
         ("udpin:203.0.113.1:14550", "this machine has no such address"),
     ],
 )
-def test_a_ground_station_link_that_cannot_be(tmp_path: Path, link: str, advice: str) -> None:
+def test_an_impossible_ground_station_link(tmp_path: Path, link: str, advice: str) -> None:
     assert_refused(run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", tmp_path), link, advice)
 
 
@@ -76,12 +76,12 @@ def test_two_daemons_on_one_state_directory(start: Starter) -> None:
     link = f"udpin:127.0.0.1:{free_port()}"
     ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", str(first.state_dir))
     assert_refused(ended, str(first.state_dir), "in use by process", "--state-dir")
-    # And the first one can still be asked.
+    # The first one still answers.
     first.wait()
 
 
-def test_a_state_directory_that_cannot_be(start: Starter, tmp_path: Path) -> None:
-    """It is a disk that died: the daemon flies on without, and says so everywhere."""
+def test_an_impossible_state_directory(start: Starter, tmp_path: Path) -> None:
+    """As with a dead disk: the daemon works without it and reports it everywhere."""
     file = tmp_path / "file"
     file.write_text("not a directory")
     daemon = start.daemon("sim:", state_dir=file / "state")
@@ -98,7 +98,7 @@ def test_a_state_directory_that_cannot_be(start: Starter, tmp_path: Path) -> Non
 
 
 def test_the_plain_simulator_takes_a_mission(start: Starter) -> None:
-    """`--fc sim:`, as the README and `make demo` use it."""
+    """`--fc sim:`, as in the README and `make demo`."""
     daemon = start.daemon("sim:")
     daemon.wait()
     with udp_station(daemon.address) as station:
@@ -111,7 +111,7 @@ def test_the_plain_simulator_takes_a_mission(start: Starter) -> None:
 
 
 def complaint(start: Starter, path: Path) -> str:
-    """The daemon's message about its port; it keeps running."""
+    """The daemon's message about its port; the daemon keeps running."""
     daemon = start.daemon(str(path))
     event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
     assert daemon.is_alive
@@ -121,7 +121,7 @@ def complaint(start: Starter, path: Path) -> str:
 
 @pytest.fixture
 def terminal() -> Iterator[Path]:
-    """A serial port with nothing at its other end."""
+    """A serial port with nothing connected."""
     near, far = os.openpty()
     tty.setraw(far)
     path = Path(os.ttyname(far))
@@ -130,12 +130,12 @@ def terminal() -> Iterator[Path]:
     os.close(near)
 
 
-def test_a_port_that_is_missing_is_taken_when_it_appears(start: Starter) -> None:
+def test_a_missing_port_is_opened_when_it_appears(start: Starter) -> None:
     daemon = start.daemon(str(start.directory / "naze"))
     event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
     assert "is missing: plug the flight controller in" in event["why"]
     with udp_station(daemon.address) as station:
-        # The vehicle is there for a ground station anyway, and says why it takes no mission.
+        # Ground stations still see a vehicle, which gives the reason for refusing missions.
         station.say_hello()
         assert station.upload(plain_plan(12)) == 14
     board = start.board()
@@ -143,16 +143,16 @@ def test_a_port_that_is_missing_is_taken_when_it_appears(start: Starter) -> None
     with udp_station(daemon.address) as station:
         assert station.upload(plain_plan(12)) == 0
     assert board.records() == records_of(judge(plain_plan(12)))
-    # It was told once, not four times a second.
+    # It was reported once, not four times a second.
     assert len([event for event in daemon.events() if event["event"] == "fc.port_unavailable"]) == 1
 
 
 @pytest.mark.parametrize("path", ["/dev/null", __file__])
-def test_a_port_that_is_not_a_port(start: Starter, path: str) -> None:
+def test_a_port_that_is_not_a_serial_port(start: Starter, path: str) -> None:
     assert "is not a serial port" in complaint(start, Path(path))
 
 
-def test_a_port_that_another_program_has(start: Starter, terminal: Path) -> None:
+def test_a_port_used_by_another_program(start: Starter, terminal: Path) -> None:
     script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", script, str(terminal)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -165,7 +165,7 @@ def test_a_port_that_another_program_has(start: Starter, terminal: Path) -> None
         other.kill()
 
 
-def test_a_port_that_a_login_console_has(start: Starter, terminal: Path) -> None:
+def test_a_port_used_by_a_login_console(start: Starter, terminal: Path) -> None:
     with subprocess.Popen(
         ["/sbin/agetty", "-c", "input()", terminal.name], executable=sys.executable, stdin=subprocess.PIPE
     ) as console:
@@ -175,7 +175,7 @@ def test_a_port_that_a_login_console_has(start: Starter, terminal: Path) -> None
         console.kill()
 
 
-def test_a_tcp_flight_controller_that_is_not_there_yet(start: Starter) -> None:
+def test_a_tcp_flight_controller_that_is_not_up_yet(start: Starter) -> None:
     port = free_port(socket.SOCK_STREAM)
     daemon = start.daemon(f"tcp:127.0.0.1:{port}")
     event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")
@@ -192,7 +192,7 @@ def test_a_tcp_flight_controller_that_is_not_there_yet(start: Starter) -> None:
 # -- the store -----------------------------------------------------------------------------------------------
 
 
-def test_a_corrupt_database_is_kept_aside(start: Starter) -> None:
+def test_a_corrupt_database_is_set_aside(start: Starter) -> None:
     state = start.directory / "state"
     state.mkdir()
     rubbish = bytes(range(256)) * 64
@@ -207,7 +207,7 @@ def test_a_corrupt_database_is_kept_aside(start: Starter) -> None:
     assert [mission["outcome"] for mission in daemon.missions()] == ["VERIFIED"]
 
 
-def test_the_log_is_one_object_a_line(start: Starter) -> None:
+def test_the_log_has_one_object_per_line(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     lines = daemon.printed.splitlines()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller loses power, hangs, garbles, is unplugged or is another one; the daemon is killed.
+"""The flight controller loses power, hangs, garbles, is unplugged or replaced; the daemon is killed.
 
-The pilot is told in time, the old list is whole, and a second try works.
+The pilot is told in time, the old list is intact, and a second attempt works.
 """
 
 from collections.abc import Callable
@@ -20,14 +20,14 @@ OLD, NEW = plain_plan(40), plain_plan(146, start=40)
 
 @pytest.fixture
 def planner(bench: Bench) -> MissionPlanner:
-    """With its own timers: a refusal that comes too late for them is a timeout, which is another error."""
+    """With its real timers, so that a late refusal becomes a timeout, a different error."""
     planner = bench.mission_planner(pace=1.0)
     planner.write(OLD)
     return planner
 
 
 def assert_denied(act: Callable[[], None]) -> None:
-    """Assert that the user is told, and before Mission Planner has given up waiting."""
+    """Assert that the user is told before Mission Planner gives up waiting."""
     with pytest.raises(UploadFailed) as refused:
         act()
     assert refused.value.result is MissionResult.DENIED, refused.value
@@ -45,7 +45,7 @@ def assert_retry_works(bench: Bench, planner: MissionPlanner) -> None:
     assert bench.daemon.missions()[0]["outcome"] == "VERIFIED"
 
 
-# Of the first list, whose slot was blank, and of the second: its records.
+# Writing the first list, in a blank slot, and writing the second.
 @pytest.mark.parametrize("operation", [2, 106])
 def test_a_power_cut_while_it_is_written(bench: Bench, planner: MissionPlanner, operation: int) -> None:
     bench.board.set(f"power_cut_at_flash_operation {operation}")
@@ -58,7 +58,7 @@ def test_a_power_cut_while_it_is_written(bench: Bench, planner: MissionPlanner, 
     assert_retry_works(bench, planner)
 
 
-def test_a_hang_while_items_come_in(bench: Bench, planner: MissionPlanner) -> None:
+def test_a_hang_while_items_arrive(bench: Bench, planner: MissionPlanner) -> None:
     planner.write_begun(NEW, 20)
     bench.board.set("hang 1")
     assert_denied(lambda: planner.go_on(NEW, 20))
@@ -68,7 +68,7 @@ def test_a_hang_while_items_come_in(bench: Bench, planner: MissionPlanner) -> No
     assert_retry_works(bench, planner)
 
 
-def test_flash_that_fails(bench: Bench, planner: MissionPlanner) -> None:
+def test_failing_flash(bench: Bench, planner: MissionPlanner) -> None:
     bench.board.set("flash_failures 1000")
     assert_denied(lambda: planner.write(NEW))
     planner.wait_for_text("could not write its flash")
@@ -78,9 +78,7 @@ def test_flash_that_fails(bench: Bench, planner: MissionPlanner) -> None:
 
 
 @pytest.mark.parametrize("fault", ["bit_error_rate 0.0001", "lost_byte_rate 0.0005"])
-def test_a_line_that_damages_some_frames_delays_and_does_no_more(
-    bench: Bench, planner: MissionPlanner, fault: str
-) -> None:
+def test_a_line_that_damages_some_frames_only_delays(bench: Bench, planner: MissionPlanner, fault: str) -> None:
     bench.board.set(fault)
     planner.write(NEW)
     assert bench.board.records() == records_of(judge(NEW))
@@ -113,7 +111,7 @@ def test_unplugged_and_plugged_in_again(bench: Bench, planner: MissionPlanner) -
     assert lost is not None
 
 
-def test_left_in_its_command_line(start: Starter) -> None:
+def test_a_board_left_in_its_command_line(start: Starter) -> None:
     board = start.board()
     with board.link.open("r+b", buffering=0) as terminal:
         terminal.write(b"\r\r\r")
@@ -136,8 +134,8 @@ def test_left_in_its_command_line(start: Starter) -> None:
     assert board.stats()["hazard_runs"] == 1
 
 
-def test_another_list_is_there_after_the_board_was_changed(start: Starter) -> None:
-    """A copy on the companion answers only while its checksum is the board's."""
+def test_a_replaced_boards_list_is_read(start: Starter) -> None:
+    """The bridge uses its copy only while its checksum equals the board's."""
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
         station.say_hello()
@@ -171,7 +169,7 @@ def test_a_harakiri_without_the_mission_extension(start: Starter) -> None:
     bench.board.assert_was_treated_well()
 
 
-def test_one_that_speaks_mavlink_while_it_is_armed(start: Starter) -> None:
+def test_a_harakiri_that_speaks_mavlink_while_armed(start: Starter) -> None:
     board = start.board("--armed", "--tele-prot", "2")
     daemon = start.daemon(str(board.link))
     daemon.wait("MAVLink")
@@ -187,7 +185,7 @@ def test_one_that_speaks_mavlink_while_it_is_armed(start: Starter) -> None:
     board.assert_was_treated_well()
 
 
-def test_a_speed_that_nobody_told(start: Starter) -> None:
+def test_an_unexpected_speed(start: Starter) -> None:
     bench = start.bench("--baud", "38400")
     status = bench.daemon.status()
     assert status is not None
@@ -200,7 +198,7 @@ def test_a_speed_that_nobody_told(start: Starter) -> None:
 # -- the daemon ----------------------------------------------------------------------------------------------
 
 
-def test_a_kill_right_behind_the_ack_loses_nothing(start: Starter) -> None:
+def test_a_kill_right_after_the_ack_loses_nothing(start: Starter) -> None:
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
         station.say_hello()
@@ -217,7 +215,7 @@ def test_a_kill_right_behind_the_ack_loses_nothing(start: Starter) -> None:
             assert bench.board.records() == records_of(judge(plan))
 
 
-def test_a_kill_in_mid_upload_keeps_the_list_that_was_there(bench: Bench, planner: MissionPlanner) -> None:
+def test_a_kill_during_an_upload_keeps_the_old_list(bench: Bench, planner: MissionPlanner) -> None:
     planner.write_begun(NEW, 100)
     bench.daemon.kill_and_restart()
     bench.daemon.wait()

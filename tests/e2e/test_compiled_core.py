@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MAVSDK, daemon, pty, simulated UART, and behind it the very C code that goes onto the flight controller."""
+"""MAVSDK, daemon, pty and simulated UART with the flight controller's real C code."""
 
 import random
 from collections.abc import Iterator
@@ -20,12 +20,12 @@ from tests.support.programs import run_naze_bridge, until
 
 OLD, NEW = mixed_plan(60), plain_plan(146, start=40)
 OLD_RECORDS, NEW_RECORDS = records_of(judge(OLD)), records_of(judge(NEW))
-# The records, the header, the seal: what a list costs in a slot that is blank.
+# Flash writes of a list in a blank slot: records, header, seal.
 NEW_OPERATIONS = len(NEW_RECORDS) + 2
 
 
 def start_on_core(start: Starter) -> tuple[Bench, Path]:
-    """Start daemon and board, whose flash is the file that is returned."""
+    """Start daemon and board; return them and the board's flash file."""
     flash = start.directory / "flash"
     return start.bench("--core", str(library()), "--state", str(flash)), flash
 
@@ -51,7 +51,7 @@ async def hear_of(vehicle: Any, *, armed: bool) -> None:
             break
 
 
-async def test_146_items_there_and_back(core: tuple[Bench, Path]) -> None:
+async def test_a_round_trip_of_146_items(core: tuple[Bench, Path]) -> None:
     (bench, flash), plan = core, mixed_plan(146)
     board, records = bench.board, records_of(judge(plan))
     async with vehicle_at(bench.daemon.port) as vehicle:
@@ -92,7 +92,7 @@ async def test_a_power_cut_while_it_is_written(start: Starter, seed: int) -> Non
     bench.board.set(f"power_cut_at_flash_operation {cut}")
     async with vehicle_at(bench.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
-        # On a loaded machine MAVSDK may have given up before we do: it does not repeat its last item.
+        # On a loaded machine MAVSDK may give up first: it does not repeat its last item.
         assert await refusal_of(missions, NEW) in (MissionRawResult.DENIED, MissionRawResult.TIMEOUT)
         assert bench.board.stats()["power"] == "OFF"
         assert bench.board.records() == OLD_RECORDS

@@ -36,13 +36,13 @@ BAD_REQUESTS = {
     "digits without end": b'{"do": "mission", "number": %b}' % (b"9" * 5000),
     "brackets without end": b"[" * 100_000,
     "no items": b'{"do": "push", "source": "test"}',
-    "items of nothing": b'{"do": "push", "source": "test", "items": [[]]}',
+    "an empty item": b'{"do": "push", "source": "test", "items": [[]]}',
     "half an item": b'{"do": "push", "source": "test", "items": [{"seq": 0}]}',
-    "a parameter in words": push(p1="much"),
-    "a parameter beyond all numbers": push(p1=10**400),
-    "a place in words": push(lat_e7="here"),
-    "a place beyond all numbers": push(lat_e7=10**400),
-    "a command that is none": push(command=-1),
+    "a parameter as text": push(p1="much"),
+    "a parameter too large for a float": push(p1=10**400),
+    "a latitude as text": push(lat_e7="here"),
+    "a latitude too large for a float": push(lat_e7=10**400),
+    "an invalid command": push(command=-1),
 }
 
 
@@ -72,7 +72,7 @@ def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
     assert "Traceback" not in daemon.printed
 
 
-def test_a_client_that_hangs_up_before_its_answer_does_no_harm(start: Starter) -> None:
+def test_a_client_that_disconnects_before_its_reply_does_no_harm(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     for line in (b'{"do": "pull"}\n', b'{"do": "missions", "limit": 5}\n', b'{"do":'):
@@ -86,7 +86,7 @@ def test_a_client_that_hangs_up_before_its_answer_does_no_harm(start: Starter) -
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_waiting_clients_are_told_of_a_stop(start: Starter, number: signal.Signals) -> None:
-    """One client has said nothing yet, another waits for a push to a flight controller that hangs."""
+    """One client is idle, another waits for a push to a hung flight controller."""
     bench = start.bench()
     daemon = bench.daemon
     with socket.socket(socket.AF_UNIX) as idle, socket.socket(socket.AF_UNIX) as pushing:
@@ -94,7 +94,7 @@ def test_waiting_clients_are_told_of_a_stop(start: Starter, number: signal.Signa
             connection.connect(str(daemon.state_dir / "control.sock"))
         bench.board.set("hang 1")
         pushing.sendall(push() + b"\n")
-        assert daemon.status() is not None  # it was accepted after the push: that has begun
+        assert daemon.status() is not None  # accepted after the push, which has therefore begun
         assert daemon.end(number) == 0
         answer = json.loads(pushing.makefile().readline())
         assert "was stopped" in answer.get("error", "") or answer["result"]["ack"] == "MAV_MISSION_DENIED"
@@ -102,7 +102,7 @@ def test_waiting_clients_are_told_of_a_stop(start: Starter, number: signal.Signa
     assert not (daemon.state_dir / "control.sock").exists()
 
 
-def test_a_path_that_is_too_long_for_a_socket(tmp_path: Path) -> None:
+def test_a_path_too_long_for_a_socket(tmp_path: Path) -> None:
     state = tmp_path / ("long" * 30)
     ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", "udpout:127.0.0.1:9", "--state-dir", state)
     assert ended.returncode == 1
@@ -112,22 +112,22 @@ def test_a_path_that_is_too_long_for_a_socket(tmp_path: Path) -> None:
 
 
 def test_the_command_line_finds_the_service(start: Starter, tmp_path: Path) -> None:
-    """systemd's state directory is closed to who asks; the socket is in the runtime directory."""
+    """Users cannot read systemd's state directory; the socket is in the runtime directory."""
     runtime = tmp_path / "run"
     runtime.mkdir()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RUNTIME_DIRECTORY", str(runtime))
         daemon = start.daemon("sim:")
         patch.setenv("XDG_STATE_HOME", str(tmp_path / "a home without a daemon"))
-        until(lambda: run_naze_bridge("status").returncode == 0, "an answer to the status")
+        until(lambda: run_naze_bridge("status").returncode == 0, "a reply to the status request")
     assert not (daemon.state_dir / "control.sock").exists()
 
 
-def test_what_the_command_line_does_is_logged(start: Starter) -> None:
+def test_actions_of_the_command_line_are_logged(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     daemon.push(plain_plan(5))
-    event = until(lambda: daemon.has_logged("mission.push_ended"), "a word about the push")
+    event = until(lambda: daemon.has_logged("mission.push_ended"), "a log entry about the push")
     assert (event["source"], event["ack"], event["mission"]) == ("test", "ACCEPTED", 1)
     assert event["detail"] == "Mission verified: 5 records"
     daemon.clears()

@@ -38,19 +38,19 @@ def test_start_search_and_stop(start: Starter, number: signal.Signals) -> None:
     assert started["version"]
     assert stopping is not None
     assert stopping["signal"] == number.name
-    # A stop is not a loss.
+    # Stopping is not reported as a loss.
     assert not [event for event in events if event["event"] in LOSSES]
 
 
-def test_a_port_that_is_pulled_is_a_loss(start: Starter) -> None:
+def test_an_unplugged_port_is_reported_lost(start: Starter) -> None:
     bench = start.bench()
     bench.board.set("unplug")
     lost = until(lambda: bench.daemon.has_logged("fc.port_lost"), "the loss")
     assert lost["level"] == "warning"
 
 
-def test_a_log_that_nobody_reads_stops_nothing(tmp_path: Path) -> None:
-    """`naze-bridge run 2>&1 | less`, or a journal that stands still: the pipe is full before the first line."""
+def test_an_unread_log_does_not_stop_the_daemon(tmp_path: Path) -> None:
+    """`naze-bridge run 2>&1 | less`, or a stalled journal; here the pipe is full before the first line."""
     unread, full = os.pipe()
     os.set_blocking(full, False)
     with suppress(BlockingIOError):
@@ -73,7 +73,7 @@ def test_a_log_that_nobody_reads_stops_nothing(tmp_path: Path) -> None:
     os.close(unread)
 
 
-async def test_a_search_that_finds_nobody_says_so_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_search_without_result_is_reported_repeatedly(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(daemon_module, "_SEARCH_REPORT_S", 0.01)
     near, far = os.openpty()
     tty.setraw(far)
@@ -89,8 +89,8 @@ async def test_a_search_that_finds_nobody_says_so_again_and_again(monkeypatch: p
     os.close(far)
 
 
-async def test_a_fault_in_the_bridge_is_logged_and_the_line_set_up_again(tmp_path: Path) -> None:
-    """An exception on the loop goes to the log, not past it, and telemetry continues."""
+async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_path: Path) -> None:
+    """Telemetry continues afterwards."""
     with capture_logs() as events:
         daemon = Daemon(Settings(SimulatedFc(), state_dir=tmp_path))
         running = asyncio.create_task(daemon.run())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground stations by every kind of link, old ones, and several at once."""
+"""Ground stations on every kind of link, old versions, and several at once."""
 
 import socket
 from concurrent.futures import ThreadPoolExecutor
@@ -44,7 +44,7 @@ def test_every_kind_of_link_at_once(start: Starter) -> None:
             assert station.download() == expected_fields(plan)
             assert bench.board.records() == records_of(judge(plan))
         until(lambda: len(_stations(bench)) == 4, "four ground stations")
-        # Once somebody has answered, it is spoken to and the others on the net are left alone.
+        # Once a station has answered, only it gets messages, and no longer the whole network.
         assert not [peer for peer in _stations(bench) if "127.255.255.255'" in peer]
     until(lambda: len(_stations(bench)) == 3, "the end of the TCP connection")
 
@@ -56,7 +56,7 @@ def _stations(bench: Bench) -> list[str]:
     return stations
 
 
-def test_a_tcp_client_that_hangs_up_in_mid_upload_blocks_nobody(start: Starter) -> None:
+def test_a_tcp_client_that_disconnects_during_an_upload_blocks_no_one(start: Starter) -> None:
     port = free_port(socket.SOCK_STREAM)
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
     plan = plain_plan(30)
@@ -69,7 +69,7 @@ def test_a_tcp_client_that_hangs_up_in_mid_upload_blocks_nobody(start: Starter) 
     assert bench.board.records() == records_of(judge(plan))
 
 
-def test_one_that_knows_mavlink_1_only(shared: Bench) -> None:
+def test_a_station_that_supports_only_mavlink_1(shared: Bench) -> None:
     plan = mixed_plan(14)
     with udp_station(shared.daemon.address, mavlink_1) as station:
         station.say_hello()
@@ -84,7 +84,7 @@ def test_one_that_knows_mavlink_1_only(shared: Bench) -> None:
 # -- several at once -----------------------------------------------------------------------------------------
 
 
-def test_a_second_one_waits_for_2_5_s_while_the_first_one_writes(shared: Bench) -> None:
+def test_a_second_station_waits_2_5_s_while_the_first_writes(shared: Bench) -> None:
     first = shared.mission_planner()
     plan = plain_plan(30, start=60)
     first.write_begun(plan, 10)
@@ -94,11 +94,11 @@ def test_a_second_one_waits_for_2_5_s_while_the_first_one_writes(shared: Bench) 
         assert shared.board.records() == records_of(judge(plan))
         assert set(first.acks()) == {MissionResult.ACCEPTED}
         assert second.upload(plain_plan(12)) is MissionResult.ACCEPTED
-    # Whose mission it is not about need not read it.
+    # Other stations do not get this text.
     assert "Another mission transfer" not in first.said()
 
 
-def test_two_mission_planners_that_press_write_together_both_succeed(shared: Bench) -> None:
+def test_two_simultaneous_writes_of_mission_planner_both_succeed(shared: Bench) -> None:
     plans = [plain_plan(146, start=60), plain_plan(146, start=300)]
     planners = [shared.mission_planner(pace=1.0) for _ in plans]
     for planner in planners:
@@ -111,7 +111,7 @@ def test_two_mission_planners_that_press_write_together_both_succeed(shared: Ben
     assert [mission["outcome"] for mission in shared.daemon.missions()[:2]] == ["VERIFIED"] * 2
 
 
-def test_items_from_another_one_get_into_no_list(shared: Bench) -> None:
+def test_items_from_another_station_are_ignored(shared: Bench) -> None:
     first = shared.mission_planner()
     plan, other = plain_plan(30, start=60), plain_plan(30, start=160)
     first.write_begun(plan, 10)
@@ -122,7 +122,7 @@ def test_items_from_another_one_get_into_no_list(shared: Bench) -> None:
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_a_reader_gets_one_list_whatever_is_written_meanwhile(shared: Bench) -> None:
+def test_a_download_is_consistent_during_an_upload(shared: Bench) -> None:
     old, new = plain_plan(30, start=60), plain_plan(30, start=160)
     writer = shared.mission_planner()
     writer.write(old)
@@ -136,7 +136,7 @@ def test_a_reader_gets_one_list_whatever_is_written_meanwhile(shared: Bench) -> 
     assert [item.x for item in reader.read()] == [item.lat_e7 for item in judge(new).items]
 
 
-def test_everyone_is_told_what_becomes_of_the_mission(shared: Bench) -> None:
+def test_all_stations_are_told_the_result_of_an_upload(shared: Bench) -> None:
     writer, other = shared.mission_planner(), shared.mission_planner()
     other.meet()
     writer.write(plain_plan(13, start=60))
@@ -144,7 +144,7 @@ def test_everyone_is_told_what_becomes_of_the_mission(shared: Bench) -> None:
     other.wait_until(lambda: 12 in [message.total for message in other.heard_of("MISSION_CURRENT")], "the new total")
 
 
-def test_many_that_came_and_went_lock_nobody_out(bench: Bench) -> None:
+def test_many_former_stations_do_not_lock_out_a_new_one(bench: Bench) -> None:
     for _ in range(40):
         with udp_station(bench.daemon.address) as passer_by:
             passer_by.say_hello()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Real ground stations write and read 120 records through the real daemon, on a simulated INAV behind a TCP socket."""
+"""Real ground stations write and read 120 records on a simulated INAV through a daemon, over TCP."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -24,7 +24,7 @@ RULES = NavRules(inav_profile())
 
 
 def nav_plan(records: int) -> list[PlanRow]:
-    """Home and a list of so many records with everything that INAV holds as it is sent."""
+    """Home and `count` records, of every kind that INAV stores unchanged."""
     head = [
         PlanRow(Command.DO_SET_ROI, 45.3843398, 8.4742597, 20.0),
         PlanRow(Command.DO_CHANGE_SPEED, p1=1.0, p2=5.0),
@@ -45,12 +45,12 @@ def judged(plan: list[PlanRow]) -> Verdict[NavRecord]:
 
 
 def expected(plan: list[PlanRow]) -> list[tuple[float, ...]]:
-    """What is read of it; home is where the board has it."""
+    """The list as it reads back; home comes from the board."""
     return [stored_fields(item) for item in judged(plan).items[1:]]
 
 
 def stored(bench: Bench, count: int) -> list[bytes]:
-    """The records as the next boot finds them, without their numbers."""
+    """The records that the next boot would load, without their numbers."""
     return [bytes.fromhex(record)[1:] for record in bench.board.records()[:count]]
 
 
@@ -79,7 +79,7 @@ async def test_mavsdk_writes_and_reads_120_records(inav: Bench) -> None:
         assert stored(inav, 120) == records_of(plan)
         read = await missions.download_mission()
         assert [fields(item) for item in read][1:] == expected(plan)
-        read[0].current = 1  # MAVSDK sends no list without one
+        read[0].current = 1  # MAVSDK does not send a list without one
         await missions.upload_mission(read)
         assert stored(inav, 120) == records_of(plan)
         assert await refusal_of(missions, [HOME, waypoint(1), PlanRow(Command.DO_JUMP, p1=1.0, p2=1.0)])
@@ -99,11 +99,11 @@ def test_mavproxy_loads_lists_and_clears_120_records(inav: Bench, tmp_path: Path
         mavproxy.wait_for("cleared")
         assert stored(inav, 1) == [b"\4" + bytes(18) + b"\xa5"]
         mavproxy.type("wp list")
-        # Home is left.
+        # Only home is left.
         mavproxy.wait_for("Requesting 1 waypoints")
 
 
-def test_after_a_restart_of_the_board_the_daemon_says_what_is_true(start: Starter) -> None:
+def test_after_a_restart_of_the_board_the_reported_mission_is_true(start: Starter) -> None:
     board = start.board("--kind", "inav", tcp=True)
     daemon = start.daemon(board.fc)
     daemon.wait()

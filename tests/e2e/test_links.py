@@ -28,7 +28,7 @@ def has_lost_port(daemon: Daemon, times: int) -> bool:
 
 
 def take_terminals(name: Path) -> list[int]:
-    """Open terminals until the one of that name is among them, or surely another program's."""
+    """Open terminals until the name is taken, by this or another program."""
     taken: list[int] = []
     while len(taken) < 40 and not (taken and os.ttyname(taken[-1]) == str(name)):
         taken += os.openpty()
@@ -36,7 +36,7 @@ def take_terminals(name: Path) -> list[int]:
 
 
 def answer_requests(station: PlainStation, plan: list[PlanRow], until_seq: int | None = None) -> MissionResult | None:
-    """Give each item that is asked for, until one number is or until the final ack."""
+    """Send each requested item until `until_seq` is requested or the final ack arrives."""
     while True:
         message = station.wait_for("MISSION_REQUEST", "MISSION_ACK")
         if message.get_type() == "MISSION_ACK":
@@ -49,8 +49,8 @@ def answer_requests(station: PlainStation, plan: list[PlanRow], until_seq: int |
 # -- the flight controller's side ----------------------------------------------------------------------------
 
 
-def test_it_comes_back_under_another_name_behind_the_same_link(start: Starter, tmp_path: Path) -> None:
-    """As USB adapters do: ttyUSB0 becomes ttyUSB1, and /dev/serial/by-id/... leads there."""
+def test_a_port_returns_under_another_name_behind_the_same_link(start: Starter, tmp_path: Path) -> None:
+    """As with USB adapters: ttyUSB0 becomes ttyUSB1, and /dev/serial/by-id/... points there."""
     board = start.board()
     by_id = tmp_path / "usb-FTDI_FT232R-if00-port0"
     by_id.symlink_to(board.link)
@@ -62,7 +62,7 @@ def test_it_comes_back_under_another_name_behind_the_same_link(start: Starter, t
             name = by_id.resolve()
             board.set("unplug")
             until(partial(has_lost_port, daemon, number + 1), "the loss of the port")
-            # Somebody else has the name now.
+            # Another program has the old name now.
             taken = take_terminals(name)
             board.set("plug")
             assert by_id.resolve() != name
@@ -95,7 +95,7 @@ def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> Non
 
 
 def test_an_upload_continues_from_another_address(bench: Bench) -> None:
-    """The same ids from elsewhere: Wi-Fi has given the laptop another address."""
+    """The same ids at a new address, as after Wi-Fi roaming."""
     with udp_station(bench.daemon.address) as there:
         there.announce(len(PLAN))
         assert answer_requests(there, PLAN, until_seq=20) is None
@@ -105,7 +105,7 @@ def test_an_upload_continues_from_another_address(bench: Bench) -> None:
         assert answer_requests(here, PLAN) is MissionResult.ACCEPTED
         assert bench.board.records() == records_of(judge(PLAN))
         assert bench.daemon.has_logged("mission.station_moved")
-        # The old address is not spoken to for a minute, as that of one who just fell silent is.
+        # The old address is dropped at once, not after a minute as for a silent station.
 
         def is_alone() -> bool:
             here.say_hello()
@@ -114,7 +114,7 @@ def test_an_upload_continues_from_another_address(bench: Bench) -> None:
         until(is_alone, "the end of the old address")
 
 
-def test_what_was_written_meanwhile_is_acked_at_the_other_address(bench: Bench) -> None:
+def test_a_list_written_meanwhile_is_acked_at_the_new_address(bench: Bench) -> None:
     with udp_station(bench.daemon.address) as there:
         there.announce(len(PLAN))
         assert answer_requests(there, PLAN, until_seq=len(PLAN) - 1) is None
@@ -123,7 +123,7 @@ def test_what_was_written_meanwhile_is_acked_at_the_other_address(bench: Bench) 
         here.say_hello()
 
         def is_acked() -> bool:
-            """It has seen no ack, and repeats its last item."""
+            """The station has seen no ack and repeats its last item."""
             here.give(PLAN, len(PLAN) - 1)
             here.wait_for("HEARTBEAT", "MISSION_ACK")
             return any(message.get_type() == "MISSION_ACK" and not message.type for message in here.heard)
@@ -151,7 +151,7 @@ def test_ipv6_and_a_name(start: Starter) -> None:
     assert bench.board.records() == records_of(judge(PLAN))
 
 
-def test_a_client_that_reads_nothing_keeps_nobody_waiting(start: Starter) -> None:
+def test_a_client_that_does_not_read_delays_no_one(start: Starter) -> None:
     port, udp = free_port(socket.SOCK_STREAM), free_port()
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{udp}"])
     with tcp_station(port) as deaf, tcp_station(port) as station, udp_station(("127.0.0.1", udp)) as by_udp:
@@ -160,6 +160,6 @@ def test_a_client_that_reads_nothing_keeps_nobody_waiting(start: Starter) -> Non
             plan = plain_plan(50 + number)
             assert writer.upload(plan) is MissionResult.ACCEPTED
             assert bench.board.records() == records_of(judge(plan))
-        # It reads again, and is as good as any.
+        # When it reads again, it is served like any other.
         assert deaf.upload(PLAN) is MissionResult.ACCEPTED
     assert bench.board.records() == records_of(judge(PLAN))

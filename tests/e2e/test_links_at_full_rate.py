@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An autopilot that sends 3000 frames/s: all arrive, and a stalled client affects no other."""
+"""An autopilot sends 3000 frames/s: all arrive, and a stalled client affects no other."""
 
 import os
 import socket
@@ -23,7 +23,7 @@ DEAF = 251
 
 
 class Autopilot:
-    """Something with ArduPilot's ids on a terminal; its attitudes are numbered. What it says waits for the reader."""
+    """An autopilot with ArduPilot's ids on a pty; its attitudes are numbered. Writes block until they are read."""
 
     def __init__(self, directory: Path) -> None:
         self._wire, self._terminal = os.openpty()
@@ -66,7 +66,7 @@ def autopilot(tmp_path: Path) -> Iterator[Autopilot]:
 
 
 class Reader(threading.Thread):
-    """Reads a connected socket until it has heard the last attitude."""
+    """Reads a connected socket up to the last attitude."""
 
     def __init__(self, connection: socket.socket, last: int) -> None:
         super().__init__(daemon=True)
@@ -81,7 +81,7 @@ class Reader(threading.Thread):
         return [int.from_bytes(frame.payload[:4].ljust(4, b"\0"), "little") for frame in attitudes]
 
     def assert_frames_are_whole(self) -> None:
-        """Nothing but frames came; the last read may have cut one."""
+        """Only frames were received; the last one may be incomplete."""
         whole = b"".join(frame.raw for frame in self.frames)
         assert self.data.startswith(whole)
         assert len(self.data) - len(whole) < 64
@@ -108,9 +108,7 @@ def connected_udp(port: int) -> socket.socket:
     return connection
 
 
-def test_nothing_is_lost_at_any_rate_and_a_stalled_client_finds_what_matters(
-    start: Starter, autopilot: Autopilot
-) -> None:
+def test_nothing_is_lost_at_any_rate_and_a_stalled_client_gets_its_acks(start: Starter, autopilot: Autopilot) -> None:
     udp, tcp = free_port(), free_port(socket.SOCK_STREAM)
     daemon = start.daemon(str(autopilot.path), gcs=[f"udpin:127.0.0.1:{udp}", f"tcpin:127.0.0.1:{tcp}"])
     daemon.wait("MAVLink")
@@ -138,7 +136,7 @@ def test_nothing_is_lost_at_any_rate_and_a_stalled_client_finds_what_matters(
             reader.assert_frames_are_whole()
         by_tcp, by_datagrams = readers
         assert by_tcp.numbers == list(range(total))
-        # What a busy machine lets no one read in time is lost at the reader's own socket.
+        # On a busy machine the reader's own socket may lose datagrams.
         assert by_datagrams.numbers == sorted(set(by_datagrams.numbers))
         assert len(by_datagrams.numbers) > total / 2
         late = Reader(stalled_socket, total - 1)
@@ -149,6 +147,6 @@ def test_nothing_is_lost_at_any_rate_and_a_stalled_client_finds_what_matters(
     assert late.numbers == sorted(late.numbers)
     assert late.numbers[-1] == total - 1
     assert len(late.numbers) < total / 2
-    # All the time it was one port and one autopilot.
+    # Neither the port nor the autopilot was ever lost.
     assert not daemon.has_logged("fc.port_lost")
     assert len([entry for entry in daemon.events() if entry["event"] == "fc.found"]) == 1

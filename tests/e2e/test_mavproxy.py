@@ -27,7 +27,7 @@ def test_load_list_save_and_clear(shared: Bench, tmp_path: Path, version: str) -
         mavproxy.wait_for("cleared")
         assert shared.board.records() == []
         mavproxy.type("wp list")
-        # Home is left.
+        # Only home is left.
         mavproxy.wait_for("Requesting 1 waypoints")
 
 
@@ -45,7 +45,7 @@ def test_load_with_float_items_and_its_parameters(shared: Bench, tmp_path: Path)
         mavproxy.wait_for("transmitter sticks")
 
 
-def test_refusals_come_with_a_reason_and_keep_the_list(bench: Bench, tmp_path: Path) -> None:
+def test_refusals_have_a_reason_and_keep_the_list(bench: Bench, tmp_path: Path) -> None:
     plan = plain_plan(12)
     with MavProxy(tmp_path, bench.daemon.port) as mavproxy:
         mavproxy.load(plan)
@@ -64,7 +64,7 @@ def test_refusals_come_with_a_reason_and_keep_the_list(bench: Bench, tmp_path: P
 
 
 def test_load_and_list_over_a_bad_link(shared: Bench, tmp_path: Path) -> None:
-    """It announces a list once and gives its last item once: the user's remedy for a loss there is `wp load` again."""
+    """MAVProxy sends MISSION_COUNT and the last item only once; after a loss the user repeats `wp load`."""
     link = shared.lossy_link(loss=0.1, repeats=0.05, delay_s=0.02, jitter_s=0.05, seed=3)
     plan = plain_plan(8, start=40)
     expected = records_of(judge(plan))

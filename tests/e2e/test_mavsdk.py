@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real MAVSDK as a ground station (what QGroundControl does, as far as missions go)."""
+"""The real MAVSDK as a ground station (for missions it behaves like QGroundControl)."""
 
 import asyncio
 import math
@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 @asynccontextmanager
 async def vehicle_at(port: int) -> AsyncIterator[Any]:
-    """Connect MAVSDK; the vehicle that it finds."""
+    """Connect MAVSDK; return the vehicle it finds."""
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
         await mavsdk.add_any_connection(f"udpout://127.0.0.1:{port}")
         system = await mavsdk.first_autopilot(timeout_s=PATIENCE)
@@ -74,7 +74,7 @@ async def refusal_of(missions: Any, plan: Sequence[PlanRow]) -> Any:
 
 
 async def pressed_again(act: Callable[[], Awaitable[T]], after_failure: Callable[[], None]) -> T:
-    """Do what its user does whose MAVSDK gave up (it does after five repeats of one message): press again, twice."""
+    """Retry twice, like a user whose MAVSDK gave up (after five repeats of one message)."""
     for _ in range(2):
         try:
             return await act()
@@ -95,7 +95,7 @@ async def test_a_round_trip(shared: Bench, count: int) -> None:
         assert [fields(item) for item in await missions.download_mission()] == expected_fields(plan)
 
 
-async def test_parameters_that_are_not_given_are_not_a_number(shared: Bench) -> None:
+async def test_unset_parameters_are_nan(shared: Bench) -> None:
     plan = [replace(row, p1=math.nan, p3=math.nan, p4=math.nan) for row in plain_plan(20, start=3)]
     async with vehicle_at(shared.daemon.port) as vehicle:
         await MissionRawAsync(vehicle).upload_mission(raw_items(plan))
@@ -148,7 +148,7 @@ async def test_armed(bench: Bench) -> None:
 
 
 async def test_clearing(shared: Bench) -> None:
-    """To an ArduPilot its clear_mission writes a list of one item, which is none by the rules: the list is kept."""
+    """To an ArduPilot its clear_mission sends a list of one item, which the rules reject: the list is kept."""
     async with vehicle_at(shared.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
         plan = plain_plan(12, start=20)
@@ -161,12 +161,12 @@ async def test_clearing(shared: Bench) -> None:
         message = MavlinkMessage("MISSION_CLEAR_ALL", 245, 190, 1, 1, clear_all)
         await MavlinkDirectAsync(vehicle).send_message(message)
         until(lambda: shared.board.records() == [], "an empty board")
-        # Home is left.
+        # Only home is left.
         assert len(await missions.download_mission()) == 1
 
 
 async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
-    """MAVSDK joins the pieces of a STATUSTEXT, as QGroundControl does."""
+    """MAVSDK joins the pieces of a STATUSTEXT, like QGroundControl."""
     texts: list[str] = []
     async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(PATIENCE):
         upload = asyncio.ensure_future(MissionRawAsync(vehicle).upload_mission(raw_items(mixed_plan(20))))
@@ -184,7 +184,7 @@ async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     ]
 
 
-async def test_cancelling_keeps_the_list_that_was_there(shared: Bench, kept: list[str]) -> None:
+async def test_cancelling_keeps_the_old_list(shared: Bench, kept: list[str]) -> None:
     link = shared.lossy_link(delay_s=0.05)
     async with vehicle_at(link.address[1]) as vehicle:
         missions = MissionRawAsync(vehicle)
@@ -207,7 +207,7 @@ async def test_parameters_and_telemetry(shared: Bench) -> None:
         parameters = ParamAsync(vehicle)
         found = {each.name: each.value for each in (await parameters.get_all_params()).float_params}
         assert found == {"SYSID_THISMAV": 1.0, "WPNAV_RADIUS": 200.0}
-        # The flash write of one is scheduled when the next one comes.
+        # The first one's flash write is still pending when the next one arrives.
         for radius_cm in (300.0, 200.0):
             await parameters.set_param_float("WPNAV_RADIUS", radius_cm)
             assert await parameters.get_param_float("WPNAV_RADIUS") == radius_cm

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/ground-stations.md lists which of MAVSDK's telemetry streams have values; the real MAVSDK says the same."""
+"""The MAVSDK telemetry streams listed in docs/ground-stations.md have values in the real MAVSDK."""
 
 import asyncio
 import math
@@ -15,12 +15,12 @@ from tests.support.programs import until_async
 
 PAGE = (Path(__file__).parents[2] / "docs" / "ground-stations.md").read_text()
 _PREFIX = "subscribe_"
-#: How long to wait for a stream that should have no values, once all others have some.
+#: Further wait for streams that should have no values, once all others have some.
 _SILENCE_S = 3.0
 
 
 def is_value(sample: Any) -> bool:
-    """True unless every number in a sample is NaN."""
+    """False if every number in a sample is NaN."""
     numbers = [value for value in getattr(sample, "__dict__", {}).values() if isinstance(value, float)]
     return not numbers or any(map(math.isfinite, numbers))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Prometheus' text of a daemon that is at work, read by Prometheus' own parser."""
+"""A busy daemon's metrics, read by Prometheus' own parser."""
 
 import asyncio
 from pathlib import Path
@@ -28,12 +28,12 @@ def read(metrics: Metrics) -> Samples:
 
 
 def _other_labels(labels: dict[str, str]) -> list[str]:
-    """All but the vehicle's name, which each sample has."""
+    """All labels except the vehicle's name, which each sample has."""
     assert labels["vehicle"]
     return [value for name, value in labels.items() if name != "vehicle"]
 
 
-async def test_what_a_daemon_counts(tmp_path: Path) -> None:
+async def test_the_counters_of_a_daemon(tmp_path: Path) -> None:
     link = parse_gcs(f"udpin:127.0.0.1:{free_port()}")
     daemon = Daemon(Settings(parse_fc("sim:"), [link], tmp_path))
     metrics = Metrics(daemon)
@@ -42,7 +42,7 @@ async def test_what_a_daemon_counts(tmp_path: Path) -> None:
     assert ("battery_volts", ()) not in before
     running = asyncio.create_task(daemon.run())
     await daemon.started.wait()
-    await asyncio.to_thread(until, lambda: ("battery_volts", ()) in read(metrics), "a word on the battery")
+    await asyncio.to_thread(until, lambda: ("battery_volts", ()) in read(metrics), "a battery voltage")
 
     def write() -> list[MissionResult]:
         with udp_station((link.host, link.port)) as station:
@@ -50,7 +50,7 @@ async def test_what_a_daemon_counts(tmp_path: Path) -> None:
             station.wait_for("HEARTBEAT")
             return [station.upload(plain_plan(count)) for count in (12, 1, 147)]
 
-    # A home point alone is read and rejected; 147 items are refused at their count.
+    # A single home point is requested and rejected; 147 items are refused at their count.
     assert await asyncio.to_thread(write) == [MissionResult.ACCEPTED, MissionResult.INVALID, MissionResult.NO_SPACE]
     after = read(metrics)
     assert after["fc_state", ("MSP",)] == 1
@@ -65,13 +65,13 @@ async def test_what_a_daemon_counts(tmp_path: Path) -> None:
     assert -90 < after["latitude_degrees", ()] < 90
     assert ("height_meters", ()) in after
     assert after["process_resident_memory_bytes", ()] > 1e6
-    # MISSION_ITEM_INT, each asked for until it is there.
+    # MISSION_ITEM_INT; lost ones are requested again.
     assert after["ground_received_frames_total", (str(link), "73")] >= 12
     answered = after["fc_round_trip_seconds_bucket", ("+Inf",)]
     assert answered == after["fc_round_trip_seconds_count", ()] >= 12
     assert answered >= after["fc_round_trip_seconds_bucket", ("0.1",)]
     assert 0 <= after["fc_round_trip_seconds_sum", ()] < answered
-    # Twelve items, three counts, and the greeting.
+    # Twelve items, three counts, and the heartbeat.
     assert after["link_received_pieces_total", (str(link),)] >= 15
     for way in ("received", "sent"):
         for name in ("fc", str(link)):

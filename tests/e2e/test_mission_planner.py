@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission Planner writes, reads, cancels and is refused, on clean links and on bad ones."""
+"""Mission Planner writes, reads, cancels and is refused, on good and bad links."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ from tests.support.plan import (
 )
 from tests.support.programs import until
 
-#: What a long-range radio does to a link.
+#: A link over a long-range radio.
 BAD_RADIO = {"loss": 0.1, "repeats": 0.05, "delay_s": 0.2}
 
 
@@ -45,7 +45,7 @@ def as_read(message: Message) -> tuple[float, ...]:
 
 
 def assert_reads(planner: MissionPlanner, plan: Sequence[PlanRow], *, use_int: bool = True) -> None:
-    """Assert that a Read shows what the rules say that became of `plan`."""
+    """Assert that a Read shows `plan` with the rules applied."""
     read = planner.read()
     assert all((message.autocontinue, message.current) == (1, 0) for message in read)
     assert [as_read(message) for message in read] == expected_fields(plan, use_int=use_int)
@@ -54,7 +54,7 @@ def assert_reads(planner: MissionPlanner, plan: Sequence[PlanRow], *, use_int: b
 # -- connecting ----------------------------------------------------------------------------------------------
 
 
-def test_connecting_leaves_nothing_unanswered(shared: Bench) -> None:
+def test_every_request_while_connecting_is_answered(shared: Bench) -> None:
     planner = shared.mission_planner()
     planner.connect()
     assert planner.vehicle == (1, 1)
@@ -86,7 +86,7 @@ def test_it_speaks_mavlink_1_until_it_has_seen_mavlink_2(shared: Bench) -> None:
         assert not planner.heard_in(1)
 
 
-def test_an_old_one_that_never_takes_mavlink_2_up(shared: Bench) -> None:
+def test_an_old_version_that_never_switches_to_mavlink_2(shared: Bench) -> None:
     planner = shared.mission_planner(mavlink_1_only=True)
     planner.connect()
     plan = mixed_plan(14)
@@ -101,7 +101,7 @@ def test_an_old_one_that_never_takes_mavlink_2_up(shared: Bench) -> None:
 
 @pytest.mark.parametrize("use_int", [True, False], ids=["int", "float"])
 @pytest.mark.parametrize("count", [12, 146])
-def test_a_write_reaches_the_board_as_the_rules_say(shared: Bench, count: int, use_int: bool) -> None:
+def test_a_write_is_stored_with_the_rules_applied(shared: Bench, count: int, use_int: bool) -> None:
     planner = shared.mission_planner()
     planner.connect()
     plan = mixed_plan(count)
@@ -111,13 +111,13 @@ def test_a_write_reaches_the_board_as_the_rules_say(shared: Bench, count: int, u
     assert shared.board.records() == records_of(verdict)
     assert shared.daemon.missions()[0]["outcome"] == "VERIFIED"
     assert_reads(planner, plan, use_int=use_int)
-    # Every change and drop that matters was said.
+    # Every important change and drop was reported.
     lines = finding_lines(verdict.findings)
     assert lines
     assert all(line in planner.said() for _, line in lines)
 
 
-def test_a_read_in_float_shows_the_same_list(shared: Bench) -> None:
+def test_a_read_of_float_items_shows_the_same_list(shared: Bench) -> None:
     planner = shared.mission_planner()
     plan = mixed_plan(13)
     planner.write(plan)
@@ -131,7 +131,7 @@ def test_a_read_in_float_shows_the_same_list(shared: Bench) -> None:
 
 
 @pytest.mark.parametrize(("count", "use_int"), [(12, False), (146, True)])
-def test_a_write_survives_that_it_eats_its_own_packets(shared: Bench, count: int, use_int: bool) -> None:
+def test_a_write_succeeds_although_its_loops_take_packets(shared: Bench, count: int, use_int: bool) -> None:
     planner = shared.mission_planner(appetite=0.2, seed=count + use_int)
     plan = plain_plan(count, start=count)
     planner.write(plan, use_int=use_int)
@@ -151,7 +151,7 @@ def test_a_write_and_a_read_survive_a_bad_radio(shared: Bench) -> None:
 
 
 @pytest.mark.parametrize(("count", "use_int"), [(40, False), (146, True)])
-def test_a_write_survives_loss_repeats_and_reordering(shared: Bench, count: int, use_int: bool) -> None:
+def test_a_write_survives_loss_duplication_and_reordering(shared: Bench, count: int, use_int: bool) -> None:
     link = shared.lossy_link(loss=0.1, repeats=0.05, delay_s=0.005, jitter_s=0.02, seed=use_int)
     planner = shared.mission_planner(link.address)
     plan = mixed_plan(count)
@@ -172,7 +172,7 @@ def test_write_fast(shared: Bench, count: int) -> None:
 
 
 def test_write_fast_over_a_bad_radio_is_whole_or_not_at_all(shared: Bench, kept: list[str]) -> None:
-    """It does not look whether its last burst arrived: then the list that was there stays, and the user is told."""
+    """It does not check that its last burst arrived; if not, the old list is kept and the user is told."""
     link = shared.lossy_link(**BAD_RADIO, seed=4)
     planner = shared.mission_planner(link.address, pace=1.0)
     plan = plain_plan(33, start=300)
@@ -183,26 +183,26 @@ def test_write_fast_over_a_bad_radio_is_whole_or_not_at_all(shared: Bench, kept:
 
 
 def _ended_with(bench: Bench, most: int) -> str | None:
-    """Return the outcome of the mission that came in last, if it is one of 20 to `most` items."""
+    """The outcome of the latest mission, if it has 20 to `most` items."""
     newest = bench.daemon.missions()[0]
     ended = newest["outcome"] != "PENDING" and 20 <= newest["item_count"] <= most
     return str(newest["outcome"]) if ended else None
 
 
-def test_a_second_write_right_behind_the_radius_waits_for_the_flash(bench: Bench) -> None:
+def test_a_second_write_right_after_the_radius_waits_for_the_flash(bench: Bench) -> None:
     planner = bench.mission_planner(pace=1.0)
     planner.connect()
     planner.write(plain_plan(12))
     planner.after_write(radius_m=4.0)
     assert planner.parameters["WPNAV_RADIUS"] == 400
-    # The radius is written to flash a second later; this list comes meanwhile and is judged by the new one.
+    # The radius is written to flash a second later; this list arrives before and is checked with the new one.
     plan = plain_plan(12, start=50)
     planner.write(plan)
     planner.wait_for_text("Hit Rad changed from 3 to 4 m")
     assert [record[26:28] for record in bench.board.records()] == ["04"] * 12
 
 
-def test_a_list_of_home_and_nothing_that_flies_clears(shared: Bench) -> None:
+def test_a_list_without_any_flown_item_clears(shared: Bench) -> None:
     planner = shared.mission_planner()
     planner.write(plain_plan(12))
     planner.write([HOME, PlanRow(178, p2=5.0)])
@@ -257,14 +257,14 @@ def test_a_list_that_breaks_a_rule(shared: Bench, kept: list[str], name: str) ->
     assert (newest["outcome"], newest["ack"]) == ("REJECTED", f"MAV_MISSION_{ack.name}")
 
 
-def test_a_refusal_reaches_a_user_whose_packets_are_eaten(shared: Bench, kept: list[str]) -> None:
+def test_a_refusal_reaches_the_user_although_loops_take_packets(shared: Bench, kept: list[str]) -> None:
     planner = shared.mission_planner(appetite=0.3, seed=5)
     assert refusal_of(planner, plain_plan(147)) is MissionResult.NO_SPACE
     assert refusal_of(planner, BAD_LISTS["land in the middle"][0]) is MissionResult.INVALID
     assert shared.board.records() == kept
 
 
-def test_fence_and_rally_points_are_refused_in_their_own_type(shared: Bench, kept: list[str]) -> None:
+def test_refused_fence_and_rally_points_keep_their_mission_type(shared: Bench, kept: list[str]) -> None:
     planner = shared.mission_planner()
     for mission_type in (1, 2):
         planner.send(messages.MAVLink_mission_count_message(1, 1, 5, mission_type))
@@ -286,7 +286,7 @@ def test_armed(bench: Bench) -> None:
     planner.wait_for_armed(True)
     assert refusal_of(planner, plain_plan(12, start=70)) is MissionResult.DENIED
     planner.wait_for_text("disarm to change the mission")
-    # It asks for home when the pilot arms.
+    # It requests home when the pilot arms.
     assert as_read(planner.read_item(0)) == expected_fields(plan)[0]
     bench.board.set("armed 0")
     planner.wait_for_armed(False)
@@ -295,7 +295,7 @@ def test_armed(bench: Bench) -> None:
     assert bench.board.records() != kept
 
 
-def test_arming_in_the_middle_ends_the_upload(bench: Bench) -> None:
+def test_arming_ends_the_upload(bench: Bench) -> None:
     planner = bench.mission_planner()
     planner.write(plain_plan(12))
     kept = bench.board.records()
@@ -307,17 +307,17 @@ def test_arming_in_the_middle_ends_the_upload(bench: Bench) -> None:
     assert bench.board.records() == kept
 
 
-def test_its_arm_button_is_answered_with_a_reason(shared: Bench) -> None:
+def test_its_arm_button_is_refused_with_a_reason(shared: Bench) -> None:
     planner = shared.mission_planner()
     assert planner.arm() == messages.MAV_RESULT_DENIED
     planner.wait_for_text("transmitter sticks")
     assert not shared.board.stats()["armed"]
 
 
-# -- what else goes wrong ------------------------------------------------------------------------------------
+# -- other faults ------------------------------------------------------------------------------------
 
 
-def test_a_lost_final_ack_is_given_again(shared: Bench) -> None:
+def test_a_lost_final_ack_is_sent_again(shared: Bench) -> None:
     link = shared.lossy_link()
     planner = shared.mission_planner(link.address)
     swallowed: list[bytes] = []
@@ -338,19 +338,19 @@ def test_a_lost_final_ack_is_given_again(shared: Bench) -> None:
     assert set(planner.acks()) == {MissionResult.ACCEPTED}
 
 
-def test_cancel_keeps_the_list_that_was_there(shared: Bench, kept: list[str]) -> None:
+def test_cancel_keeps_the_old_list(shared: Bench, kept: list[str]) -> None:
     planner = shared.mission_planner()
     planner.write_fast(plain_plan(40, start=100), cancel_at=20)
     planner.wait_for_ack(MissionResult.OPERATION_CANCELLED)
     planner.wait_for_text("old mission kept")
     assert shared.board.records() == kept
-    # And what was not cancelled in time is written: the next Write goes through at once.
+    # A list not cancelled in time is written; the next Write succeeds at once.
     plan = plain_plan(12, start=100)
     planner.write(plan)
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_a_user_who_goes_away_blocks_nobody(shared: Bench, kept: list[str]) -> None:
+def test_an_abandoned_upload_blocks_no_one(shared: Bench, kept: list[str]) -> None:
     gone = shared.mission_planner()
     gone.write_begun(plain_plan(30, start=100), 9)
     planner = shared.mission_planner()
@@ -360,7 +360,7 @@ def test_a_user_who_goes_away_blocks_nobody(shared: Bench, kept: list[str]) -> N
 
 
 @pytest.mark.parametrize("count", [12, 30])
-def test_a_write_that_is_started_again_starts_again(shared: Bench, count: int) -> None:
+def test_a_restarted_write_starts_from_the_beginning(shared: Bench, count: int) -> None:
     planner = shared.mission_planner()
     planner.write_begun(plain_plan(30, start=100), 9)
     plan = plain_plan(count, start=120)
@@ -368,8 +368,8 @@ def test_a_write_that_is_started_again_starts_again(shared: Bench, count: int) -
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_a_count_that_the_network_repeats_late_does_no_harm(shared: Bench) -> None:
-    """It would have to go back to item 0, which it never does: each wrong request costs it one of ten tries."""
+def test_a_late_duplicate_of_a_count_does_no_harm(shared: Bench) -> None:
+    """It never goes back to item 0, and each wrong request costs it one of ten tries."""
     planner = shared.mission_planner()
     plan = plain_plan(30, start=140)
     planner.write_begun(plan, 6)
@@ -379,8 +379,8 @@ def test_a_count_that_the_network_repeats_late_does_no_harm(shared: Bench) -> No
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_an_item_that_comes_before_it_was_asked_for(shared: Bench) -> None:
-    """A stale ack of the upload before is a go-ahead like any other."""
+def test_an_item_sent_before_its_request(shared: Bench) -> None:
+    """Mission Planner takes a stale ack of the previous upload for "continue"."""
     planner = shared.mission_planner()
     plan = plain_plan(20, start=180)
     planner.send(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The real DroneKit: its missions on an empty and on a full board.
 
-Its telemetry is in test_shown_telemetry.py, and a client with its habits in tests/bridge/test_dronekit.py.
+Its telemetry is tested in test_shown_telemetry.py; tests/bridge/test_dronekit.py has a scripted client like it.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ def download(vehicle: Any) -> Any:
 
 
 def upload(vehicle: Any, commands: Sequence[Any]) -> None:
-    """Item 0 stays the home that was downloaded."""
+    """Item 0 stays the downloaded home."""
     vehicle.commands.clear()
     for each in commands:
         vehicle.commands.add(each)
@@ -45,7 +45,7 @@ def test_an_empty_board_then_a_mission_then_a_full_board(shared: Bench) -> None:
         upload(vehicle, flight)
         until(lambda: len(shared.board.records()) == 4, "the mission in flash")
         assert [each.command for each in download(vehicle)] == [each.command for each in flight]
-        # A clear and a longer list at once; it reads no acknowledgement and repeats no MISSION_COUNT.
+        # A clear, then a longer list at once; it ignores acks and does not repeat MISSION_COUNT.
         upload(vehicle, [command(Command.NAV_WAYPOINT, HOME[0] + step * 1e-4, HOME[1], 20) for step in range(145)])
         until(lambda: len(shared.board.records()) == 146, "the long mission in flash")
         held = download(vehicle)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A running daemon's recordings: telemetry logs, and the flight controller's port, which is then replayed."""
+"""A running daemon's recordings: telemetry logs, and the flight controller's port, then replayed."""
 
 import os
 import signal
@@ -28,7 +28,7 @@ def msgid_of(frame: bytes) -> int:
 
 
 class Listener:
-    """A ground station that keeps the bytes that it heard and said."""
+    """A ground station that keeps all bytes received and sent."""
 
     def __init__(self, address: tuple[str, int]) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -68,7 +68,7 @@ Connect = Callable[[Daemon], Listener]
 
 @pytest.fixture
 def connect() -> Iterator[Connect]:
-    """Makes ground stations that have said hello to a daemon."""
+    """A factory of ground stations known to a daemon."""
     with ExitStack() as stack:
 
         def connected(daemon: Daemon) -> Listener:
@@ -89,7 +89,7 @@ def records_of(path: Path) -> list[TlogRecord]:
 
 
 @pytest.mark.parametrize("protocol", ["MSP", "MAVLink"])
-def test_a_telemetry_log_holds_what_was_heard_and_said(start: Starter, connect: Connect, protocol: str) -> None:
+def test_a_telemetry_log_holds_received_and_sent_frames(start: Starter, connect: Connect, protocol: str) -> None:
     board = start.board(*(("--armed", "--tele-prot", "2") if protocol == "MAVLink" else ()))
     daemon = start.daemon(str(board.link))
     daemon.wait(protocol)
@@ -107,9 +107,9 @@ def test_a_telemetry_log_holds_what_was_heard_and_said(start: Starter, connect: 
     if protocol == "MSP":
         assert recorded == listener.heard
     else:
-        # A flight is logged at the default rates, whenever a ground station's own frames are due.
+        # A flight is logged at the default rates, independently of a ground station's own rates.
         assert {msgid_of(frame) for frame in listener.heard} <= {msgid_of(frame) for frame in recorded}
-    # A log begins with the vehicle's heartbeat, not with the ground station's; the key is nowhere.
+    # A log begins with the vehicle's heartbeat, not the ground station's, and never contains the key.
     assert (records[0].frame.sysid, records[0].frame.msgid) == (1, HEARTBEAT)
     said = [frame for frame in listener.said if bytes(range(32)) not in frame]
     assert len(said) == len(listener.said) - 1
@@ -127,7 +127,7 @@ def test_a_telemetry_log_holds_what_was_heard_and_said(start: Starter, connect: 
     assert os.path.getmtime(path) - 60 < times[0] / 1e6 <= times[-1] / 1e6 <= os.path.getmtime(path) + 1
 
 
-def test_a_daemon_that_is_killed_loses_the_last_second_at_most(start: Starter, connect: Connect) -> None:
+def test_a_killed_daemon_loses_at_most_the_last_second(start: Starter, connect: Connect) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     listener = connect(daemon)
@@ -140,7 +140,7 @@ def test_a_daemon_that_is_killed_loses_the_last_second_at_most(start: Starter, c
     assert recorded
     assert recorded == listener.heard[: len(recorded)]
     lost = [frame for frame in listener.heard[len(recorded) :] if msgid_of(frame) == SYSTEM_STATE]
-    # There is one each second. (Heartbeats come more often at first, for a newcomer.)
+    # One is sent each second. (Heartbeats are faster at first, for a new station.)
     assert len(lost) <= 2
 
 
@@ -153,7 +153,7 @@ def test_a_second_start_begins_a_second_log(start: Starter, connect: Connect) ->
         daemon.kill_and_restart()
 
 
-def test_logs_that_cannot_be_written_are_reported_once_and_hold_nothing_up(start: Starter, connect: Connect) -> None:
+def test_unwritable_logs_are_reported_once_and_delay_nothing(start: Starter, connect: Connect) -> None:
     (start.directory / "state").mkdir()
     (start.directory / "state" / "logs").write_text("in the way")
     daemon = start.daemon("sim:")
@@ -166,7 +166,7 @@ def test_logs_that_cannot_be_written_are_reported_once_and_hold_nothing_up(start
     assert [event["event"] for event in daemon.events() if "tlog" in event["event"]] == ["tlog.stopped"]
 
 
-def test_the_status_tells_what_is_recorded(start: Starter, connect: Connect) -> None:
+def test_the_status_names_the_recordings(start: Starter, connect: Connect) -> None:
     capture = start.directory / "naze.uart"
     daemon = start.daemon("sim:", options=("--record-uart", str(capture)))
     daemon.wait()
@@ -194,14 +194,14 @@ def test_recording_can_be_switched_off(start: Starter, connect: Connect) -> None
 # -- the UART --------------------------------------------------------------------------------------------------------
 
 
-def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: Starter, connect: Connect) -> None:
-    """Recorded at the built-in simulator, killed, recorded on; then played on a port of its own."""
+def test_a_recorded_flight_controller_is_found_in_the_replay(start: Starter, connect: Connect) -> None:
+    """Recorded from the built-in simulator, with a kill in between; then replayed on another port."""
     capture = start.directory / "naze.uart"
     recorded = start.daemon("sim:", options=("--record-uart", str(capture)))
     recorded.wait()
     listener = connect(recorded)
     until(lambda: listener.has_heard(HEARTBEAT, 3), "telemetry")
-    # The last second may be lost, and with it, in a daemon so young, the beginning.
+    # The last second may be lost, which in such a short run includes the beginning.
     until(lambda: UartDeed.READ in [event.deed for event in read_capture(capture.read_bytes())], "a capture")
     recorded.kill_and_restart()
     recorded.wait()
@@ -225,7 +225,7 @@ def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: St
     listener = connect(daemon)
     until(lambda: listener.has_heard(messages.MAVLINK_MSG_ID_ATTITUDE, 3), "the recorded attitude")
     until(lambda: "The capture has ended" in player.printed, "the end")
-    # It continues with what it answered last.
+    # It keeps giving its last replies.
     daemon.wait()
     assert player.end() == 0
     assert not link.is_symlink()
@@ -249,7 +249,7 @@ def test_a_recorded_flight_controller_is_found_again_when_it_is_played(start: St
         ),
     ],
 )
-def test_what_cannot_be_recorded_or_played(
+def test_invalid_recordings_and_replays(
     tmp_path: Path, arguments: tuple[str, ...], status: int, complaint: str
 ) -> None:
     (tmp_path / "notes.txt").write_text("mine\n")

@@ -37,7 +37,7 @@ class ConfiguredDaemon:
         self._config.write_text(f"gcs = [{links}]\n{more}\n")
 
     def reload(self, word: str) -> None:
-        """Send SIGHUP, and wait for an event."""
+        """Send SIGHUP and wait for an event."""
         before = self.log.count(word)
         os.kill(self._program.process.pid, signal.SIGHUP)
         until(lambda: self.log.count(word) > before, word)
@@ -71,7 +71,7 @@ def test_links_come_and_go_while_the_others_continue(daemon: ConfiguredDaemon) -
     assert "config.needs_restart" not in daemon.log
 
 
-def test_a_port_that_is_taken_costs_only_that_link(daemon: ConfiguredDaemon) -> None:
+def test_an_occupied_port_affects_only_its_link(daemon: ConfiguredDaemon) -> None:
     with udp_station(("127.0.0.1", daemon.port)) as taken:
         own_port = taken.own_address[1]
         daemon.write(f'{daemon.first_link}, "udpin:127.0.0.1:{own_port}"')
@@ -80,7 +80,7 @@ def test_a_port_that_is_taken_costs_only_that_link(daemon: ConfiguredDaemon) -> 
         taken.wait_for("HEARTBEAT")
 
 
-def test_what_needs_a_restart_is_named(daemon: ConfiguredDaemon) -> None:
+def test_settings_that_need_a_restart_are_named(daemon: ConfiguredDaemon) -> None:
     daemon.write(daemon.first_link, 'sysid = 7\ntakeoff_max_m = 20\nlog_level = "debug"\n[zenoh]')
     daemon.reload("config.needs_restart")
     assert '"settings": ["sysid", "takeoff_max_m", "zenoh"]' in daemon.log
@@ -97,7 +97,7 @@ def test_write_access_is_not_changed_by_a_reload(daemon: ConfiguredDaemon) -> No
     assert '"taken_over": []' in daemon.log
 
 
-def test_a_broken_file_changes_nothing_and_is_explained(daemon: ConfiguredDaemon) -> None:
+def test_an_invalid_file_changes_nothing_and_is_explained(daemon: ConfiguredDaemon) -> None:
     daemon.write("", "sysidd = 1")
     daemon.reload("config.rejected")
     assert "gcs is empty" in daemon.log
@@ -113,7 +113,7 @@ def test_a_missing_file_changes_nothing(daemon: ConfiguredDaemon, start: Starter
     assert daemon.stations() == []
 
 
-def test_a_pipe_instead_of_the_file_holds_nothing_up(daemon: ConfiguredDaemon, start: Starter) -> None:
+def test_a_pipe_in_place_of_the_file_delays_nothing(daemon: ConfiguredDaemon, start: Starter) -> None:
     Path(start.directory / "config.toml").unlink()
     os.mkfifo(start.directory / "config.toml")
     daemon.reload("config.rejected")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Notifications to systemd, and the time to stop in the middle of a mission."""
+"""Notifications to systemd, and stopping during a mission transfer."""
 
 import asyncio
 import json
@@ -38,7 +38,7 @@ class Systemd:
         self._socket.bind(str(self.path))
 
     def listen(self) -> list[str]:
-        """Return all that was said so far."""
+        """All notifications so far."""
         while True:
             try:
                 self.heard.append(self._socket.recv(4096).decode())
@@ -55,47 +55,47 @@ class Systemd:
 
 @pytest.fixture
 def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Systemd]:
-    """Daemons that are started now find it."""
+    """A service manager for the daemons of a test."""
     with closing(Systemd(tmp_path)) as systemd:
         monkeypatch.setenv("NOTIFY_SOCKET", str(systemd.path))
         monkeypatch.setenv("WATCHDOG_USEC", "600000")
         yield systemd
 
 
-def test_ready_without_a_flight_controller_and_the_link_in_the_status(start: Starter, systemd: Systemd) -> None:
+def test_ready_without_a_flight_controller_and_the_status_has_the_link(start: Starter, systemd: Systemd) -> None:
     daemon = start.daemon(str(start.directory / "naze"))
     until(lambda: "READY=1" in systemd.listen(), "READY")
-    until(lambda: "is missing: plug the flight controller in" in systemd.status(), "a word on the port")
+    until(lambda: "is missing: plug the flight controller in" in systemd.status(), "the port in the status")
     assert systemd.status().endswith("; 0 ground stations")
     start.board()
     daemon.wait()
-    until(lambda: "(MSP, 115200 baud, disarmed); 0 ground stations" in systemd.status(), "a word on the link")
+    until(lambda: "(MSP, 115200 baud, disarmed); 0 ground stations" in systemd.status(), "the link in the status")
     with udp_station(daemon.address) as station:
         station.say_hello()
-        until(lambda: systemd.status().endswith("; 1 ground station"), "a word on the ground station")
+        until(lambda: systemd.status().endswith("; 1 ground station"), "the ground station in the status")
     assert daemon.end() == 0
     assert systemd.listen().count("READY=1") == systemd.listen().count("STOPPING=1") == 1
 
 
-async def more_food(systemd: Systemd, before: int) -> int:
-    """Return the watchdog's feed count once it has grown."""
+async def next_feed(systemd: Systemd, before: int) -> int:
+    """Wait until the watchdog is fed again; return the total count."""
     await until_async(lambda: systemd.listen().count("WATCHDOG=1") > before, "food")
     return systemd.listen().count("WATCHDOG=1")
 
 
-async def test_the_watchdog_is_fed_by_the_loop_that_owns_the_links(systemd: Systemd, tmp_path: Path) -> None:
-    """A hanging loop stops feeding it, whatever other threads do."""
+async def test_the_watchdog_is_fed_by_the_event_loop(systemd: Systemd, tmp_path: Path) -> None:
+    """A hung loop stops feeding it even if other threads run."""
     daemon = Daemon(Settings(parse_fc("sim:"), [parse_gcs(f"udpin:127.0.0.1:{free_port()}")], tmp_path / "state"))
     running = asyncio.create_task(run_until_signal(daemon, Notifier(), lambda: daemon.settings))
-    fed = await more_food(systemd, 2)
+    fed = await next_feed(systemd, 2)
     time.sleep(1.0)  # noqa: ASYNC251 - this is the hang; the watchdog would have waited for 0.6 s
     assert systemd.listen().count("WATCHDOG=1") == fed
-    await more_food(systemd, fed)
+    await next_feed(systemd, fed)
     running.cancel()
     await asyncio.wait([running])
 
 
-def test_a_start_that_fails_is_never_ready(start: Starter, systemd: Systemd) -> None:
+def test_a_failed_start_is_never_ready(start: Starter, systemd: Systemd) -> None:
     first = start.daemon("sim:")
     until(lambda: "READY=1" in systemd.listen(), "READY")
     systemd.heard.clear()
@@ -106,7 +106,7 @@ def test_a_start_that_fails_is_never_ready(start: Starter, systemd: Systemd) -> 
 
 
 def test_a_service_manager_in_the_abstract_namespace(tmp_path: Path) -> None:
-    """systemd names it with an @ in front."""
+    """systemd gives its name with a leading @."""
     name = f"naze-bridge-test-{tmp_path}"
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) as systemd:
         systemd.bind(f"\0{name}")
@@ -121,11 +121,11 @@ def test_a_service_manager_in_the_abstract_namespace(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("environment", [{"WATCHDOG_PID": "1"}, {"WATCHDOG_USEC": "soon"}, {}])
-def test_a_watchdog_that_is_not_for_us(environment: dict[str, str]) -> None:
+def test_a_watchdog_for_another_process_is_ignored(environment: dict[str, str]) -> None:
     assert Notifier({"WATCHDOG_USEC": "1000000", **environment}).watchdog_s == (None if environment else 1.0)
 
 
-def test_no_service_manager_and_one_that_is_gone(start: Starter, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_service_manager(start: Starter, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NOTIFY_SOCKET", str(start.directory / "nobody"))
     daemon = start.daemon("sim:")
     daemon.wait()
@@ -134,7 +134,7 @@ def test_no_service_manager_and_one_that_is_gone(start: Starter, monkeypatch: py
 
 
 def push_begun(daemon: DaemonProgram) -> socket.socket:
-    """Push a long list as the command line does; return the connection once the board has some of it."""
+    """Push a long list like the command line; return the connection once the board has part of it."""
     connection = socket.socket(socket.AF_UNIX)
     connection.settimeout(PATIENCE)
     connection.connect(str(daemon.state_dir / "control.sock"))
@@ -152,13 +152,13 @@ def last_answer(connection: socket.socket) -> dict[str, dict[str, object]]:
 
 
 def outcomes(start: Starter, daemon: DaemonProgram) -> list[str]:
-    """Ask another daemon on the same store."""
+    """The stored outcomes, read by another daemon on the same store."""
     after = start.daemon("sim:", state_dir=daemon.state_dir)
     after.wait_up()
     return [mission["outcome"] for mission in after.missions()]
 
 
-def test_a_push_that_is_nearly_done_is_done(start: Starter) -> None:
+def test_a_push_close_to_its_end_is_finished(start: Starter) -> None:
     bench = start.bench()
     connection = push_begun(bench.daemon)
     assert bench.daemon.end() == 0
@@ -168,15 +168,15 @@ def test_a_push_that_is_nearly_done_is_done(start: Starter) -> None:
 
 
 @pytest.mark.parametrize("trouble", ["slow", "deaf"])
-def test_a_push_that_would_take_long_is_given_up(start: Starter, trouble: str) -> None:
-    """The old list stays, the sender is told, the outcome is stored, and systemd waits for at most 2 s."""
+def test_a_push_that_would_take_long_is_aborted(start: Starter, trouble: str) -> None:
+    """The old list is kept, the sender is told, the outcome is stored, and systemd waits at most 2 s."""
     bench = start.bench("--baud", "9600") if trouble == "slow" else start.bench()
     bench.daemon.push(plain_plan(5))
     old = bench.board.records()
     connection = push_begun(bench.daemon)
     if trouble == "deaf":
         bench.board.set("hang 10")
-    # Neither is done before 2 s are over: what comes of it shows that no one waited for that.
+    # Neither push can finish within 2 s, so the result shows that the daemon did not wait.
     assert bench.daemon.end() == 0
     answer = last_answer(connection)["result"]
     assert answer["ack"] == "MAV_MISSION_DENIED"
@@ -198,8 +198,8 @@ def test_a_second_signal_does_not_wait(start: Starter) -> None:
     assert "Traceback" not in bench.daemon.printed
 
 
-def test_a_ground_station_hears_of_the_stop(start: Starter) -> None:
-    """Its upload is refused, and it is told why."""
+def test_a_ground_station_is_told_of_the_stop(start: Starter) -> None:
+    """Its upload is refused with the reason."""
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
         station.say_hello()

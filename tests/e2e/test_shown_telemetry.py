@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the real MAVSDK, MAVProxy and DroneKit show of a flown circle, beside what the simulated craft really did.
+"""The real MAVSDK, MAVProxy and DroneKit show a flown circle like the simulated craft flew it.
 
-Between a moment on board and the truth that is asked for lie the poll, the ground station's own rate and this process:
-half a second at most. The craft flies at 2.5 m/s on a circle of 25 m (6 degrees a second), and climbs at 2.5 m/s
-at first. Tolerances are what it does meanwhile, and what MSP rounds.
+Polls, the ground station's own rate and this process delay a value by half a second at most. The craft flies at
+2.5 m/s on a circle of 25 m (6 degrees a second) and initially climbs at 2.5 m/s. The tolerances are its motion
+during that delay and MSP's rounding.
 """
 
 import asyncio
@@ -33,10 +33,11 @@ DIRECTION_DEG = 6.0
 TILT_DEG = 1.0
 SPEED_MS = 0.1
 VOLTAGE_V = 0.1
-#: An estimate from the voltage of the craft's three cells; as far apart as VOLTAGE_V is on the curve at its steepest.
+#: Remaining charge is estimated from the voltage of three cells; the tolerance is VOLTAGE_V on the steepest part of the
+#: discharge curve.
 CELLS = 3
 REMAINING_PERCENT = 9
-#: By the box that is active.
+#: Mode by active box.
 MAVSDK_MODES = {
     1 << 0: "STABILIZED",
     1 << 2: "ALTCTL",
@@ -48,7 +49,7 @@ MAVSDK_MODES = {
 
 
 def truth(bench: Bench) -> dict[str, Any]:
-    """What the craft is doing: the fields of FlightState."""
+    """The craft's true state: the fields of FlightState."""
     craft = json.loads(bench.board.line("truth"))
     flight: dict[str, Any] = craft["flight"]
     return flight
@@ -65,7 +66,7 @@ def degrees_between(one: float, other: float) -> float:
 
 
 async def agrees(values: AsyncIterator[Any], check: Callable[[Any], None], times: int = 10) -> None:
-    """Check values as they come, until so many in a row agree: the first ones may be older than the flight."""
+    """Check values until `times` in a row pass: the first ones may be from before the flight."""
     agreed, failure = 0, None
     try:
         async with asyncio.timeout(PATIENCE):
@@ -82,7 +83,7 @@ async def agrees(values: AsyncIterator[Any], check: Callable[[Any], None], times
         raise failure or AssertionError(f"nothing came to {check.__name__}") from None
 
 
-async def test_mavsdk_shows_the_flight_as_it_is(bench: Bench) -> None:
+async def test_mavsdk_shows_the_flight_correctly(bench: Bench) -> None:
     bench.board.set("armed 1")
     async with vehicle_at(bench.daemon.port) as vehicle:
         telemetry = TelemetryAsync(vehicle)
@@ -136,7 +137,7 @@ async def test_mavsdk_shows_the_flight_as_it_is(bench: Bench) -> None:
 
 
 def shown_by(mavproxy: MavProxy, name: str) -> dict[str, float]:
-    """Return the fields of a message as MAVProxy's `status` prints them."""
+    """The fields of a message as printed by MAVProxy's `status`."""
     mavproxy.type(f"status {name}")
     printed = mavproxy.wait_for(f"{name} {{")
     (line,) = re.findall(rf"{name} {{(.*)}}", printed)
@@ -144,7 +145,7 @@ def shown_by(mavproxy: MavProxy, name: str) -> dict[str, float]:
     return {key.strip(): float(value) for key, value in fields if re.fullmatch(r"[-\d.e+]+", value)}
 
 
-def test_mavproxy_shows_the_flight_as_it_is(bench: Bench, tmp_path: Path) -> None:
+def test_mavproxy_shows_the_flight_correctly(bench: Bench, tmp_path: Path) -> None:
     modules = "--default-modules=wp,param,arm,mode,fence,battery"
     with MavProxy(tmp_path, bench.daemon.port, modules) as mavproxy:
         bench.board.set("armed 1")
@@ -171,7 +172,7 @@ def test_mavproxy_shows_the_flight_as_it_is(bench: Bench, tmp_path: Path) -> Non
 
 
 def check_position(bench: Bench, mavproxy: MavProxy) -> None:
-    """MAVProxy asks for four a second; a busy machine may print late, so it may try again."""
+    """MAVProxy requests four a second; a busy machine may print late, so retry."""
 
     def agrees_now() -> bool:
         position, now = shown_by(mavproxy, "GLOBAL_POSITION_INT"), truth(bench)
@@ -187,7 +188,7 @@ def shows_mode(vehicle: Any, name: str) -> bool:
     return shown == name
 
 
-def test_dronekit_shows_the_flight_as_it_is(bench: Bench) -> None:
+def test_dronekit_shows_the_flight_correctly(bench: Bench) -> None:
     bench.board.set("armed 1")
     with dronekit.vehicle_at(bench.daemon.port) as vehicle:
         assert dict(vehicle.parameters) == {"SYSID_THISMAV": 1, "WPNAV_RADIUS": 200}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon whose link requires a key or an address, and pymavlink as a ground station that signs."""
+"""A daemon whose link requires a key or an address, with pymavlink as a signing ground station."""
 
 import socket
 import time
@@ -23,7 +23,7 @@ KEY = key_from_passphrase(PASSPHRASE)
 
 
 class Field:
-    """A board, its daemon with one guarded UDP link, and stations that come to it."""
+    """A board, its daemon with one protected UDP link, and ground stations."""
 
     def __init__(self, start: Starter, stack: ExitStack, guard: str) -> None:
         self._stack = stack
@@ -72,8 +72,8 @@ def signed(station: PlainStation, message: Any) -> bytes:
     return bytes(message.pack(station._codec))
 
 
-def assert_nowhere_is_the_key(field: Field) -> None:
-    """Neither in the log nor in anything that the daemon has stored."""
+def assert_key_is_not_leaked(field: Field) -> None:
+    """It is neither in the log nor in any stored file."""
     places = [path for path in field.daemon.state_dir.rglob("*") if path.is_file()]
     assert any(path.suffix == ".tlog" and path.stat().st_size for path in places)
     for content in [field.daemon.printed.encode(), *(path.read_bytes() for path in places)]:
@@ -85,14 +85,14 @@ def test_only_the_key_allows_writing(keyed: Field) -> None:
     thief, pilot, other = keyed.station(), keyed.station(KEY), keyed.station(key_from_passphrase("guessed"), sysid=251)
     plan = plain_plan(9)
     assert thief.upload(plan) is MissionResult.DENIED
-    # Only who does not look at signatures can hear who has another key.
+    # A station with another key would drop all frames, so this one ignores signatures.
     other.announce(9)
     until(lambda: any("another key" in line for line in keyed.refused()), "the refusal")
     assert keyed.board.records() == []
     assert pilot.upload(plan) is MissionResult.ACCEPTED
     stored = keyed.board.records()
     assert len(stored) == 9
-    # All that the pilot takes is signed; the thief still reads.
+    # Every frame the pilot accepts is signed; the other station can still read.
     assert len(pilot.download()) == len(thief.download()) == 9
     thief.send(messages.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
     assert thief.wait_for("COMMAND_ACK").result == messages.MAV_RESULT_DENIED
@@ -108,10 +108,10 @@ def test_only_the_key_allows_writing(keyed: Field) -> None:
     assert sorted(event["why"] for event in refusals).count("not signed") == 1
     assert {event["level"] for event in refusals} == {"warning"}
     assert keyed.daemon.has_logged("gcs.open") is None
-    assert_nowhere_is_the_key(keyed)
+    assert_key_is_not_leaked(keyed)
 
 
-def test_a_recording_is_worth_nothing_even_after_a_restart(keyed: Field) -> None:
+def test_replayed_frames_are_refused_even_after_a_restart(keyed: Field) -> None:
     pilot = keyed.station(KEY)
     assert pilot.upload(plain_plan(5)) is MissionResult.ACCEPTED
     clear = signed(pilot, messages.MAVLink_mission_clear_all_message(1, 1))
@@ -128,9 +128,9 @@ def test_a_recording_is_worth_nothing_even_after_a_restart(keyed: Field) -> None
         keyed.daemon.process = keyed.daemon._start()
         keyed.daemon.wait()
     assert keyed.board.records() == stored
-    # The pilot continues where he was, and takes what the new daemon signs.
+    # The pilot continues and accepts the new daemon's signed frames.
     assert pilot.upload(plain_plan(4)) is MissionResult.ACCEPTED
-    assert_nowhere_is_the_key(keyed)
+    assert_key_is_not_leaked(keyed)
 
 
 def test_only_listed_addresses_may_write(start: Starter, stack: ExitStack) -> None:
@@ -142,7 +142,7 @@ def test_only_listed_addresses_may_write(start: Starter, stack: ExitStack) -> No
     assert field.daemon.has_logged("gcs.open") is None
 
 
-def test_an_open_link_is_reported_of_once(start: Starter) -> None:
+def test_an_open_link_is_reported_once(start: Starter) -> None:
     board = start.board()
     daemon = start.daemon(str(board.link))
     daemon.wait()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A daemon at full rate under all kinds of events and attacks, for half a minute; `make soak` runs longer."""
+"""A daemon at full rate under events and attacks of all kinds for half a minute; `make soak` runs longer."""
 
 import os
 import random
@@ -18,12 +18,12 @@ from tests.support.soak import Crowd, Meter, Stalls, Weather, Witness
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "0.5"))
 SEED = int(os.environ.get("SOAK_SEED", "1"))
-#: SQLite's page cache fills up to 2 MB, and Python seldom gives back what it had.
+#: SQLite's page cache grows to 2 MB, and Python seldom returns memory.
 MEMORY_KB = 3000
-#: What the simulated board counts of what a real one would suffer from. Not its receive ring: a board that hangs amid
-#: two chunks cannot keep them, and finds that by the checksum.
+#: The simulated board's counters of harmful events. Not overflows of its receive ring: they are unavoidable if it
+#: hangs during two chunks, and the checksum detects them.
 TRAPS = ("hazard_runs", "tx_overflows", "cli_entered")
-#: Each has its own way of arming.
+#: Each value arms differently.
 TELE_PROTS = (2, 0, 3, 1)
 
 
@@ -57,10 +57,10 @@ def test_soak(start: Starter, tmp_path: Path, capsys: pytest.CaptureFixture[str]
             while time.monotonic() < end:
                 crowd.act(board)
             weather[-1].end()
-            # It gets better, and all is well.
+            # After the events end, everything works.
             crowd.leave()
             daemon.wait()
-            until(partial(crowd.writes, board), "a mission in fine weather")
+            until(partial(crowd.writes, board), "a mission without disturbances")
             assert daemon.held()["records"] == board.records()
             boards.append({name: value for name, value in board.stats().items() if name in TRAPS})
             memory_kb.append(meter.memory_kb())
@@ -86,7 +86,7 @@ def test_soak(start: Starter, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def _settled(meter: Meter) -> int:
-    """Return how many descriptors are open when those of all who left are closed."""
+    """The number of open descriptors once former clients' are closed."""
     counts = [len(meter.descriptors())]
     while len(counts) < 10 or len(set(counts[-10:])) > 1:
         time.sleep(0.1)

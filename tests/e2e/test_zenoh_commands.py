@@ -47,7 +47,7 @@ def error(answers: list[Any]) -> str:
     return said
 
 
-def test_an_upload_tells_its_progress_and_its_result(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_an_upload_reports_its_progress_and_result(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     *progress, last = ask(opened, UPLOAD, mission_file(60), consolidation=zenoh.ConsolidationMode.NONE)
     assert [each["of"] for each in progress] == [60] * len(progress)
@@ -112,7 +112,7 @@ BAD_PAYLOADS = {
 
 
 @pytest.mark.parametrize("name", BAD_PAYLOADS)
-def test_what_is_not_a_mission_is_refused_with_a_reason(commanded: tuple[Bench, zenoh.Session], name: str) -> None:
+def test_an_invalid_mission_is_refused_with_a_reason(commanded: tuple[Bench, zenoh.Session], name: str) -> None:
     bench, opened = commanded
     before = bench.board.records()
     payload, reason = BAD_PAYLOADS[name]
@@ -123,7 +123,7 @@ def test_what_is_not_a_mission_is_refused_with_a_reason(commanded: tuple[Bench, 
 @pytest.mark.parametrize(
     "parameters", ["", "?number=", "?number=0", "?number=-1", "?number=1e3", "?number=" + "9" * 99]
 )
-def test_a_restore_of_nothing(commanded: tuple[Bench, zenoh.Session], parameters: str) -> None:
+def test_restoring_a_missing_mission(commanded: tuple[Bench, zenoh.Session], parameters: str) -> None:
     _, opened = commanded
     assert "restore?number=3" in error(ask(opened, RESTORE + parameters))
     assert "there is no mission 99999" in error(ask(opened, f"{RESTORE}?number=99999"))
@@ -139,7 +139,7 @@ def test_no_wildcard_sends_a_command(commanded: tuple[Bench, zenoh.Session]) -> 
 
 
 def test_one_transfer_at_a_time(commanded: tuple[Bench, zenoh.Session]) -> None:
-    """One of many at once is served, or one after the other; whoever is not hears why."""
+    """Of simultaneous requests, those not served get the reason."""
     bench, opened = commanded
     answers: list[Any] = []
     askers = [
@@ -159,7 +159,7 @@ def test_one_transfer_at_a_time(commanded: tuple[Bench, zenoh.Session]) -> None:
     assert f"{verified[0]['checksum']}" == bench.daemon.held()["checksum"]
 
 
-def test_an_armed_craft_is_left_alone(start: Starter) -> None:
+def test_nothing_is_written_while_armed(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
     with session(connect=where) as opened:
@@ -170,12 +170,12 @@ def test_an_armed_craft_is_left_alone(start: Starter) -> None:
             payload = mission_file(5) if suffix == UPLOAD else None
             said = error(ask(opened, suffix, payload))
             assert "rmed" in said or "No link" in said, suffix
-        until(lambda: bench.daemon.has_logged("zenoh.refused"), "a word in the log")
+        until(lambda: bench.daemon.has_logged("zenoh.refused"), "a log entry")
         assert bench.board.records() == before
     bench.board.assert_was_treated_well()
 
 
-def test_commands_are_off_unless_they_are_switched_on(start: Starter) -> None:
+def test_commands_are_off_by_default(start: Starter) -> None:
     where = endpoint()
     zenoh_bench(start, f'listen = ["{where}"]')
     with session(connect=where) as opened:
@@ -198,7 +198,7 @@ def test_a_command_without_a_flight_controller(start: Starter, tmp_path: Path) -
         assert (current["count"], current["items"]) == (None, None)
 
 
-def test_a_status_is_what_the_command_line_shows(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_the_status_equals_the_command_lines(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     (answer,) = ask(opened, STATUS)
     shown = bench.daemon.status()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A vehicle on a datagram link that loses: telemetry is not sent again, events and reports are recovered."""
+"""A vehicle on a lossy datagram link: telemetry is not repeated; events and reports are recovered."""
 
 import json
 from itertools import count
@@ -34,7 +34,7 @@ def test_a_link_that_loses_every_fourth_datagram(start: Starter, tmp_path: Path)
         numbers = count()
         air.swallow = lambda way, _: way is Way.TO_DAEMON and next(numbers) % 4 == 0
         until(lambda: has_gap([each["seq"] for each in reader.of("telemetry/attitude")]), "a lost sample")
-        # A report is asked for again once: if that reply were lost too, so would be the report.
+        # A report is requested again only once; if that reply is lost too, the report is lost.
         air.swallow = lambda way, _: way is Way.TO_DAEMON
         bench.daemon.push(plain_plan(5))
         air.swallow = lambda way, _: False

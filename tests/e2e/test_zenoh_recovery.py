@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nothing that matters is lost: cuts, late subscribers, recorders, and storages that answer for vehicles long gone."""
+"""Events and reports survive outages; late subscribers and recorders get them; storages answer for absent vehicles."""
 
 import signal
 from pathlib import Path
@@ -35,7 +35,7 @@ def test_events_and_reports_survive_a_router_that_hangs_and_dies(start: Starter,
     reports: list[Any] = []
     with running_router(tmp_path, where) as router, session(connect=where) as opened:
         subscribers = [recovering(opened, "event", events), recovering(opened, "mission/report", reports)]
-        until(lambda: any(each["event"] == "fc.found" for each in events), "what was said before")
+        until(lambda: any(each["event"] == "fc.found" for each in events), "earlier events")
         router.process.send_signal(signal.SIGSTOP)
         for count in range(4, 10):
             bench.daemon.push(plain_plan(count))
@@ -52,7 +52,7 @@ def test_events_and_reports_survive_a_router_that_hangs_and_dies(start: Starter,
     assert status["zenoh_dropped"] == 0
 
 
-def test_a_late_subscriber_hears_what_was_said(start: Starter) -> None:
+def test_a_late_subscriber_gets_earlier_events(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]')
     bench.daemon.push(plain_plan(7))
@@ -65,7 +65,7 @@ def test_a_late_subscriber_hears_what_was_said(start: Starter) -> None:
         del subscribers
 
 
-def test_the_past_can_be_asked_for(start: Starter) -> None:
+def test_past_events_can_be_queried(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]')
     bench.daemon.push(plain_plan(7))
@@ -79,7 +79,7 @@ def test_the_past_can_be_asked_for(start: Starter) -> None:
         assert "positions" in ask_surely(opened, "history?positions=0")["error"]
 
 
-def test_the_past_before_a_restart_is_in_the_telemetry_logs(start: Starter) -> None:
+def test_events_from_before_a_restart_are_read_from_telemetry_logs(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]')
     bench.daemon.push(plain_plan(7))
@@ -143,7 +143,7 @@ def test_replies_and_samples_have_a_time(start: Starter) -> None:
 
 
 def test_a_metered_link_and_a_request_for_more(start: Starter) -> None:
-    """Telemetry is rare, arming is not delayed, and a subscriber may ask for more."""
+    """Telemetry is infrequent, arming is not delayed, and a subscriber may request more."""
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\nprofile = "metered"\nrates = {{rc = 0}}\n{I_KNOW}')
     with session(connect=where) as opened:
@@ -151,7 +151,7 @@ def test_a_metered_link_and_a_request_for_more(start: Starter) -> None:
         reader.wait("telemetry/status")
         bench.board.set("armed 1")
         reader.wait("telemetry/status", lambda status: status["armed"])
-        # What has not changed is sent twice a minute.
+        # Unchanged groups are sent twice a minute.
         assert [status["armed"] for status in reader.of("telemetry/status")].count(True) == 1
         assert reader.of("telemetry/rc") == []
         (granted,) = ask(opened, "@cmd/v1/rates?attitude=5;for_s=30")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything that is published or replied is what the published schemas say, on every key and in both encodings."""
+"""Every sample and reply, on every key and in both encodings, matches the published schemas."""
 
 import json
 from pathlib import Path
@@ -35,7 +35,7 @@ def check(suffix: str, payload: Any) -> None:
 
 
 def check_all(reader: Reader, encoding: str) -> set[str]:
-    """Check all samples, and return which keys there were."""
+    """Check all samples and return their keys."""
     found: set[str] = set()
     for sample in reader.samples:
         suffix = str(sample.key_expr).removeprefix(key("@").removesuffix("@"))
@@ -54,7 +54,7 @@ def test_the_files_are_up_to_date() -> None:
 
 @pytest.mark.parametrize("encoding", ["json", "cbor"])
 def test_all_payloads_match_the_published_schemas(start: Starter, encoding: str) -> None:
-    """A pilot's day: telemetry, missions that are taken and refused, arming, the other protocol, a cut cable."""
+    """Telemetry, accepted and refused missions, arming, the other protocol, an unplugged cable."""
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\nencoding = "{encoding}"\n{I_KNOW}')
     with session(connect=where) as opened:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon in a fleet where everyone proves who it is, by the examples unchanged: what strangers may do."""
+"""The daemon in a fleet with authentication, using the unchanged examples, and attempts of strangers."""
 
 import datetime
 import json
@@ -53,7 +53,7 @@ def secured_bench(start: Starter, config: Path) -> Bench:
     return zenoh_bench(start, f'config_file = "{config}"\ncommands = true')
 
 
-def test_the_pilot_commands_and_a_guest_looks(start: Starter, fleet: Fleet) -> None:
+def test_the_pilot_commands_and_a_guest_only_reads(start: Starter, fleet: Fleet) -> None:
     bench = secured_bench(start, fleet.config("vehicle", "naze-1"))
     with fleet.open("pilot", "pilot") as pilot, fleet.open("pilot", "guest") as guest:
         ask_surely(pilot, UPLOAD, MISSION)
@@ -70,8 +70,8 @@ def test_the_pilot_commands_and_a_guest_looks(start: Starter, fleet: Fleet) -> N
     bench.board.assert_was_treated_well()
 
 
-def test_a_vehicle_that_may_not_publish_continues_flying(start: Starter, fleet: Fleet) -> None:
-    """The router denies it every key: it has another vehicle's name. The ground station notices nothing."""
+def test_a_vehicle_that_may_not_publish_keeps_working(start: Starter, fleet: Fleet) -> None:
+    """It has another vehicle's name, so the router denies it every key. The ground station notices nothing."""
     bench = secured_bench(start, fleet.config("vehicle", "naze-2"))
     with fleet.open("pilot", "pilot") as pilot:
         reader = Reader(pilot)
@@ -84,7 +84,7 @@ def test_a_vehicle_that_may_not_publish_continues_flying(start: Starter, fleet: 
     bench.board.assert_was_treated_well()
 
 
-def test_vehicles_whose_certificates_do_not_hold_say_so(tls: Fleet, stack: ExitStack, tmp_path: Path) -> None:
+def test_vehicles_with_invalid_certificates_report_it(tls: Fleet, stack: ExitStack, tmp_path: Path) -> None:
     own = trustme.CA.from_pem((tls.folder / "ca.pem").read_bytes(), (tls.folder / "ca.key").read_bytes())
     for name, issued in {
         "old": own.issue_cert("naze-1", common_name="naze-1", **EXPIRED),
@@ -100,7 +100,7 @@ def test_vehicles_whose_certificates_do_not_hold_say_so(tls: Fleet, stack: ExitS
         config = write_config(tmp_path / name, f'config_file = "{tls.config("vehicle", name)}"')
         daemons[name] = Starter(tmp_path / name, stack).daemon("sim:", options=("--config", str(config)))
     for name, said in wrong.items():
-        alone = until(partial(daemons[name].has_logged, "zenoh.alone"), "a word about the certificate")
+        alone = until(partial(daemons[name].has_logged, "zenoh.alone"), "a log entry about the certificate")
         assert said in alone["why"]
         daemons[name].wait()
         daemons[name].push(plain_plan(9))
@@ -108,20 +108,20 @@ def test_vehicles_whose_certificates_do_not_hold_say_so(tls: Fleet, stack: ExitS
 
 
 SETTINGS_THAT_END_IT = {
-    "a configuration that is not there": ('config_file = "nothing.json5"', None, "No such file"),
-    "a configuration that is none": ('config_file = "zenoh.json5"', "{mode: ", "zenoh.config_file"),
+    "a missing configuration": ('config_file = "nothing.json5"', None, "No such file"),
+    "an invalid configuration": ('config_file = "zenoh.json5"', "{mode: ", "zenoh.config_file"),
     "an unknown field": ('config_file = "zenoh.json5"', "{moode: 'peer'}", "unknown field `moode`"),
     "no endpoint": ('connect = ["tcp/"]', None, "zenoh.connect"),
-    "commands for everybody": ('listen = ["tcp/127.0.0.1:1"]\ncommands = true', None, "sessions accepted at tcp/"),
-    "frames for everybody": ('connect = ["tcp/127.0.0.1:1"]\nmavlink_in = true', None, "zenoh.mavlink_in is on"),
-    "a certificate that nobody asks for": (
+    "commands without authentication": ('listen = ["tcp/127.0.0.1:1"]\ncommands = true', None, "sessions accepted at tcp/"),
+    "mavlink_in without authentication": ('connect = ["tcp/127.0.0.1:1"]\nmavlink_in = true', None, "zenoh.mavlink_in is on"),
+    "TLS without client certificates": (
         'config_file = "zenoh.json5"\ncommands = true',
         json.dumps({"listen": {"endpoints": ["tls/127.0.0.1:1"]}}),
         "sessions accepted at tls/",
     ),
-    "half a knowledge": ('connect = ["tcp/127.0.0.1:1"]\ncommands = true\ncommands_without_authentication = "yes"',
+    "a wrong confirmation": ('connect = ["tcp/127.0.0.1:1"]\ncommands = true\ncommands_without_authentication = "yes"',
                          None, "I know"),
-    "scouting for commanders": (
+    "commands with multicast scouting": (
         'config_file = "zenoh.json5"\ncommands = true',
         json.dumps({"scouting": {"multicast": {"enabled": True}}}),
         "multicast scouting",
@@ -133,7 +133,7 @@ SETTINGS_THAT_END_IT = {
 
 
 @pytest.mark.parametrize("name", SETTINGS_THAT_END_IT)
-def test_settings_that_cannot_be_used_end_the_start_with_a_sentence(tmp_path: Path, name: str) -> None:
+def test_invalid_settings_stop_the_start_with_one_sentence(tmp_path: Path, name: str) -> None:
     table, zenoh_file, said = SETTINGS_THAT_END_IT[name]
     if zenoh_file is not None:
         (tmp_path / "zenoh.json5").write_text(zenoh_file)
@@ -147,8 +147,8 @@ def test_settings_that_cannot_be_used_end_the_start_with_a_sentence(tmp_path: Pa
 
 
 @pytest.mark.parametrize("of", ["zenoh-tls", "zenoh-password"])
-def test_the_examples_are_proof_enough_for_commands(tmp_path: Path, of: str) -> None:
-    """No "I know" is needed where everyone proves who it is."""
+def test_the_examples_allow_commands(tmp_path: Path, of: str) -> None:
+    """With authentication, "I know" is not needed."""
     example = Path(__file__).parents[2] / "examples" / of / "vehicle.json5"
     config = write_config(tmp_path, f'config_file = "{example}"\ncommands = true\nmavlink_in = true')
     settings = load_settings(config, "sim:", (), tmp_path)

@@ -47,7 +47,7 @@ with zenoh.open(config) as session, session.declare_subscriber("fleet/**") as su
 
 @contextmanager
 def stalled_subscriber(where: str) -> Iterator[None]:
-    """A subscriber of everything that is stopped after its first sample; its kernel takes what it still can."""
+    """A subscriber to all keys, stopped (SIGSTOP) after its first sample; its kernel buffers still fill."""
     with subprocess.Popen([sys.executable, "-c", _SUBSCRIBER, where], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
@@ -62,7 +62,7 @@ def count(bench: Bench, event: str) -> int:
     return sum(entry["event"] == event for entry in bench.daemon.events())
 
 
-def test_a_router_that_comes_late_goes_and_comes_back(start: Starter, tmp_path: Path) -> None:
+def test_a_router_that_starts_late_and_restarts(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     with running_router(tmp_path, where) as router, session(connect=where) as opened:
@@ -75,13 +75,13 @@ def test_a_router_that_comes_late_goes_and_comes_back(start: Starter, tmp_path: 
         heard = len(reader.samples)
         router.start_again()
         until(lambda: count(bench, "zenoh.joined") == 2, "the daemon's return")
-        until(lambda: len(reader.samples) > heard, "samples by the new router")
-        (state,) = until(lambda: ask(opened, "state"), "an answer by the new router")
+        until(lambda: len(reader.samples) > heard, "samples through the new router")
+        (state,) = until(lambda: ask(opened, "state"), "a reply through the new router")
         assert state["mission"]["count"] == 12
 
 
 def test_two_peers_without_a_router(start: Starter) -> None:
-    """The daemon was there first; who comes later gets what was said before from a query."""
+    """The later peer queries for earlier events."""
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     bench.daemon.push(plain_plan(12))
@@ -96,7 +96,7 @@ def test_two_peers_without_a_router(start: Starter) -> None:
 
 
 def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
-    """Mission Planner writes; the router gets a signal when it has begun. The board and the pilot notice nothing."""
+    """Signal the router during Mission Planner's upload, which must succeed."""
     planner = bench.mission_planner()
     plan = plain_plan(146)
     planner._start_upload(len(plan))
@@ -106,7 +106,7 @@ def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
     bench.board.assert_was_treated_well()
 
 
-def test_a_router_that_dies_in_the_middle_of_an_upload(start: Starter, tmp_path: Path) -> None:
+def test_a_router_that_dies_during_an_upload(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     with running_router(tmp_path, where) as router, session(connect=where) as opened:
@@ -114,7 +114,7 @@ def test_a_router_that_dies_in_the_middle_of_an_upload(start: Starter, tmp_path:
         upload_while(bench, router, signal.SIGKILL)
 
 
-def test_a_router_that_hangs_in_the_middle_of_an_upload(start: Starter, tmp_path: Path) -> None:
+def test_a_router_that_hangs_during_an_upload(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     with running_router(tmp_path, where) as router, session(connect=where) as opened:
@@ -123,8 +123,8 @@ def test_a_router_that_hangs_in_the_middle_of_an_upload(start: Starter, tmp_path
         assert bench.daemon.end() == 0
 
 
-def test_a_stalled_subscriber_holds_nothing_up(start: Starter) -> None:
-    """Not the missions, not other subscribers, not the daemon's end."""
+def test_a_stalled_subscriber_delays_nothing(start: Starter) -> None:
+    """Missions, other subscribers and the daemon's shutdown are unaffected."""
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
     with stalled_subscriber(where), session(connect=where) as opened:
@@ -132,15 +132,15 @@ def test_a_stalled_subscriber_holds_nothing_up(start: Starter) -> None:
         for number in range(6):
             bench.daemon.push(plain_plan(146, number))
         heard = len(reader.samples)
-        until(lambda: len(reader.samples) > heard + 20, "telemetry for the other one")
-        until(lambda: len(ask(opened, "state")) == 1, "an answer for the other one")
+        until(lambda: len(reader.samples) > heard + 20, "telemetry for the other subscriber")
+        until(lambda: len(ask(opened, "state")) == 1, "a reply to the other subscriber")
         bench.board.assert_was_treated_well()
         assert bench.daemon.end() == 0
     assert "Traceback" not in bench.daemon.printed
 
 
 @pytest.mark.parametrize("behind_a_router", [False, True])
-def test_two_vehicles_of_one_name_both_say_so(start: Starter, tmp_path: Path, *, behind_a_router: bool) -> None:
+def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Path, *, behind_a_router: bool) -> None:
     where = endpoint()
     with ExitStack() as stack:
         if behind_a_router:
@@ -154,7 +154,7 @@ def test_two_vehicles_of_one_name_both_say_so(start: Starter, tmp_path: Path, *,
         config = write_config(second_directory, f'connect = ["{where}"]')
         second = Starter(second_directory, stack).daemon("sim:", options=("--config", str(config)))
         for daemon in (first.daemon, second):
-            taken = until(partial(daemon.has_logged, "zenoh.name_taken"), "a word about the other one")
+            taken = until(partial(daemon.has_logged, "zenoh.name_taken"), "a log entry about the other vehicle")
             assert taken["vehicle"] == VEHICLE
         reader.wait("state", lambda state: state["others_of_this_name"] == 1)
         assert reader.events("zenoh.name_taken")
@@ -165,7 +165,7 @@ def test_two_vehicles_of_one_name_both_say_so(start: Starter, tmp_path: Path, *,
         until(lambda: first.daemon.has_logged("zenoh.name_free"), "the end of that")
 
 
-def test_mavlink_goes_out_while_it_is_read_and_comes_in(start: Starter) -> None:
+def test_mavlink_is_published_while_subscribed_and_received(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\nmavlink_in = true\ncommands_without_authentication = "I know"')
     decoder = MavlinkDecoder()
@@ -193,7 +193,7 @@ def test_mavlink_goes_out_while_it_is_read_and_comes_in(start: Starter) -> None:
         assert status["ground_stations"] == ["zenoh @mavlink/v1/out"]
 
 
-def test_nothing_comes_in_unless_it_is_switched_on(start: Starter) -> None:
+def test_incoming_mavlink_is_off_by_default(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
     with session(connect=where) as opened:
@@ -208,8 +208,8 @@ def test_nothing_comes_in_unless_it_is_switched_on(start: Starter) -> None:
         assert status["ground_stations"] == []
 
 
-def test_why_nobody_is_joined_is_said(start: Starter) -> None:
+def test_a_failed_connection_is_reported_with_its_reason(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
-    alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a word about it")
+    alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a log entry about it")
     assert alone["why"] == f"{where}: connection refused"
