@@ -112,8 +112,8 @@ SETTINGS_THAT_END_IT = {
     "an invalid configuration": ('config_file = "zenoh.json5"', "{mode: ", "zenoh.config_file"),
     "an unknown field": ('config_file = "zenoh.json5"', "{moode: 'peer'}", "unknown field `moode`"),
     "no endpoint": ('connect = ["tcp/"]', None, "zenoh.connect"),
-    "commands without authentication": ('listen = ["tcp/127.0.0.1:1"]\ncommands = true', None, "sessions accepted at tcp/"),
-    "mavlink_in without authentication": ('connect = ["tcp/127.0.0.1:1"]\nmavlink_in = true', None, "zenoh.mavlink_in is on"),
+    "commands, no login": ('listen = ["tcp/127.0.0.1:1"]\ncommands = true', None, "sessions accepted at tcp/"),
+    "mavlink_in, no login": ('connect = ["tcp/127.0.0.1:1"]\nmavlink_in = true', None, "zenoh.mavlink_in is on"),
     "TLS without client certificates": (
         'config_file = "zenoh.json5"\ncommands = true',
         json.dumps({"listen": {"endpoints": ["tls/127.0.0.1:1"]}}),
