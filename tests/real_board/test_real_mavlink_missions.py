@@ -10,8 +10,8 @@ def test_an_upload_becomes_the_stored_list(bench: RealBench, figure: Figure) -> 
     figure("MAVLink upload", "becomes the stored list")
 
 
-def test_an_upload_that_breaks_off_leaves_what_was_there(bench: RealBench, figure: Figure) -> None:
-    page.an_upload_that_breaks_off_leaves_what_was_there(bench)
+def test_an_interrupted_upload_keeps_the_old_list(bench: RealBench, figure: Figure) -> None:
+    page.an_interrupted_upload_keeps_the_old_list(bench)
     figure("MAVLink upload that breaks off", "leaves the old list, and none on a fresh board")
 
 

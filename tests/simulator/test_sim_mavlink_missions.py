@@ -11,7 +11,7 @@ def test_an_upload_becomes_the_stored_list() -> None:
 
 
 def test_an_interrupted_upload_keeps_the_old_list() -> None:
-    page.an_upload_that_breaks_off_leaves_what_was_there(Bench())
+    page.an_interrupted_upload_keeps_the_old_list(Bench())
 
 
 def test_an_upload_while_armed_is_an_error() -> None:
