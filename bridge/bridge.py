@@ -18,7 +18,6 @@ from bridge.fc.actions import FcActions
 from bridge.fc.msp_sharing import MspSharing
 from bridge.fc.profile import FlightController, RuleSettings
 from bridge.fc.session import FcSession
-from bridge.fc.states.mavlink import Mavlink
 from bridge.gcs.ground import FrameListener, Ground
 from bridge.gcs.guard import Guard
 from bridge.gcs.pass_through import PassThrough
@@ -39,6 +38,7 @@ from bridge.vehicle.mission_watch import MissionWatch
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from bridge.vehicle.vehicle_report import VehicleReporter
+from protocols.mavlink.frame import MavlinkFrame
 from protocols.mission_item import MissionResult
 
 
@@ -51,6 +51,8 @@ class Bridge:
         self._config = config
         self._log_event = log_event
         self._was_armed = False
+        #: True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes.
+        self.is_passing_through = False
         self._announcer = LinkAnnouncer()
         incidents = Incidents()
 
@@ -72,7 +74,7 @@ class Bridge:
             log_event,
             incidents,
             self._controller_changed,
-            lambda frames: self._incoming.from_autopilot(frames),
+            self._mavlink_received,
             config.autopilot,
         )
         vehicle = self.session.vehicle
@@ -94,11 +96,6 @@ class Bridge:
         )
 
     # The flight controller's side.
-
-    @property
-    def is_passing_through(self) -> bool:
-        """True while an autopilot speaks MAVLink itself: the bridge then does not wait for particular bytes."""
-        return self._incoming.routes is not None and isinstance(self.session.state, Mavlink)
 
     def fc_received(self, data: bytes, now: float) -> None:
         """Handle bytes from the port."""
@@ -193,6 +190,7 @@ class Bridge:
     def _controller_changed(self, controller: FlightController | None, now: float) -> None:
         self._downloads.forget_all()
         vehicle = self.session.vehicle
+        self.is_passing_through = controller is not None and controller.profile.is_passed_through
         if controller is None:
             trouble = self.session.trouble
             self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK)
@@ -201,11 +199,15 @@ class Bridge:
             return
         store = controller.open_store(vehicle, RuleSettings(self._config.takeoff_max_m))
         self.missions.use(store)
-        self._incoming.routes = PassThrough(self.ground) if controller.profile.is_passed_through else None
+        self._incoming.routes = PassThrough(self.ground) if self.is_passing_through else None
         self._say(self._announcer.found(controller, now))
         if not isinstance(store, Refusal):
             # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
             self._watch.look(now)
+
+    def _mavlink_received(self, frames: list[MavlinkFrame]) -> None:
+        if self._incoming.routes is not None:
+            self._incoming.routes.from_autopilot(frames)
 
     def _pass_on_news(self, now: float) -> None:
         self.report.now = now

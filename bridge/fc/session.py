@@ -19,7 +19,6 @@ from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
 from bridge.model.events import EventLog, Incidents, Level
-from bridge.model.vehicle import Vehicle
 from protocols.mavlink.frame import MavlinkFrame
 
 #: State -> event, or what was found -> next state. Any other event in a state is a bug.
@@ -66,16 +65,13 @@ class FcSession:
         self._incident = ""
         self._on_change = on_change
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
+        #: Its readings, kept when it is lost.
+        self.vehicle = self._port.vehicle
 
     @property
     def controller(self) -> FlightController | None:
         """The flight controller on the line; None until it is identified."""
         return self.state.controller
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """Its readings, kept when it is lost."""
-        return self._port.vehicle
 
     @property
     def link(self) -> MspLink | None:

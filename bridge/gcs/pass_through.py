@@ -11,13 +11,15 @@ from collections.abc import Sequence
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import messages
-from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.target import target_of, without_target
+from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
+from protocols.mavlink.target import has_target_field, target_of
 
 #: Mission Planner, QGroundControl, MAVSDK and MAVProxy read several frames in a datagram; MAVROS cuts at 296 bytes.
 MAX_DATAGRAM_SIZE = 280
 #: Ids remembered behind one peer: a router may carry a fleet, but made-up ids must not fill the memory.
 _MAX_SPEAKERS = 64
+#: Messages remembered that have no target: all of one dialect from a few components.
+_MAX_KINDS = 1024
 #: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
 
@@ -29,13 +31,20 @@ class PassThrough:
         self._ground = ground
         self._aboard: set[tuple[int, int]] = set()
         self._heard: dict[Peer, set[tuple[int, int]]] = {}
+        #: Messages without a target, by the bytes of the header that hold sender and message id.
+        self._for_all: set[bytes] = set()
 
     def from_autopilot(self, frames: Sequence[MavlinkFrame]) -> None:
-        """Send the autopilot's frames on."""
-        self._aboard.add(frames[0].sender)
-        for_all = without_target(frames)
-        if for_all is not None:
-            self._send(for_all)
+        """Send the autopilot's frames on; those that arrived together share datagrams unless one has a target."""
+        raws: list[bytes] = []
+        for frame in frames:
+            raw = frame.raw
+            kind = raw[5:10] if raw[0] == MAGIC_V2 else raw[3:6]
+            if kind not in self._for_all and not self._is_for_all(kind, frame):
+                break
+            raws.append(raw)
+        else:
+            self._send(raws)
             return
         for frame in frames:
             self._send_alone(frame)
@@ -80,6 +89,15 @@ class PassThrough:
             return any(sysid == system and component in (0, compid) for sysid, compid in behind)
 
         return [peer for peer in self._ground.peers() if is_there(peer)]
+
+    def _is_for_all(self, kind: bytes, frame: MavlinkFrame) -> bool:
+        """Meet a new kind of message from a component aboard; True if it has no target field."""
+        if has_target_field(frame.msgid):
+            return False
+        self._aboard.add(frame.sender)
+        if len(self._for_all) < _MAX_KINDS:
+            self._for_all.add(kind)
+        return True
 
     def _send_alone(self, frame: MavlinkFrame) -> None:
         self._aboard.add(frame.sender)

@@ -47,14 +47,14 @@ class MavlinkLine:
         """Take bytes from the port; return the whole frames."""
         self._last_byte_at = now
         frames = self._splitter.feed(data)
-        self._note(frames, now)
+        if frames:
+            self._note(frames, now)
         if self._is_harakiri and self._msp.feed(data):
             self.ended = "it answers MSP again"
         return frames
 
     def _note(self, frames: list[MavlinkFrame], now: float) -> None:
-        if frames:
-            self._heard_at = now
+        self._heard_at = now
         if not self._is_harakiri:
             return
         for frame in frames:
@@ -85,7 +85,8 @@ class MavlinkLine:
         frames: list[MavlinkFrame] = []
         if self._splitter.is_waiting and now >= self._last_byte_at + _LINE_SILENCE_S:
             frames = self._splitter.reset()
-            self._note(frames, now)
+            if frames:
+                self._note(frames, now)
         # Checked ten times a second rather than after each byte: a timer per byte would cost more than the frames.
         self._look_at = now + _LINE_SILENCE_S
         if now >= self._silent_at:

@@ -205,11 +205,6 @@ class Incoming:
                         self._router.take(station, message, now)
         return True
 
-    def from_autopilot(self, frames: list[MavlinkFrame]) -> None:
-        """Pass on frames from the line."""
-        if self.routes is not None:
-            self.routes.from_autopilot(frames)
-
     def forget(self, peer: Peer) -> None:
         """A ground station is gone."""
         self._guard.forget(peer)

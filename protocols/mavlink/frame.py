@@ -109,19 +109,16 @@ class MavlinkSplitter:
         """True while a frame is incomplete."""
         return bool(self._buffer)
 
-    def feed(self, data: bytes) -> list[MavlinkFrame]:
-        """Take received bytes; return the completed frames."""
-        return self._split(self._buffer + data, is_end=False)
-
     def reset(self) -> list[MavlinkFrame]:
         """Drop an incomplete frame (silence, end of a datagram); return the frames found in its bytes."""
-        return self._split(self._buffer, is_end=True)
+        return self.feed(b"", is_end=True)
 
-    def _split(self, data: bytes, *, is_end: bool) -> list[MavlinkFrame]:
-        """Return the frames in `data` and keep its incomplete rest; at an end there is no rest.
+    def feed(self, data: bytes, *, is_end: bool = False) -> list[MavlinkFrame]:
+        """Take received bytes; return the completed frames. At an end an incomplete one is dropped.
 
         One loop, with no call per frame except the CRC's: this is the main cost of forwarding a frame.
         """
+        data = self._buffer + data
         frames: list[MavlinkFrame] = []
         start, size = 0, len(data)
         while start < size:

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The target of a frame, read from its bytes without decoding it."""
 
-from collections.abc import Sequence
-
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 
@@ -19,16 +17,9 @@ _PLACES = {
 }
 
 
-def without_target(frames: Sequence[MavlinkFrame]) -> list[bytes] | None:
-    """Return the frames' bytes if none of their messages has a target field, as in telemetry; else None.
-
-    One check for all frames that arrived together, because it runs for every forwarded frame.
-    """
-    raws = [frame.raw for frame in frames]
-    for raw in raws:
-        if (raw[7:10] if raw[0] == MAGIC_V2 else raw[5:6]) in _PLACES:
-            return None
-    return raws
+def has_target_field(msgid: int) -> bool:
+    """True if a message can name a target."""
+    return msgid.to_bytes(3, "little") in _PLACES
 
 
 def target_of(frame: MavlinkFrame) -> tuple[int, int]:

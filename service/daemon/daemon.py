@@ -243,8 +243,9 @@ class Daemon:
 
     def _send_datagrams(self) -> None:
         for peer, data in self.bridge.ground.take_datagrams():
-            self._links[peer.link].send(peer, data)
-            traffic = self.traffic[peer.link]
+            link = peer.link
+            self._links[link].send(peer, data)
+            traffic = self.traffic[link]
             traffic.pieces_sent += 1
             traffic.bytes_sent += len(data)
 

@@ -21,10 +21,10 @@ _READ_SIZE = 4096
 _RETRY_S = 0.25
 #: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
-#: Above this rate, wake-ups cost more than this delay is worth. Timers are rounded up to whole ms.
-_GATHER_ABOVE_HZ = 1000
-_GATHER_S = 0.0019
+#: So many reads within this time cost more than the delay of gathering is worth. Timers are rounded up to whole ms.
+_MANY_READS = 100
 _RATE_WINDOW_S = 0.1
+_GATHER_S = 0.0019
 
 _log = structlog.get_logger()
 
@@ -50,6 +50,8 @@ class FcPort:
         self._on_close = on_close
         self._loop = asyncio.get_running_loop()
         self._device: Device | None = None
+        self._descriptor = -1
+        self._is_tcp = False
         self._speed: int | None = None
         self._unsent = bytearray()
         self._closed = asyncio.Event()
@@ -59,9 +61,9 @@ class FcPort:
         #: Reads may be delayed by a few ms at high rates, because no reply is pending.
         self.may_gather = False
         self._gathering: asyncio.TimerHandle | None = None
-        self._window_ends = 0.0
+        self._window_began = 0.0
         self._reads = self._bytes = 0
-        self._gathered_rate = 0.0
+        self._gather_above = 0.0  # bytes in a window
 
     async def run(self) -> None:
         """Open the port and keep reopening it; cancel to end."""
@@ -73,9 +75,11 @@ class FcPort:
                     self._complain(str(error))
                     await asyncio.sleep(_RETRY_S)
                     continue
+                self._descriptor = self._device.fileno()
+                self._is_tcp = isinstance(self._device, socket.socket) and self._device.family != socket.AF_UNIX
                 self.trouble = ""
                 self._closed.clear()
-                self._loop.add_reader(self._device.fileno(), self._readable)
+                self._loop.add_reader(self._descriptor, self._readable)
                 self._on_open()
                 await self._closed.wait()
         finally:
@@ -110,12 +114,11 @@ class FcPort:
         sent = self._try_write(data)
         if sent < len(data) and self._device is not None:
             self._unsent += data[sent:]
-            self._loop.add_writer(self._device.fileno(), self._writable)
+            self._loop.add_writer(self._descriptor, self._writable)
 
     def _try_write(self, data: bytes | bytearray) -> int:
-        assert self._device is not None
         try:
-            return os.write(self._device.fileno(), data)
+            return os.write(self._descriptor, data)
         except (BlockingIOError, InterruptedError):
             return 0
         except OSError as error:
@@ -128,22 +131,22 @@ class FcPort:
         sent = self._try_write(self._unsent)
         del self._unsent[:sent]
         if not self._unsent and self._device is not None:
-            self._loop.remove_writer(self._device.fileno())
+            self._loop.remove_writer(self._descriptor)
 
     def _readable(self) -> None:
         data = self._read()
         if data:
             self._on_data(data)
-        if self.may_gather and self._device is not None:
-            self._reads += 1
-            self._bytes += len(data)
+        self._reads += 1
+        self._bytes += len(data)
+        if self._reads >= _MANY_READS:
+            # Time is looked at only now: at each read it would cost too much.
             now = self._loop.time()
-            if now >= self._window_ends:
-                if self._reads > _GATHER_ABOVE_HZ * _RATE_WINDOW_S and now < self._window_ends + _RATE_WINDOW_S:
-                    self._loop.remove_reader(self._device.fileno())
-                    self._gathered_rate = self._bytes / 2
-                    self._gathering = self._loop.call_later(_GATHER_S, self._gather)
-                self._begin_window(now)
+            if self.may_gather and self._device is not None and now < self._window_began + _RATE_WINDOW_S:
+                self._loop.remove_reader(self._descriptor)
+                self._gather_above = 0.75 * self._bytes
+                self._gathering = self._loop.call_later(_GATHER_S, self._gather)
+            self._begin_window(now)
 
     def _gather(self) -> None:
         """Read the bytes of one delay, until the rate drops."""
@@ -153,16 +156,16 @@ class FcPort:
         self._gathering = self._loop.call_later(_GATHER_S, self._gather)
         self._bytes += len(data)
         now = self._loop.time()
-        if now >= self._window_ends:
-            if self._bytes < self._gathered_rate or not self.may_gather:
+        if now >= self._window_began + _RATE_WINDOW_S:
+            if self._bytes < self._gather_above or not self.may_gather:
                 self._stop_gathering()
-                self._loop.add_reader(self._device.fileno(), self._readable)
+                self._loop.add_reader(self._descriptor, self._readable)
             self._begin_window(now)
         if data:
             self._on_data(data)
 
     def _begin_window(self, now: float) -> None:
-        self._window_ends = now + _RATE_WINDOW_S
+        self._window_began = now
         self._reads = self._bytes = 0
 
     def _stop_gathering(self) -> None:
@@ -171,9 +174,8 @@ class FcPort:
             self._gathering = None
 
     def _read(self) -> bytes:
-        assert self._device is not None
         try:
-            data = os.read(self._device.fileno(), _READ_SIZE)
+            data = os.read(self._descriptor, _READ_SIZE)
         except (BlockingIOError, InterruptedError):
             return b""
         except OSError as error:
@@ -181,17 +183,26 @@ class FcPort:
             return b""
         if not data:
             self._shut("the other end closed the connection")
-        else:
-            _acknowledge(self._device)
+        elif self._is_tcp:
+            self._acknowledge()
         return data
+
+    def _acknowledge(self) -> None:
+        """Let the TCP connection acknowledge received bytes at once, not 40 ms later.
+
+        INAV 6.1's simulator and cheap serial adapters send replies byte by byte, and wait for this after the first one.
+        """
+        assert isinstance(self._device, socket.socket)
+        with suppress(OSError):
+            self._device.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
 
     def _shut(self, why: str) -> None:
         device, self._device = self._device, None
         if device is None:
             return
         self._stop_gathering()
-        self._loop.remove_reader(device.fileno())
-        self._loop.remove_writer(device.fileno())
+        self._loop.remove_reader(self._descriptor)
+        self._loop.remove_writer(self._descriptor)
         self._unsent.clear()
         self._speed = None
         device.close()
@@ -202,13 +213,3 @@ class FcPort:
         level = _log.debug if why == self.trouble else _log.warning
         level("fc.port_unavailable", why=why)
         self.trouble = why
-
-
-def _acknowledge(device: Device) -> None:
-    """Let a TCP connection acknowledge received bytes at once, not 40 ms later.
-
-    INAV 6.1's simulator and cheap serial adapters send replies byte by byte, and wait for this after the first one.
-    """
-    if isinstance(device, socket.socket) and device.family != socket.AF_UNIX:
-        with suppress(OSError):
-            device.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)

@@ -53,9 +53,9 @@ class Mavlink(State):
         if frames:
             self.telemetry.take(frames, now)
             self.port.on_mavlink(frames)
-        if self.port.runner.is_busy:
-            for frame in frames:
-                self.port.runner.received_mavlink(frame, now)
+            if self.port.runner.is_busy:
+                for frame in frames:
+                    self.port.runner.received_mavlink(frame, now)
         return Lost(self._line.ended) if self._line.ended else None
 
     def _profile(self, heard: MavlinkFrame | None) -> Profile:
