@@ -29,8 +29,8 @@ _NEVER = {
     0x3001: "BIND",
 }
 #: Without a payload a request only reads, except for these: DATAFLASH_ERASE, calibrations, RESET_CONF, RESET_CURR_PID,
-#: BIND (240 and 241 on MultiWii), EEPROM_WRITE, OPFLOW_CALIBRATION.
-_ACTIONS = frozenset((72, 205, 206, 208, 219, 240, 241, 250, 0x2032))
+#: BIND (MultiWii), EEPROM_WRITE, OPFLOW_CALIBRATION.
+_ACTIONS = frozenset((72, 205, 206, 208, 219, 241, 250, 0x2032))
 _DATAFLASH_READ = 71
 #: With a payload it is a change, except for these, which say what to read: OSD_CHAR_READ, WP, VTXTABLE_BAND,
 #: VTXTABLE_POWERLEVEL, SETTING, SETTING_INFO, PG_LIST, TIMER_OUTPUT_MODE, OSD_LAYOUTS, SAFEHOME,
@@ -73,7 +73,7 @@ class MspSharing:
         if link is None or self._session.controller is None:
             return "no flight controller speaks MSP now"
         if self._session.vehicle.armed is not False:
-            return "armed, or not known to be disarmed"
+            return "the craft is armed" if self._session.vehicle.armed else "not yet known to be disarmed"
         if self._pending >= _MAX_PENDING:
             return "too many requests at once"
         if frame.command in _NEVER:

@@ -117,6 +117,7 @@ async def test_armed_nothing_is_carried(monkeypatch: pytest.MonkeyPatch) -> None
         monkeypatch.setattr(type(daemon.bridge.session.vehicle), "armed", True)
         (reply,) = await program.ask(IDENT)
         assert reply.direction is Direction.ERROR
+        assert list(daemon.share_refused) == ["the craft is armed"]
 
 
 async def test_a_mission_transfer_is_not_disturbed() -> None:
