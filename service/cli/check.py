@@ -21,6 +21,7 @@ from protocols.mission_record import identify
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_json, print_table
+from service.cli.sentences import complain, say
 from service.control.mission_data import verdict_data
 from service.settings import SettingsError, takeoff_limit_m
 
@@ -125,7 +126,7 @@ def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, s
         if as_json:
             print_json({"file": name, "error": str(error)})
         else:
-            click.echo(f"naze-bridge: {error}", err=True)
+            complain(error)
         return ExitCode.UNREADABLE
     verdict = check_list(sent, rules, home)
     if as_json:
@@ -142,7 +143,7 @@ def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]
     click.secho(name, bold=True)
     if verdict.ack is not MissionResult.NO_SPACE:
         print_table(mission_table(sent, verdict.items, verdict.findings))
-    click.echo(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n")
+    say(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n")
 
 
 def _summary(sent: int, verdict: Verdict[Any]) -> str:

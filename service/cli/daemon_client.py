@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from service.cli.printing import fail
+from service.cli.sentences import complain, fail
 from service.control.client import ControlError, Interrupted, NoDaemonError, ask_daemon
 from service.control.mission_data import Json
 from service.settings import SettingsError, default_state_dir
@@ -57,7 +57,7 @@ def ask(
         return asyncio.run(ask_directly(parse_fc(fc), request, progress))
     except (KeyboardInterrupt, Interrupted) as error:
         said = _LEFT if fc is None and request["do"] in _WRITES else str(error) or "interrupted"
-        click.echo(f"naze-bridge: {said}", err=True)
+        complain(said)
         raise SystemExit(_INTERRUPTED) from None
     except (AddressError, SettingsError) as error:
         raise click.UsageError(str(error)) from error

@@ -21,7 +21,8 @@ from protocols.mission_item import MissionItem, MissionResult
 from service.cli.mission_client import ClientError, connect
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
-from service.cli.printing import fail, print_table
+from service.cli.printing import print_table
+from service.cli.sentences import fail
 from service.control.client import ControlError, ask_daemon
 from service.control.mission_data import Json, mission_items
 from service.machine.host import Host

@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 import click
 
 from service.cli.command_group import LazyCommand, LazyGroup
+from service.cli.sentences import complain
 
 _COMMANDS = {
     "setup": LazyCommand("service.cli.setup.command:setup", "Set this Raspberry Pi up: UART, Wi-Fi, page, service."),
@@ -41,16 +42,19 @@ class _Main(LazyGroup):
         """
         try:
             code = super().main(*args, **kwargs | {"standalone_mode": False})
+        except click.exceptions.NoArgsIsHelpError as error:
+            error.show()
+            sys.exit(error.exit_code)
         except click.ClickException as error:
-            click.echo(f"naze-bridge: {error.format_message()}", err=True)
+            complain(error.format_message())
             sys.exit(error.exit_code)
         except click.Abort:
-            click.echo("naze-bridge: interrupted", err=True)
+            complain("interrupted")
             sys.exit(_INTERRUPTED)
         except OSError as error:
             if error.errno not in _UNWRITABLE:
                 raise
-            click.echo(f"naze-bridge: the output cannot be written: {error.strerror}", err=True)
+            complain(f"the output cannot be written: {error.strerror}")
             # The unwritten buffer would fail again at the interpreter's exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(os.EX_IOERR)

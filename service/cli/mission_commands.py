@@ -12,7 +12,8 @@ from protocols.mission_file import MissionFileError, write_mission_file, write_q
 from service.cli.daemon_client import ask, ask_with_progress, bridge_options
 from service.cli.mission_source import load_mission, save_mission
 from service.cli.mission_table import mission_table
-from service.cli.printing import fail, print_json, print_table
+from service.cli.printing import print_json, print_table
+from service.cli.sentences import complain, fail, say
 from service.control.mission_data import Json, mission_items
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
@@ -35,7 +36,7 @@ def push(file: Path, erase: bool, state_dir: Path | None, fc: str | None, as_jso
     try:
         items = load_mission(file)
     except MissionFileError as error:
-        click.echo(f"naze-bridge: {error}", err=True)
+        complain(error)
         raise SystemExit(_UNREADABLE) from error
     request: Json = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}
     delivery = ask_with_progress(state_dir, fc, request | {"may_erase": erase}, len(items))
@@ -113,7 +114,7 @@ def show_delivery(delivery: Json, *, as_json: bool) -> None:
             sent, stored = (mission_items(delivery[key]) for key in ("sent", "stored"))
             findings = [Finding(**finding) for finding in delivery["findings"]]
             print_table(mission_table(sent, stored, findings))
-        click.echo(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
+        say(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
     if _would_erase(delivery):
         raise SystemExit(_WOULD_ERASE)
     if delivery["ack"] != _ACCEPTED:

@@ -8,6 +8,7 @@ import click
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
+from service.cli.sentences import complain
 from service.machine.bounded_file import read_bounded
 
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
@@ -18,7 +19,7 @@ def load_mission(path: Path) -> list[MissionItem]:
     name = click.format_filename(path)
 
     def note(text: str) -> None:
-        click.echo(f"naze-bridge: {name}, {text}", err=True)
+        complain(f"{name}, {text}")
 
     return read_mission_file(mission_bytes(path), name, note)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The output of commands: tables without trailing blanks, strict JSON, and one sentence on failure."""
+"""The output of commands: tables without trailing blanks, and strict JSON."""
 
 import re
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import click
 
@@ -27,9 +27,3 @@ def print_table(table: "RenderableType") -> None:
 def print_json(value: object) -> None:
     """Print one line of JSON."""
     click.echo(to_json(value))
-
-
-def fail(text: str) -> NoReturn:
-    """End the program with one sentence and status 1."""
-    click.echo(f"naze-bridge: {text}", err=True)
-    raise SystemExit(1)

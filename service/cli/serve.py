@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.cli.printing import fail
+from service.cli.sentences import fail
 from service.control.client import ControlError, socket_of_daemon
 from service.daemon.api import ControlServer
 from service.daemon.daemon import Daemon

@@ -8,6 +8,7 @@ import click
 
 from service.cli.daemon_client import ask, bridge_options
 from service.cli.printing import print_json
+from service.cli.sentences import say
 from service.control.client import STATUS
 from service.control.mission_data import Json
 from service.machine.host import Host
@@ -28,7 +29,7 @@ def status(state_dir: Path | None, fc: str | None, as_json: bool) -> None:
     lines = list(status_lines(facts, Host().ipv4_addresses()))
     width = max(len(name) for name, _ in lines)
     for name, text in lines:
-        click.echo(f"{name:{width}}  {text}")
+        say(text, prefix=f"{name:{width}}  ", indent=width + 2)
 
 
 def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]:

@@ -3,6 +3,7 @@
 
 from datetime import datetime
 from pathlib import Path
+from typing import NoReturn
 
 import click
 from rich.table import Table
@@ -14,10 +15,17 @@ from service.cli.daemon_client import ask_store, ask_with_progress, bridge_optio
 from service.cli.mission_commands import show_delivery
 from service.cli.mission_table import difference_table, mission_table
 from service.cli.printing import print_json, print_table
+from service.cli.sentences import say
 from service.control.mission_data import MOST, Json, mission_items
 from service.web.comparison import difference
 
-_NUMBER = click.IntRange(1, MOST)
+
+class _Number(click.IntRange):
+    def fail(self, message: str, param: click.Parameter | None = None, ctx: click.Context | None = None) -> NoReturn:
+        raise click.UsageError(f"{message.split()[0]} is not a mission's number: see `naze-bridge missions list`", ctx)
+
+
+_NUMBER, _LIMIT = _Number(1, MOST), click.IntRange(1, MOST)
 
 
 @click.group(cls=CommandGroup)
@@ -29,7 +37,7 @@ def missions() -> None:
 
 
 @missions.command("list")
-@click.option("--limit", type=_NUMBER, default=20, show_default=True, help="The maximum number of missions.")
+@click.option("--limit", type=_LIMIT, default=20, show_default=True, help="The maximum number of missions.")
 @daemon_options
 def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
     """List the received missions, newest first."""
@@ -62,7 +70,7 @@ def show(number: int, state_dir: Path | None, as_json: bool) -> None:
     findings = [Finding(**finding) for finding in received["findings"]]
     print_table(mission_table(mission_items(received["items"]), mission_items(received["stored_items"]), findings))
     click.echo(f"{_local_time(received['received_at'])} from {received['source']}")
-    click.echo(f"{received['verdict']} ({received['ack']}), {mission['outcome']}: {mission['detail']}")
+    say(f"{received['verdict']} ({received['ack']}), {mission['outcome']}: {mission['detail']}")
 
 
 @missions.command()
@@ -84,7 +92,7 @@ def diff(first: int, second: int, state_dir: Path | None, as_json: bool) -> None
         raise SystemExit(1)
 
 
-@missions.command()
+@missions.command(short_help="Write mission NUMBER to the flight controller again.")
 @click.argument("number", type=_NUMBER)
 @bridge_options
 def restore(number: int, state_dir: Path | None, fc: str | None, as_json: bool) -> None:

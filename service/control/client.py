@@ -46,7 +46,7 @@ def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[int], 
             remedy = "use sudo, or join the group that the daemon runs as (dialout, as a service)"
             raise ControlError(f"no permission to ask the daemon on {path}: {remedy}") from error
         except OSError as error:
-            remedy = "start one (sudo systemctl start naze-bridge, or naze-bridge run), or use --fc directly"
+            remedy = "start one (sudo systemctl start naze-bridge, or naze-bridge run), or use --fc FC"
             raise NoDaemonError(f"no daemon answers on {path}: {remedy}") from error
         with suppress(ConnectionError):
             # A refusal may arrive in the middle of a long request: read it.

@@ -5,6 +5,7 @@ import re
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 UNKNOWN_HOST_HINT = "check the name and the network, or give the address in numbers"
 
@@ -78,7 +79,7 @@ _GCS_ALIASES = {
     "tcps": "tcpin",
 }
 _EVERY_ADDRESS = ("", "0.0.0.0", "[::]")  # noqa: S104  # ground stations may come over any network
-_FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim:"
+_FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim"
 _GCS_FORMS = "use udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT or tcpin:HOST:PORT"
 _PORT_NAMES = ("tty", "serial", "rfcomm", "naze")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
@@ -138,10 +139,19 @@ def parse_gcs(text: str) -> GcsAddress:
             raise AddressError(f"{text!r}: write {sending}{kind}in:0.0.0.0:{port} to listen for ground stations")
         kind += "in"
     if not colon or kind not in _GCS_KINDS:
-        raise AddressError(f"{text!r} is not a ground station connection: {_GCS_FORMS}")
+        raise AddressError(f"{text!r} is not a ground station connection: {_meant_gcs(word, rest)}{_GCS_FORMS}")
     if kind in ("udpin", "tcpin") and not host and port.isdecimal():
         host = "0.0.0.0"  # noqa: S104  # as above
     return GcsAddress(kind, *parse_host_port(text, f"{host}:{port}" if host else rest, _GCS_FORMS))
+
+
+def _meant_gcs(word: str, rest: str) -> str:
+    near = get_close_matches(word.lower(), _GCS_KINDS, n=1)
+    if near and rest:
+        return f"did you mean {near[0]}:{rest}? Else "
+    if rest.isdecimal():
+        return f"did you mean udpout:{word}:{rest}? Else "
+    return f"did you mean udpin:{word}? Else " if word.isdecimal() else ""
 
 
 def family_of(host: str) -> socket.AddressFamily:

@@ -12,6 +12,7 @@ import click
 from service.cli.daemon_client import SERVICE_STATE
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.printing import print_json
+from service.cli.sentences import say
 from service.control.client import STATUS, ControlError, ask_daemon
 from service.control.mission_data import Json
 from service.machine.host import Host
@@ -29,7 +30,7 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
     "--config",
     type=click.Path(path_type=Path),
     envvar=CONFIG_VARIABLE,
-    help=f"The daemon's configuration. Default: {SERVICE_CONFIG}, if it exists.",
+    help="The daemon's configuration. Default: the service's, if it is installed.",
 )
 @click.option("--state-dir", type=click.Path(path_type=Path), help="The daemon's folder for missions.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each check.")
@@ -89,6 +90,6 @@ def _tell(checked: Checked, *, as_json: bool) -> None:
         print_json(asdict(checked) | {"grade": checked.grade.value})
         return
     grade = click.style(f"{checked.grade.value:7}", fg=_COLOURS[checked.grade], bold=checked.grade is Grade.PROBLEM)
-    click.echo(f"{grade}  {checked.check}: {checked.found}")
-    if checked.remedy:
+    say(f"{checked.check}: {checked.found}", prefix=f"{grade}  ", indent=9)
+    if checked.remedy:  # one line, so that a command can be copied
         click.echo(f"{'':7}  -> {checked.remedy}")

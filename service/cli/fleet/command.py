@@ -28,7 +28,8 @@ from service.cli.fleet.tables import complaints, fleet_table
 from service.cli.fleet.watch import watching
 from service.cli.fleet.watch_screen import print_changes, show_screen
 from service.cli.mission_source import save_mission
-from service.cli.printing import fail, print_json, print_table
+from service.cli.printing import print_json, print_table
+from service.cli.sentences import fail
 
 _STANDARD_OUTPUT = Path("-")
 
@@ -67,7 +68,7 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
         click.echo(f"No vehicle is alive under {prefix!r}.")
 
 
-@fleet.command()
+@fleet.command(short_help="Show which vehicles are alive, until Ctrl-C.")
 @address_options
 @where_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each change.")
@@ -83,7 +84,7 @@ def watch(as_json: bool, conditions: list[Condition], **where: Any) -> None:
             return
 
 
-@fleet.command("pull")
+@fleet.command("pull", short_help="Read the missions of vehicles' flight controllers.")
 @click.argument("path", type=PATH, required=False)
 @vehicle_option
 @address_options
@@ -114,7 +115,7 @@ def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **wh
         raise SystemExit(1)
 
 
-@fleet.command()
+@fleet.command(short_help="Connect a ground station with one vehicle, until Ctrl-C.")
 @click.option("--vehicle", "name", metavar="NAME", required=True, help="The vehicle to connect with.")
 @click.option(
     "--gcs",

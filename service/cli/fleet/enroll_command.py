@@ -7,11 +7,11 @@ import click
 
 from service.cli.fleet.enrolment import EnrolmentError, FleetFolder, Role
 from service.cli.fleet.options import PATH
-from service.cli.printing import fail
+from service.cli.sentences import fail
 from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettingsError
 
 
-@click.command()
+@click.command(short_help="Add a vehicle or a person to a fleet.")
 @click.argument("name")
 @click.option(
     "--role",

@@ -11,7 +11,7 @@ import zenoh
 
 from service.cli.fleet.conditions import FIELDS, parse_condition
 from service.cli.fleet.session import DEFAULT_ENDPOINT, FleetAddress, FleetError, open_session
-from service.cli.printing import fail
+from service.cli.sentences import fail
 from service.settings.zenoh import ZenohSettings, ZenohSettingsError, check_name
 
 #: The exit status of a shell after Ctrl-C.

@@ -34,12 +34,13 @@ from service.cli.fleet.tables import (
 from service.cli.fleet.trial import Trial, try_mission
 from service.cli.mission_source import mission_bytes
 from service.cli.printing import print_json, print_table
+from service.cli.sentences import complain
 
 _UNREADABLE = 2
 _GOES_ON = "stopped; transfers in progress continue: `naze-bridge fleet verify` shows their results later"
 
 
-@click.command("push")
+@click.command("push", short_help="Write a mission file to vehicles, and verify it.")
 @click.argument("file", type=PATH)
 @vehicle_option
 @all_option
@@ -82,13 +83,13 @@ def push_mission(
         print_table(push_table(delivery))
         click.echo(push_summary(delivery))
     if is_stopped:
-        click.echo(f"naze-bridge: {_GOES_ON}", err=True)
+        complain(_GOES_ON)
         raise SystemExit(INTERRUPTED)
     if delivery.failed:
         raise SystemExit(1)
 
 
-@click.command("verify")
+@click.command("verify", short_help="Compare the missions on vehicles with a file.")
 @click.argument("file", type=PATH)
 @vehicle_option
 @all_option
@@ -122,7 +123,7 @@ def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]
         mission = mission_bytes(file)
         return mission, len(read_mission_file(mission, click.format_filename(file)))
     except MissionFileError as error:
-        click.echo(f"naze-bridge: {error}", err=True)
+        complain(error)
         raise SystemExit(_UNREADABLE) from error
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from service.cli.doctor.command import diagnose
-from service.cli.printing import fail
+from service.cli.sentences import fail
 from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
 from service.machine.host import Host
@@ -48,6 +48,8 @@ def setup(
 
     Exit code 0: done, 1: a change failed, or doctor found a problem.
     """
+    if not (dry_run or is_root()):
+        fail("setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run")
     host = Host(root)
     try:
         fc = str(parse_fc(fc))
@@ -79,8 +81,6 @@ def setup(
     if dry_run:
         return
     if steps:
-        if not is_root():
-            fail("these changes need root: run it again as `sudo naze-bridge setup`")
         if not yes and not click.confirm("Make these changes?", default=True):
             raise click.Abort
         _carry_out(steps, Machine(host))

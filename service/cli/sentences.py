@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sentences on the terminal: wrapped between words there, whole lines in a file or pipe."""
+
+import shutil
+import sys
+import textwrap
+from typing import NoReturn
+
+import click
+
+
+def say(text: str, *, to_error: bool = False, prefix: str = "", indent: int = 0) -> None:
+    """Print `text` after `prefix`, which is `indent` columns wide; further lines are indented as much."""
+    if (sys.stderr if to_error else sys.stdout).isatty():
+        width = max(shutil.get_terminal_size().columns - indent, 20)
+        fit = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False)
+        text = f"\n{'':{indent}}".join(piece for line in text.splitlines() for piece in fit.wrap(line) or [""])
+    click.echo(prefix + text, err=to_error)
+
+
+def complain(text: object) -> None:
+    """Print one sentence after the program's name to standard error."""
+    say(f"naze-bridge: {text}", to_error=True)
+
+
+def fail(text: str) -> NoReturn:
+    """End the program with one sentence and status 1."""
+    complain(text)
+    raise SystemExit(1)
