@@ -180,6 +180,25 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     assert world.bridge.missions.held is None
 
 
+def test_a_multiwii_that_arms_while_it_is_read_is_sent_no_write() -> None:
+    """Not even the one that clears the record in RAM: telemetry has not noticed arming yet."""
+    multiwii = FakeMultiwii()
+    world, station = found(multiwii)
+    assert Upload(station, plan(10)).run() is ACCEPTED
+    honest = multiwii.read
+
+    def read(number: int) -> bytes:
+        if number and not multiwii.armed:
+            multiwii.armed = True
+            multiwii.commands.clear()
+        return honest(number)
+
+    multiwii.read = read  # type: ignore[method-assign]
+    world.run(3)
+    assert multiwii.armed
+    assert Nav.SET_WP not in multiwii.commands
+
+
 def test_a_save_that_fails_is_reported() -> None:
     inav = FakeInav()
     world, station = found(inav)

@@ -70,8 +70,9 @@ class MultiwiiMissions(NavMissions):
         return is_same
 
     def _clear_step(self) -> Conversation[None]:
-        if self._profile.capacity < _NOT_STORED and not self._vehicle.armed:
-            with suppress(LinkLost):
+        """Clear the record in RAM, unless the craft is armed or may be: telemetry may not have noticed arming yet."""
+        with suppress(LinkLost):
+            if self._profile.capacity < _NOT_STORED and (yield from self._ask_armed()) is False:
                 yield from ask(encode_set_wp(_NOT_STORED, _CLEARED), Nav.SET_WP, 0)
 
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
