@@ -8,9 +8,6 @@ from bridge.line.conversation import LinkLost
 from bridge.missions.mission_service import MissionChange
 from bridge.vehicle.mission_context import MissionContext
 
-#: The least pause between two checks, as a part of the time that the first one took.
-_PAUSE = 0.25
-
 
 class MissionWatch:
     """Checks as often as the store needs it, while no transfer runs."""
@@ -20,13 +17,12 @@ class MissionWatch:
         self._is_looking = False
         #: The time of the next `tick`.
         self.due = inf
-        self._began_at = 0.0
 
     def look(self, now: float) -> None:
         """Check now: a flight controller was found."""
         self.due = now + self._interval_s
         if not self._is_looking:
-            self._is_looking, self._began_at = True, now
+            self._is_looking = True
             self._context.runner.start(self._context.missions.is_outdated(), self._looked, now, in_background=True)
 
     def tick(self, now: float) -> None:
@@ -53,8 +49,6 @@ class MissionWatch:
 
     def _caught_up(self, news: MissionChange | LinkLost | None, now: float) -> None:
         self._is_looking = False
-        # On a slow line, some of the time is left to others.
-        self.due = max(self.due, now + (now - self._began_at) * _PAUSE)
         if not isinstance(news, MissionChange):
             return
         self._context.ground.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)

@@ -288,6 +288,25 @@ def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> 
     assert f"Mission on the flight controller changed: {CAPACITY} records" in " ".join(station.texts())
 
 
+@pytest.mark.parametrize("streams_hz", [0, 50])
+def test_a_former_list_that_is_loaded_again_is_noticed_within_two_seconds(streams_hz: int) -> None:
+    """Another client has changed one of many records and not saved its list; the sticks bring the saved one back."""
+    board, world, station = board_with(serial_task_ms=10.0)
+    ours = packed(plan(CAPACITY + 1))
+    assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
+    for stream in range(1, 13) if streams_hz else ():
+        station.send(messages.MAVLink_request_data_stream_message(1, 1, stream, streams_hz, 1))
+    records = [*ours[:76], packed(plan(CAPACITY + 1, 3))[76], *ours[77:]]
+    mission = board._firmware._mission  # type: ignore[union-attr]
+    for number, record in enumerate(records, 1):
+        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+    world.run(10)
+    assert [record.pack() for record in world.bridge.missions.held.records] == records  # type: ignore[union-attr]
+    board.faults.stick_loads += 1
+    world.run(2.0)
+    assert [record.pack() for record in world.bridge.missions.held.records] == ours  # type: ignore[union-attr]
+
+
 def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete() -> None:
     bench = Bench(9)
     before = len(bench.station.texts())

@@ -9,6 +9,7 @@ and watched in between.
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import ceil
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.items import home_item, item_seqs, items_from_records
@@ -45,9 +46,12 @@ from protocols.msp.telemetry import decode_status
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
 _STATUS_PAYLOAD = 11
 _TRIES = 5
-#: Records compared in one check: more of a long list, but not too many, because a transfer has to wait until it ends.
-_LEAST_COMPARED, _MOST_COMPARED = 4, 8
-_PART_COMPARED = 7
+#: A list is compared within this many checks, a quarter of a second each, but not too many records in one: other
+#: changes, and transfers, have to wait until it ends.
+_CHECKS = 6
+_LEAST_COMPARED, _MOST_COMPARED = 4, 12
+#: So many former lists are remembered: LOAD, or another client, is likely to bring one of them back.
+_FORMER = 3
 #: Restarts of one push after a read-back mismatch.
 _MAX_BEGINS = 3
 
@@ -58,7 +62,11 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
     #: True if storing a record stalls it.
     _stores_slowly = False
     watch_s = 0.25
-    #: The number of the record that was compared last.
+    #: The list that was compared last, the ones before it, and the records by which they differ from it.
+    _watched: tuple[NavRecord, ...] = ()
+    _former: tuple[tuple[NavRecord, ...], ...] = ()
+    _telling: tuple[int, ...] = ()
+    #: The number of the record that was compared last, those apart.
     _compared = 0
 
     def __init__(self, profile: NavProfile, controller: FlightController, vehicle: Vehicle) -> None:
@@ -118,6 +126,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
             failure, writing = PushFailure.UNCERTAIN, False
             yield from self._keep()
             self._known = records
+            self._watch(records)
             return PushResult(None)
         except Stopped:
             if failure is PushFailure.NO_ANSWER or (writing and (yield from self._restore_at_once(before))):
@@ -216,14 +225,26 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
                     return answer[1]
         return None
 
-    def _has_same_records(self, known: Sequence[NavRecord], before: int = 0) -> Conversation[bool]:
-        """Compare some records, the next ones each time; `before`: records in the store before the first."""
-        for _ in known[: max(_LEAST_COMPARED, min(len(known) // _PART_COMPARED, _MOST_COMPARED))]:
-            self._compared = self._compared % len(known) + 1
-            held = yield from self.read(before + self._compared)
-            if held is not None and held != known[self._compared - 1]:
+    def _has_same_records(self, known: tuple[NavRecord, ...], before: int = 0) -> Conversation[bool]:
+        """Compare some records; `before`: records in the store before the first.
+
+        These are the next ones each time, and those that would show that a former list is back.
+        """
+        self._watch(known)
+        count = min(max(_LEAST_COMPARED, ceil(len(known) / _CHECKS)), _MOST_COMPARED, len(known))
+        following = [(self._compared + step) % len(known) + 1 for step in range(count)]
+        for number in (*self._telling, *following):
+            held = yield from self.read(before + number)
+            if held is not None and held != known[number - 1]:
                 return False
+        self._compared = following[-1] if following else 0
         return True
+
+    def _watch(self, known: tuple[NavRecord, ...]) -> None:
+        if known != self._watched:
+            self._former = (self._watched, *[former for former in self._former if former != known])[:_FORMER]
+            self._telling = tuple({number for former in self._former for number in _first_difference(known, former)})
+            self._watched, self._compared = known, 0
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Write the old list again, if known; True if it is there."""
@@ -248,6 +269,12 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
         status = None if reply is None else decode_status(reply.payload)
         return None if status is None else bool(status.box_flags & self._arm_mask)
+
+
+def _first_difference(known: Sequence[NavRecord], former: Sequence[NavRecord]) -> list[int]:
+    """The number of the first record that differs, if there is one."""
+    pairs = enumerate(zip(known, former, strict=False), 1)
+    return [number for number, (one, other) in pairs if one != other][:1]
 
 
 def _frame(number: int, record: NavRecord) -> bytes:
