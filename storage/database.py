@@ -2,18 +2,28 @@
 """Open the database file: check its integrity, make commits durable, migrate it to this release's schema.
 
 Every start checks for damage, because SD cards decay and lose power. A damaged file is neither repaired
-nor deleted: it is renamed so that `sqlite3` can still open it, and a new one takes its place.
+nor deleted: it is renamed so that `sqlite3` can still open it, and a new one takes its place. SQLite detects damaged
+page structures, but not a changed byte in a value: so every row has a checksum.
 """
 
 import sqlite3
 import struct
+import zlib
+from collections.abc import Iterable
 from contextlib import ExitStack, closing
 from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 
-from storage.checksums import row_crc32
 from storage.store_error import FAILURES, StoreError, explained, primary_code
+
+#: The columns of `missions` that its crc32 covers.
+SUMMARY = (
+    "number, received_at, source, verdict, ack, item_count, finding_count, record_count, checksum, outcome, detail,"
+    " concluded_at"
+)
+#: The columns of `mission_contents` that its crc32 covers.
+CONTENTS = ("items", "findings", "stored_items", "roi_commands", "records")
 
 # SQLite's auxiliary files of a database. The log holds commits that are not in the main file yet.
 _LOG = "-wal"
@@ -23,9 +33,9 @@ _COMPANIONS = (_LOG, "-shm", "-journal")
 _LOG_HEADER = struct.Struct(">8I")
 _LOG_MAGIC = {0x377F0682: "<6I", 0x377F0683: ">6I"}
 
-# SQLITE_ERROR is "table already exists" and such: the file does not have its claimed schema.
 #: Damaged files kept, the newest: each may be as large as the store.
 _MOST_KEPT = 3
+# SQLITE_ERROR is "table already exists" and such: the file does not have its claimed schema.
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
 
@@ -68,6 +78,19 @@ def memory_database() -> sqlite3.Connection:
     connection = _connect(":memory:")
     _apply_schema(connection, version=0)
     return connection
+
+
+def row_crc32(*values: object) -> int:
+    """The checksum of a row of `missions`, over the columns of SUMMARY."""
+    return zlib.crc32(repr(values).encode(errors="backslashreplace"))
+
+
+def contents_crc32(contents: Iterable[object]) -> int:
+    """The checksum of a row of `mission_contents`, over the columns of CONTENTS; a damaged one may have any type."""
+    crc = 0
+    for part in contents:
+        crc = zlib.crc32(part if isinstance(part, bytes) else str(part).encode(errors="surrogateescape"), crc)
+    return crc
 
 
 def _connect(path: Path | str) -> sqlite3.Connection:

@@ -10,8 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from storage.checksums import CONTENTS, SUMMARY, contents_crc32, row_crc32
-from storage.database import memory_database, open_database, read_database
+from storage.database import (
+    CONTENTS,
+    SUMMARY,
+    contents_crc32,
+    memory_database,
+    open_database,
+    read_database,
+    row_crc32,
+)
 from storage.salvage import salvage
 from storage.store_error import StoreError, explained
 

@@ -11,7 +11,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from storage.checksums import CONTENTS, SUMMARY, contents_crc32, row_crc32
+from storage.database import CONTENTS, SUMMARY, contents_crc32, row_crc32
 from storage.store_error import FAILURES
 
 #: A damaged table may claim any number; a store within its budget holds fewer.
