@@ -23,7 +23,7 @@ from bridge.gcs.guard import Guard
 from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity
 from bridge.line.runner import Runner
-from bridge.missions.mission_service import NO_LINK, MissionService, MissionTransfer
+from bridge.missions.mission_service import NO_LINK, EndingListener, MissionService, MissionTransfer
 from bridge.model.events import EventLog, Incidents
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import FlightState
@@ -46,7 +46,12 @@ class Bridge:
     """Wires the parts and routes events between them."""
 
     def __init__(
-        self, config: BridgeConfig, log_event: EventLog, now: float, on_frames: FrameListener | None = None
+        self,
+        config: BridgeConfig,
+        log_event: EventLog,
+        now: float,
+        on_frames: FrameListener | None = None,
+        on_ending: EndingListener = lambda _mission, _delivery: None,
     ) -> None:
         self._config = config
         self._log_event = log_event
@@ -64,7 +69,7 @@ class Bridge:
             self._newcomer,
             on_frames,
             self.guard.standing,
-            config.signers,
+            self.guard.signers,
         )
         self.runner = Runner()
         self.session = FcSession(
@@ -78,7 +83,7 @@ class Bridge:
             config.autopilot,
         )
         vehicle = self.session.vehicle
-        self.missions = MissionService(vehicle)
+        self.missions = MissionService(vehicle, on_ending)
         context = MissionContext(self.missions, self.runner, self.ground, vehicle, log_event, incidents)
         self.local = LocalMissions(context)
         self.sharing = MspSharing(self.session, self.runner)
@@ -197,7 +202,9 @@ class Bridge:
             self._uploads.link_lost(now)
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)
             return
-        store = controller.open_store(vehicle, RuleSettings(self._config.takeoff_max_m))
+        missions = controller.profile.missions
+        settings = RuleSettings(self._config.takeoff_max_m)
+        store = missions if isinstance(missions, Refusal) else missions(controller, vehicle, settings)
         self.missions.use(store)
         self._incoming.routes = PassThrough(self.ground) if self.is_passing_through else None
         self._say(self._announcer.found(controller, now))

@@ -3,12 +3,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import Profile
-from bridge.gcs.ground import Signer
 from bridge.gcs.guard import LinkAccess
 from bridge.model.autopilot import Autopilot
 
@@ -32,12 +30,3 @@ class BridgeConfig:
     version: str = ""
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     passes_everything: bool = False
-
-    @property
-    def signers(self) -> dict[str, Signer]:
-        """The signers of the links that need one."""
-        return {
-            name: partial(access.signing.signature, link_id=access.link_id)
-            for name, access in self.links.items()
-            if access.signing is not None
-        }

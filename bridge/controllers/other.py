@@ -40,7 +40,7 @@ OTHER_MAVLINK = Profile(
     "another MAVLink autopilot",
     "MAVLink",
     Spoken.MAVLINK,
-    no_missions=Refusal(
+    missions=Refusal(
         MissionResult.UNSUPPORTED, "This autopilot speaks MAVLink itself: write its missions from a ground station"
     ),
     is_passed_through=True,

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 
 from bridge.fc.profile import Decoder, FlightController
-from bridge.model.flight_mode import FAILSAFE_BOX, flight_mode, names_of_active
+from bridge.model.flight_mode import ARM_BOX, FAILSAFE_BOX, flight_mode, names_of_active
 from bridge.model.vehicle import (
     Fix,
     FlightState,
@@ -136,8 +136,8 @@ def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
     before = vehicle.last(Health)
     load = None if before is None else before.cpu_load
     vehicle.hear(Health(now, Source.MSP, status.sensors, status.cycle_time_us, status.i2c_errors, load))
-    armed = None if controller.arm_bit is None else bool(status.box_flags >> controller.arm_bit & 1)
     active = names_of_active(status.box_flags, controller.boxes)
+    armed = ARM_BOX in active if ARM_BOX in controller.boxes else None
     mode = flight_mode(active) if controller.boxes else None
     # Disarmed, the box only says that there is no RC link.
     vehicle.hear(FlightState(now, Source.MSP, armed, mode, bool(armed) and FAILSAFE_BOX in active))

@@ -15,12 +15,11 @@ from bridge.line.poll_schedule import POLLS, Poll
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.list_check import MissionRules
 from bridge.model.airframe import Airframe
+from bridge.model.flight_mode import ARM_BOX
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import Info
-
-_ARM_BOX = "ARM"
 
 #: Fills the vehicle from the payload of a reply, heard at a time.
 Decoder = Callable[[Vehicle, bytes, "FlightController", float], None]
@@ -37,6 +36,10 @@ class RuleSettings:
     capacity: int | None = None
 
 
+#: Opens the mission store of a board.
+OpenStore = Callable[["FlightController", Vehicle, RuleSettings], AnyFcMissionStore]
+
+
 @dataclass(frozen=True, slots=True)
 class Profile:
     """One kind of flight controller, on one protocol.
@@ -47,7 +50,7 @@ class Profile:
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
     has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
-    open_store: how missions are written to it, or None with `no_missions` as the reply to any attempt.
+    missions: how they are written to it, or the reply to any attempt.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
     is_passed_through: an autopilot that represents itself to ground stations. The bridge sends nothing in its name.
@@ -65,8 +68,7 @@ class Profile:
     has_gyro_deg_s: bool = False
     accepts_any_byte: bool = False
     turn_s: float = 0.0
-    open_store: Callable[["FlightController", Vehicle, RuleSettings], AnyFcMissionStore] | None = None
-    no_missions: Refusal = NO_MISSIONS
+    missions: OpenStore | Refusal = NO_MISSIONS
     check_kind: str | None = None
     rules: Callable[[RuleSettings], MissionRules] | None = None
     mavlink_sender: tuple[int, int, int] | None = None
@@ -94,9 +96,4 @@ class FlightController:
     @property
     def arm_bit(self) -> int | None:
         """The place of the ARM box in the status flags."""
-        return self.boxes.index(_ARM_BOX) if _ARM_BOX in self.boxes else None
-
-    def open_store(self, vehicle: Vehicle, settings: RuleSettings) -> AnyFcMissionStore | Refusal:
-        """Its mission store, or the reason that it has none."""
-        profile = self.profile
-        return profile.no_missions if profile.open_store is None else profile.open_store(self, vehicle, settings)
+        return self.boxes.index(ARM_BOX) if ARM_BOX in self.boxes else None

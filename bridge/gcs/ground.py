@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from bridge.gcs.budget import Budgets
 from bridge.gcs.cost import Cost
-from bridge.gcs.guard import Standing
+from bridge.gcs.guard import Signer, Standing
 from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
 from bridge.gcs.stations import Stations, displaced
@@ -18,8 +18,6 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 _TEXT_SIZE = 50
 _MAX_TEXT_ID = 0xFFFF
 
-#: Returns the signature of a MAVLink 2 frame.
-Signer = Callable[[bytes], bytes]
 #: A frame listener: called with all frames to and from ground stations, each once.
 FrameListener = Callable[[Sequence[bytes]], None]
 

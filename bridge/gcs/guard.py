@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from typing import NamedTuple
 
 from bridge.gcs.station import Peer, Station
@@ -99,6 +100,10 @@ _ADDRESS = "this address may only read"
 _NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
 
 
+#: Returns the signature of a MAVLink 2 frame.
+Signer = Callable[[bytes], bytes]
+
+
 class Standing(Enum):
     """The rights that a peer has proven."""
 
@@ -160,6 +165,15 @@ class Guard:
         has_key = access.signing is None or peer in self._signed
         has_address = access.may_write is None or access.may_write(peer)
         return Standing.PROVEN if has_key and has_address else Standing.LISTENER
+
+    @property
+    def signers(self) -> dict[str, Signer]:
+        """The signers of the links that need one."""
+        return {
+            name: partial(access.signing.signature, link_id=access.link_id)
+            for name, access in self._links.items()
+            if access.signing is not None
+        }
 
     def refusal(self, peer: Peer, frame: MavlinkFrame) -> GuardRefusal | None:
         """The reason for refusing a frame; None if it is accepted."""

@@ -67,9 +67,9 @@ POLLS = (
     Poll(Msp.MOTOR, request(Msp.MOTOR), 16, inf),
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
 )
-#: For boards that report their progress in a mission.
 #: Asked where the switches must be known in flight; the longest reply is that of 15 boxes with six aux channels.
 BOX_POLL = Poll(Msp.BOX, request(Msp.BOX), 60, 5.0)
+#: For boards that report their progress in a mission.
 NAV_POLL = Poll(Msp.NAV_STATUS, request(Msp.NAV_STATUS), 7, 0.5)
 
 
@@ -135,11 +135,6 @@ class PollSchedule:
         self._lost_before = 0
         self._beside_missions = False
 
-    @property
-    def quality(self) -> float:
-        """The factor that losses apply to the rates, 0.1..1."""
-        return self._quality
-
     def begin(self, baud: int | None, polls: Sequence[Poll] = POLLS, turn_s: float = 0.0) -> None:
         """Start polling a flight controller: everything once, then at the requested intervals.
 
@@ -193,11 +188,11 @@ class PollSchedule:
             link.send(Send(slot.poll.frame, slot.poll.command, slot.size), now)
             limit = now + _GATHER_S
 
-    def answered(self, frame: MspFrame) -> None:
-        """Take a reply."""
+    def answered(self, frame: MspFrame) -> bool:
+        """Take a reply; False if its command is not polled."""
         slot = self._slots.get(frame.command)
         if slot is None:
-            return
+            return False
         slot.is_asked = False
         is_bent = slot.misses > _TOLERATED_MISSES or self._quality < 1
         slot.misses = 0
@@ -212,6 +207,7 @@ class PollSchedule:
         elif is_bent:
             # The others follow with their own replies.
             slot.set_interval(self._interval(slot, self._scale))
+        return True
 
     def next_deadline(self, link: MspLink) -> float:
         """The time of the next request; infinity if a reply must arrive first."""

@@ -7,6 +7,7 @@ Ground stations (bridge.vehicle.mission_upload, mission_download) and the comman
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from math import inf
 from typing import Any
 
 from bridge.line.conversation import Conversation, Pause, conclude, find_pending, recall, save
@@ -91,12 +92,16 @@ STOPPING = Refusal(MissionResult.DENIED, "naze-bridge is stopping: try again lat
 OCCUPIED = Refusal(MissionResult.DENIED, "Another mission transfer is running")
 
 
+#: Called with each mission that was completed or rejected.
+EndingListener = Callable[[ArrivedMission, DeliveryResult], None]
+
+
 class MissionService:
     """Holds the transfer lock, the current flight controller's mission store, and its list."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
-        self._endings: list[tuple[ArrivedMission, DeliveryResult]] = []
+    def __init__(self, vehicle: Vehicle, on_ending: EndingListener) -> None:
         self._vehicle = vehicle
+        self._on_ending = on_ending
         self._fc_store: AnyFcMissionStore | None = None
         self._refusal = NO_LINK
         self._owner: object | None = None
@@ -138,6 +143,11 @@ class MissionService:
         """Item 0 of the last known list."""
         return self.held.items[0] if self.held is not None and self.held.items else self.former_home
 
+    @property
+    def watch_s(self) -> float:
+        """The interval at which `is_outdated` should be asked; infinity without a store."""
+        return inf if self._fc_store is None else self._fc_store.watch_s
+
     def seq_of(self, number: int) -> int:
         """The seq of the item for the flight controller's record `number`; 0: none is known."""
         if self._fc_store is None or self.held is None:
@@ -156,11 +166,6 @@ class MissionService:
         if refusal is None:
             self._owner = owner
         return refusal
-
-    def take_endings(self) -> list[tuple[ArrivedMission, DeliveryResult]]:
-        """The missions concluded since the last call, each with its result."""
-        endings, self._endings = self._endings, []
-        return endings
 
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed; saves a request to a busy board."""
@@ -211,7 +216,7 @@ class MissionService:
         `is_kept` False: do not store it, because too many lists arrived.
         """
         delivery = yield from self._deliver(arrived, progress, is_kept=is_kept)
-        self._endings.append((arrived, delivery))
+        self._on_ending(arrived, delivery)
         return delivery
 
     def _deliver(

@@ -16,6 +16,8 @@ class FlightMode(Enum):
     AUTO = auto()
 
 
+#: The flag of an armed craft, on every descendant of MultiWii.
+ARM_BOX = "ARM"
 #: A flag of INAV and Betaflight: the receiver is silent, or the pilot's switch is on, and the failsafe procedure runs.
 FAILSAFE_BOX = "FAILSAFE"
 

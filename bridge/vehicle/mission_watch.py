@@ -20,24 +20,17 @@ class MissionWatch:
 
     def look(self, now: float) -> None:
         """Check now: a flight controller was found."""
-        self.due = now + self._interval_s
+        self.due = now + self._context.missions.watch_s
         if not self._is_looking:
             self._is_looking = True
             self._context.runner.start(self._context.missions.is_outdated(), self._looked, now, in_background=True)
 
     def tick(self, now: float) -> None:
         """Check, if no transfer runs."""
-        if self._context.missions.fc_store is None:
-            self.due = inf
-        elif self._context.runner.is_busy:
-            self.due = now + self._interval_s
+        if self._context.missions.fc_store is None or self._context.runner.is_busy:
+            self.due = now + self._context.missions.watch_s
         else:
             self.look(now)
-
-    @property
-    def _interval_s(self) -> float:
-        fc_store = self._context.missions.fc_store
-        return inf if fc_store is None else fc_store.watch_s
 
     def _looked(self, is_outdated: bool | LinkLost, now: float) -> None:
         if is_outdated is True:

@@ -89,8 +89,8 @@ class Daemon:
         self.started_at = self._loop.time()
         self.found_at: float | None = None
         self.lost_at: float | None = None
-        self._recording = Recording(settings)
-        self._signing = SigningState(settings)
+        self._recording = Recording(settings.state_dir, settings.tlog, settings.record_uart)
+        self._signing = SigningState(settings.state_dir, settings.gcs, settings.access)
         self.bridge = Bridge(
             BridgeConfig(
                 _speeds(settings.fc),
@@ -105,6 +105,7 @@ class Daemon:
             self._log_event,
             self._loop.time(),
             self._recording.on_frames,
+            self._mission_ended,
         )
         self._complained_of_accept = False
         #: Why missions are kept in memory only; empty if they are stored.
@@ -144,6 +145,11 @@ class Daemon:
     def recording(self) -> list[str]:
         """The files being recorded, or the reasons why recording stopped."""
         return self._recording.describe()
+
+    @property
+    def fc_dropped_bytes(self) -> int:
+        """Bytes that the flight controller's line was too slow for."""
+        return self._port.dropped_bytes
 
     async def run(self) -> None:
         """Run until cancelled. LinkError if a ground station link cannot be set up."""
@@ -341,12 +347,13 @@ class Daemon:
     def _tell_followers(self) -> None:
         report = self.bridge.report
         fresh = report.take_fresh() if report.fresh else None
-        endings = self.bridge.missions.take_endings()
         for follower in self._followers:
             if fresh:
                 follower.telemetry(fresh)
-            for mission, delivery in endings:
-                follower.mission_ended(mission, delivery)
+
+    def _mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
+        for follower in self._followers:
+            follower.mission_ended(mission, delivery)
 
     def _log_event(self, level: Level, event: str, /, **facts: object) -> None:
         getattr(_log, level)(event, **facts)

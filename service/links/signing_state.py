@@ -10,7 +10,7 @@ unknown, but all are below the file's: until that time is reached, nothing is ac
 import asyncio
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -19,7 +19,8 @@ import structlog
 from bridge.gcs.guard import LinkAccess
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Signing, Timestamps
 from service.machine.threads import DiskThread
-from service.settings import Settings
+from service.settings.addresses import GcsAddress
+from service.settings.write_access import WriteAccess
 from storage.atomic_file import replace_file
 
 FILE_NAME = "signing.json"
@@ -34,9 +35,15 @@ _log = structlog.get_logger()
 class SigningState:
     """Makes the `links` that a bridge guards. Nothing is kept without a `state_dir`, or without any key."""
 
-    def __init__(self, settings: Settings, clock: Callable[[], float] = time.time) -> None:
-        self._path = None if settings.state_dir is None else settings.state_dir / FILE_NAME
-        keys = {name: access.key for name, access in settings.access.items() if access.key is not None}
+    def __init__(
+        self,
+        state_dir: Path | None,
+        gcs: Sequence[GcsAddress],
+        access_by_link: Mapping[str, WriteAccess],
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        self._path = None if state_dir is None else state_dir / FILE_NAME
+        keys = {name: access.key for name, access in access_by_link.items() if access.key is not None}
         self._stored = 0
         streams: Mapping[str, list[list[int]]] = {}
         was_ended = True
@@ -56,8 +63,8 @@ class SigningState:
                 number & 0xFF,
                 None if access.writers is None else access.has_address,
             )
-            for number, address in enumerate(settings.gcs)
-            if (access := settings.access.get(str(address))) is not None
+            for number, address in enumerate(gcs)
+            if (access := access_by_link.get(str(address))) is not None
         }
         self._thread = DiskThread("signing")
         self._timer: asyncio.TimerHandle | None = None

@@ -2,26 +2,27 @@
 """The daemon's recordings: telemetry logs by default, the UART on request."""
 
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 from bridge.gcs.ground import FrameListener
 from service.links.fc_device import Device
 from service.links.fc_port import FcPort
 from service.recording.tlog_recorder import TlogRecorder
 from service.recording.uart_recorder import RecordedPort, UartRecorder
-from service.settings import Settings
+from service.settings import TlogLimits
 
 #: Within the state directory.
 TLOG_FOLDER = "logs"
 
 
 class Recording:
-    """The recordings requested by `settings`. Raises UartFileError if the UART cannot be recorded."""
+    """The recordings that are set up. Raises UartFileError if the UART cannot be recorded."""
 
-    def __init__(self, settings: Settings) -> None:
-        self._uart = None if settings.record_uart is None else UartRecorder(settings.record_uart)
+    def __init__(self, state_dir: Path | None, tlog: TlogLimits | None, uart_file: Path | None) -> None:
+        self._uart = None if uart_file is None else UartRecorder(uart_file)
         self._tlog: TlogRecorder | None = None
-        if settings.tlog is not None and settings.state_dir is not None:
-            self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
+        if tlog is not None and state_dir is not None:
+            self._tlog = TlogRecorder(state_dir / TLOG_FOLDER, tlog)
         self.on_frames: FrameListener | None = None if self._tlog is None else self._tlog.on_frames
 
     def port(

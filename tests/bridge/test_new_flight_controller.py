@@ -19,7 +19,7 @@ def recognise(board: Interview) -> Conversation[FlightController | None]:
 
 
 NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "Toys do not navigate")
-TOY = Profile("a toy", "Toy", recognise=recognise, no_missions=NO_MISSIONS)
+TOY = Profile("a toy", "Toy", recognise=recognise, missions=NO_MISSIONS)
 
 
 def test_a_profile_is_enough() -> None:

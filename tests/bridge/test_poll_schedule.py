@@ -105,21 +105,25 @@ def test_an_unanswered_poll_slows_down_without_delaying_others() -> None:
 
 
 @pytest.mark.parametrize(
-    ("loss", "least", "most"), [(0.0, 1.0, 1.0), (0.01, 0.7, 1.0), (0.1, 0.2, 0.75), (0.5, 0.1, 0.2)]
+    ("loss", "least", "most"), [(0.0, 1.0, 1.0), (0.01, 0.7, 1.0), (0.1, 0.2, 0.75), (0.5, 0.05, 0.2)]
 )
 def test_losses_lower_the_rates(loss: float, least: float, most: float) -> None:
     chance = random.Random(1)
     line = Line(answer=lambda command: None if chance.random() < loss else REPLY_PAYLOADS[command])
     line.schedule.want({Msp.ATTITUDE: 0.04, Msp.RAW_GPS: 0.2})
     line.run(30)
-    qualities = []
+    rates = []
     for _ in range(60):
         line.run(1)
-        qualities.append(line.schedule.quality)
-    assert least <= sum(qualities) / len(qualities) <= most
+        interval_s = line.schedule.interval_s(Msp.ATTITUDE)
+        assert interval_s is not None
+        rates.append(line.schedule.line_interval_s(Msp.ATTITUDE) / interval_s)
+    assert least <= sum(rates) / len(rates) <= most
     line.answer = answer_all
     line.run(60)
-    assert line.schedule.quality == 1.0
+    assert line.schedule.interval_s(Msp.ATTITUDE) == pytest.approx(
+        line.schedule.line_interval_s(Msp.ATTITUDE), rel=0.02
+    )
 
 
 @pytest.mark.parametrize("delay_s", [0.05, 0.1])

@@ -14,8 +14,7 @@ from structlog.testing import capture_logs
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, key_from_passphrase, ticks
 from service.links.signing_state import FILE_NAME, SigningState
-from service.settings import Settings
-from service.settings.addresses import GcsAddress, SimulatedFc
+from service.settings.addresses import GcsAddress
 from service.settings.write_access import WriteAccess
 from tests.support.programs import until_async
 
@@ -34,11 +33,11 @@ class Pi:
     def __init__(self, folder: Path, key: bytes | None = KEY) -> None:
         self.unix_s = NOON
         access = WriteAccess(key, () if key is None else None)
-        self._settings = Settings(SimulatedFc(), [UDP, TCP], folder, access={str(UDP): access, str(TCP): access})
+        self._folder, self._access = folder, {str(UDP): access, str(TCP): access}
         self.path = folder / FILE_NAME
 
     def boot(self) -> SigningState:
-        state = SigningState(self._settings, lambda: self.unix_s)
+        state = SigningState(self._folder, (UDP, TCP), self._access, lambda: self.unix_s)
         state.start()
         return state
 

@@ -69,7 +69,7 @@ PATCHED = Profile(
     "Harakiri with the mission extension",
     _FAMILY,
     recognise=_recognise_patched,
-    open_store=_msp_store,
+    missions=_msp_store,
     polls=(*POLLS, BOX_POLL),
     check_kind="harakiri",
     rules=rules,
@@ -80,21 +80,21 @@ UNPATCHED = Profile(
     _FAMILY,
     recognise=_recognise_unpatched,
     polls=(*POLLS, BOX_POLL),
-    no_missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
+    missions=Refusal(MissionResult.UNSUPPORTED, "This Harakiri lacks the mission patch"),
     restarts_after_calibration=True,
 )
 MAVLINK = Profile(
     "Harakiri in MAVLink mode",
     _FAMILY,
     Spoken.MAVLINK,
-    open_store=_mavlink_store,
+    missions=_mavlink_store,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
 )
 FRSKY = Profile(
     "Harakiri in FrSky mode",
     _FAMILY,
     Spoken.FRSKY,
-    no_missions=ARMED,
+    missions=ARMED,
     notice="FrSky while armed: no attitude, mode or RC",
 )
 PROFILES = (PATCHED, UNPATCHED, MAVLINK, FRSKY)

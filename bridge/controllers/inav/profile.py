@@ -70,7 +70,7 @@ PROFILE = Profile(
     accepts_any_byte=True,
     # Its serial task runs 100 times a second (fc_tasks.c).
     turn_s=0.01,
-    open_store=_open_store,
+    missions=_open_store,
     check_kind="inav",
     rules=_rules,
 )

@@ -45,7 +45,7 @@ PROFILE = Profile(
     recognise=_recognise,
     polls=(*POLLS, NAV_POLL),
     accepts_any_byte=True,
-    open_store=_open_store,
+    missions=_open_store,
     check_kind="multiwii",
     rules=_rules,
 )

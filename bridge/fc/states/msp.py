@@ -12,6 +12,7 @@ from bridge.fc.states.base import Event, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import MspLink
 from bridge.line.pending_replies import PendingReplies
+from bridge.model.refusal import Refusal
 from protocols.frsky import FRSKY_SPEED
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.heartbeat import is_disarmed_heartbeat
@@ -180,14 +181,14 @@ class Polling(MspLine):
         port.polls.begin(event.found.speed, controller.profile.polls, controller.profile.turn_s)
         port.meet(controller)
         self._check_interval_s = _FIRST_CHECK_S
-        self._check_at = now + _FIRST_CHECK_S if controller.profile.open_store is None else inf
+        self._check_at = now + _FIRST_CHECK_S if isinstance(controller.profile.missions, Refusal) else inf
         self._corrected: FlightController | None = None
 
     def take_frame(self, frame: MspFrame, now: float) -> None:
         """Replies belong to a conversation, to a poll, or to both."""
         super().take_frame(frame, now)
-        self.port.polls.answered(frame)
-        hear_msp(self.port.vehicle, frame, self.controller, now)
+        if self.port.polls.answered(frame):
+            hear_msp(self.port.vehicle, frame, self.controller, now)
 
     def tick(self, now: float) -> Event | None:
         """Poll; check an identity that is in doubt."""
