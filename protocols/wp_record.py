@@ -54,11 +54,6 @@ class WpRecord:
         )
 
 
-def unpack_record(data: bytes) -> WpRecord:
-    """Read one record from exactly 16 bytes."""
-    return WpRecord(*_LAYOUT.unpack(data))
-
-
 def unpack_records(data: bytes) -> list[WpRecord]:
     """Read every complete record in `data`; a shorter rest is ignored."""
     whole = len(data) - len(data) % RECORD_SIZE

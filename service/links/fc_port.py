@@ -57,6 +57,7 @@ class FcPort:
         self._closed = asyncio.Event()
         #: Why the port cannot be opened; empty if it could be.
         self.trouble = ""
+        #: Bytes that the line was too slow for.
         self.dropped_bytes = 0
         #: Reads may be delayed by a few ms at high rates, because no reply is pending.
         self.may_gather = False

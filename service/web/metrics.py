@@ -164,10 +164,13 @@ class _State(Collector):
         for each in TRANSITIONS:
             state.add_metric([each.name], float(type(session.state) is each))
         yield state
-        # Restart at 0 with each flight controller found, which Prometheus permits for counters.
+        # This one and those of MSP restart at 0 with each flight controller, which Prometheus permits for counters.
         damaged = _counters("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.")
         damaged.add_metric([], session.bad_checksums or 0)
         yield damaged
+        dropped = _counters("fc_dropped_bytes", "Bytes for the flight controller that its line was too slow for.")
+        dropped.add_metric([], self._daemon.fc_dropped_bytes)
+        yield dropped
         if session.link is not None:
             lost = _counters("fc_lost_requests", "MSP requests that were not answered in time.")
             lost.add_metric([], session.link.requests_lost)

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import MissionItem
-from protocols.wp_record import unpack_record
+from protocols.wp_record import unpack_records
 from service.cli.main import main
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -161,7 +161,7 @@ def test_the_examples_show_what_they_are_meant_to() -> None:
     for document in documents:
         assert any("0d0d0d" in record for record in document["records"]), "no hazard bytes"
         for item, record in zip(document["items"], document["records"], strict=True):
-            held = unpack_record(bytes.fromhex(record))
+            (held,) = unpack_records(bytes.fromhex(record))
             assert (held.lat_e7, held.lon_e7, held.height_m) == (item["lat_e7"], item["lon_e7"], item["alt_m"])
     assert {item["command"] for item in documents[0]["items"]} >= {16, 18, 19, 20, 21, 22, 201}
     assert {finding["becomes"] for finding in documents[0]["findings"]} >= {"dropped", 15}

@@ -21,7 +21,7 @@ from protocols.msp.mission import (
     encode_read,
     unmask,
 )
-from protocols.wp_record import RECORD_SIZE, WpRecord, unpack_record, unpack_records
+from protocols.wp_record import RECORD_SIZE, WpRecord, unpack_records
 from simulator.msp_port import MspReceiver
 
 #: Bytes of which a third are hazards: what a mission would have to be made of to be hard to send.
@@ -29,7 +29,7 @@ hard_bytes = st.one_of(st.sampled_from(sorted(HAZARDS)), st.integers(0, 255))
 records = st.one_of(
     st.binary(min_size=RECORD_SIZE, max_size=RECORD_SIZE),
     st.lists(hard_bytes, min_size=RECORD_SIZE, max_size=RECORD_SIZE).map(bytes),
-).map(unpack_record)
+).map(lambda data: unpack_records(data)[0])
 identities = st.builds(ListIdentity, st.integers(0, 65535), st.integers(0, 2**32 - 1))
 
 

@@ -13,7 +13,7 @@ from bridge.missions.list_check import check_list
 from bridge.model.finding import DROPPED, REJECTED
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
-from protocols.wp_record import WpRecord, unpack_record
+from protocols.wp_record import WpRecord, unpack_records
 from tests.support.rule_oracle import expected
 
 KNOWN = [16, 17, 18, 19, 20, 21, 22, 80, 195, 197, 201]
@@ -165,7 +165,7 @@ def test_findings_are_one_line_each(items: list[MissionItem], profile: HarakiriR
     rois=st.dictionaries(st.integers(0, 5), st.just(201)),
 )
 def test_whatever_the_flight_controller_holds_can_be_read_back(data: list[bytes], rois: dict[int, int]) -> None:
-    records = [unpack_record(each) for each in data]
+    records = unpack_records(b"".join(data))
     items = items_from_records(records, rois)
     assert [item.seq for item in items] == list(range(len(records)))
     for seq, (item, record) in enumerate(zip(items, records, strict=True)):
