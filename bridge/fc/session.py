@@ -15,7 +15,6 @@ from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.msp import Identifying, MspLine, Polling
 from bridge.fc.states.searching import Searching
 from bridge.line.msp_link import MspLink
-from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
 from bridge.model.events import EventLog, Incidents, Level
@@ -59,6 +58,9 @@ class FcSession:
         autopilot: Autopilot,
     ) -> None:
         self._port = Port(speeds, autopilot, profiles, runner, on_mavlink)
+        #: The flight controller's readings, kept when it is lost.
+        self.vehicle = self._port.vehicle
+        self.polls = self._port.polls
         self._log_event = log_event
         self._incidents = incidents
         #: From the port's opening or a loss until a flight controller is found.
@@ -77,11 +79,6 @@ class FcSession:
     def link(self) -> MspLink | None:
         """The MSP link, while MSP is spoken."""
         return self.state.link
-
-    @property
-    def polls(self) -> PollSchedule:
-        """The telemetry polls."""
-        return self._port.polls
 
     @property
     def speed(self) -> int | None:

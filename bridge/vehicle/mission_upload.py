@@ -27,6 +27,7 @@ from bridge.vehicle.mission_context import MissionContext
 from bridge.vehicle.recent_answers import RecentAnswers
 from bridge.vehicle.upload_states import (
     TRANSITIONS,
+    Announced,
     Asking,
     Complete,
     Delivered,
@@ -161,7 +162,7 @@ class MissionUploads:
         if isinstance(taken, Judged):
             self._handle(upload, taken, now)
         elif taken:
-            self._request(upload, state, now)
+            self._request(upload, now)
 
     def partial_list(self, station: Station, now: float) -> None:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
@@ -211,7 +212,7 @@ class MissionUploads:
                 self._end([upload], state.timeout, now)
             elif isinstance(state, Receiving) and now >= state.request.due:
                 state.request.lost()
-                self._request(upload, state, now)
+                self._request(upload, now)
         for reminder in [reminder for reminder in self._reminders if now >= reminder[0]]:
             self._reminders.remove(reminder)
             _, station, text = reminder
@@ -241,7 +242,7 @@ class MissionUploads:
         self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
         for older in self._uploads:
             older.is_superseded |= older.station == station
-        upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(now))
+        upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(Announced(), now))
         self._uploads.append(upload)
         refusal = self._missions.armed_refusal()
         if refusal is None and not self._ground.allows(station, Cost.BOARD):
@@ -259,12 +260,24 @@ class MissionUploads:
             if upload not in self._in(Waiting, Complete):
                 # The end of an earlier one has already continued it.
                 continue
-            if isinstance(upload.state, Complete):
-                refusal = self._missions.acquire(upload)
-            else:
-                refusal = OCCUPIED if self._must_wait(now) else self._missions.occupied()
-            if refusal is not OCCUPIED:
-                self._handle(upload, Turn() if refusal is None else Ended(refusal), now)
+            event = self._turn(upload, now)
+            if event is not None:
+                self._handle(upload, event, now)
+
+    def _turn(self, upload: _Upload, now: float) -> Event | None:
+        """The event that continues an upload, None if it must wait for others."""
+        state = upload.state
+        if isinstance(state, Complete):
+            refusal = self._missions.acquire(upload)
+            is_write = state.verdict.result is not Result.REJECTED
+            if refusal is None and is_write and not self._ground.allows(upload.station, Cost.FLASH):
+                refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
+        else:
+            refusal = OCCUPIED if self._must_wait(now) else self._missions.occupied()
+        if refusal is not None:
+            return None if refusal is OCCUPIED else Ended(refusal)
+        is_clear = isinstance(state, Waiting) and not upload.count
+        return Judged((), CLEARED_LIST) if is_clear else Turn()
 
     def _must_wait(self, now: float) -> bool:
         """True if the list of another upload is arriving as it should."""
@@ -275,28 +288,22 @@ class MissionUploads:
     def _handle(self, upload: _Upload, event: Event, now: float) -> None:
         """Change the state by the table."""
         before = upload.state
-        if TRANSITIONS[type(before)][type(event)] is None:
+        after = TRANSITIONS[type(before)][type(event)]
+        if after is None:
             self._forget(upload, now)
+        else:
+            upload.state = after(event, now)
         match event:
             case Turn() if isinstance(before, Complete):
-                if before.verdict.result is Result.REJECTED or self._ground.allows(upload.station, Cost.FLASH):
-                    upload.state = Delivering(now)
-                    self._deliver(upload, before.received, before.verdict, now)
-                else:
-                    self._handle(upload, Ended(Refusal(MissionResult.DENIED, TOO_MANY_WRITES)), now)
-            case Turn() if upload.count:
-                if not self._in(Asking, Receiving) and now >= self._last_end + _PAUSE_S:
-                    self._arriving_since = now
-                upload.state = Asking(now)
-                self._ask(now)
+                self._deliver(upload, before.received, before.verdict, now)
             case Turn():
-                self._handle(upload, Judged((), CLEARED_LIST), now)
-            case Ready(check):
-                upload.state = state = Receiving(now, upload.count, check)
+                if self._in(Asking, Receiving) == [upload] and now >= self._last_end + _PAUSE_S:
+                    self._arriving_since = now
+                self._ask(now)
+            case Ready():
                 self._note("mission.upload_started", upload, count=upload.count)
-                self._request(upload, state, now)
-            case Judged(items, verdict):
-                upload.state = Complete(now, items, verdict)
+                self._request(upload, now)
+            case Judged():
                 self._begin_next(now)
             case Ended(refusal):
                 self._refuse(upload, before, refusal, now)
@@ -329,7 +336,7 @@ class MissionUploads:
             return False
         if isinstance(state, Receiving):
             state.announced_again = bool(state.items)
-            self._request(upload, state, now)
+            self._request(upload, now)
         return True
 
     def _ask(self, now: float) -> None:
@@ -351,10 +358,12 @@ class MissionUploads:
             self._handle(upload, Ended(answer), now)
         else:
             check = begin_check(upload.count, answer.rules, self._context.vehicle.place())
-            self._handle(upload, Ready(check), now)
+            self._handle(upload, Ready(upload.count, check), now)
 
-    def _request(self, upload: _Upload, state: Receiving, now: float) -> None:
+    def _request(self, upload: _Upload, now: float) -> None:
         """Request the lowest missing item, by id 40: the only one that Mission Planner understands in both modes."""
+        state = upload.state
+        assert isinstance(state, Receiving)
         state.request.asked(state.wanted, now)
         station = upload.station
         request = messages.MAVLink_mission_request_message(

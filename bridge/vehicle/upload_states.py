@@ -26,14 +26,19 @@ class Event:
     """An event that changes an upload's state."""
 
 
+class Announced(Event):
+    """MISSION_COUNT or MISSION_CLEAR_ALL."""
+
+
 class Turn(Event):
     """The other transfers have ended, or do not count."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ready(Event):
-    """The flight controller can take a list."""
+    """The flight controller can take a list of `count` items."""
 
+    count: int
     check: ListCheck
 
 
@@ -64,7 +69,7 @@ class UploadState(ABC):
     #: The ground station considers its list written.
     is_closed = False
 
-    def __init__(self, now: float) -> None:
+    def __init__(self, event: Event, now: float) -> None:
         self.deadline = now + self.seconds
 
     @property
@@ -153,10 +158,10 @@ class Receiving(UploadState):
 
     seconds = 5.0
 
-    def __init__(self, now: float, count: int, check: ListCheck) -> None:
-        super().__init__(now)
-        self._count = count
-        self._check = check
+    def __init__(self, event: Ready, now: float) -> None:
+        super().__init__(event, now)
+        self._count = event.count
+        self._check = event.check
         self.items: dict[int, MissionItem] = {}
         self._judged = 0  # items 0.._judged-1 have arrived and are checked
         self.request = ItemRequest()
@@ -216,10 +221,10 @@ class Complete(UploadState):
     seconds = 2.5
     timeout = OCCUPIED
 
-    def __init__(self, now: float, items: tuple[MissionItem, ...], verdict: Verdict[Any]) -> None:
-        super().__init__(now)
-        self._items = items
-        self.verdict = verdict
+    def __init__(self, event: Judged, now: float) -> None:
+        super().__init__(event, now)
+        self._items = event.items
+        self.verdict = event.verdict
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
