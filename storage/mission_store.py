@@ -22,20 +22,6 @@ from storage.database import (
 from storage.salvage import salvage
 from storage.store_error import StoreError, explained
 
-__all__ = [
-    "DAMAGED",
-    "PENDING",
-    "VERIFIED",
-    "MissionStore",
-    "MissionSummary",
-    "OpenedStore",
-    "ReceivedMission",
-    "StoreError",
-    "StoredMission",
-    "open_store",
-    "store_in_memory",
-]
-
 PENDING = "PENDING"  # the outcome until conclude(); it stays if the daemon died in between
 VERIFIED = "VERIFIED"  # the outcome that latest_verified() looks for
 DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match its checksum

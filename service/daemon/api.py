@@ -26,7 +26,8 @@ from service.control.mission_data import MOST, Json, mission_items, to_json, ver
 from service.daemon.daemon import Daemon
 from service.machine.package import version
 from service.recording.store_worker import as_dicts
-from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission, StoreError
+from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission
+from storage.store_error import StoreError
 
 #: asyncio buffers twice as much for each client; a list of 146 items has 40 kB.
 _MAX_LINE = 1 << 18

@@ -15,7 +15,8 @@ from bridge.line.conversation import Conclude, FindPending, Recall, Save, StoreE
 from bridge.model.mission_log import ArrivedMission, PendingMission
 from protocols.mission_record import ListIdentity, identify, pack_records
 from service.machine.threads import DiskThread, post
-from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store, store_in_memory
+from storage.mission_store import MissionStore, ReceivedMission, open_store, store_in_memory
+from storage.store_error import StoreError
 
 DATABASE_NAME = "missions.db"
 #: For the last jobs: a hanging disk must not keep the daemon from ending.

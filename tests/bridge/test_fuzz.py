@@ -21,7 +21,8 @@ from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.tlog import read_tlog, tlog_record
 from protocols.uart_capture import read_capture
-from storage.mission_store import StoreError, open_store
+from storage.mission_store import open_store
+from storage.store_error import StoreError
 from tests.support.fuzz_inputs import FuzzInputs
 from tests.support.sample_missions import mission
 from tests.support.world import GroundStation, World

@@ -14,7 +14,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from storage.mission_store import MissionStore, ReceivedMission, StoreError, open_store
+from storage.mission_store import MissionStore, ReceivedMission, open_store
+from storage.store_error import StoreError
 from tests.support.sample_missions import mission
 
 JSON = st.recursive(

@@ -17,7 +17,7 @@ DAEMON = """
 import sys
 from pathlib import Path
 from tests.support.sample_missions import mission
-from storage.mission_store import StoreError, open_store
+from storage.mission_store import open_store
 from storage.state_lock import StateLock
 
 directory = Path(sys.argv[1])

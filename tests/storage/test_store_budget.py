@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from storage.mission_store import DAMAGED, VERIFIED, StoreError, open_store
+from storage.mission_store import DAMAGED, VERIFIED, open_store
+from storage.store_error import StoreError
 from tests.support.sample_missions import mission
 
 #: `make soak` repeats it 300 times.

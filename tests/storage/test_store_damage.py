@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from storage.mission_store import DAMAGED, MissionStore, ReceivedMission, StoreError, open_store
+from storage.mission_store import DAMAGED, MissionStore, ReceivedMission, open_store
+from storage.store_error import StoreError
 from tests.support.sample_missions import mission
 
 NOW = 1_767_323_045.9  # 2026-01-02 03:04:05 UTC

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from storage.mission_store import StoreError, open_store
+from storage.mission_store import open_store
+from storage.store_error import StoreError
 from tests.support.sample_missions import mission
 
 
@@ -29,7 +30,8 @@ FULL_DISK = """
 import resource, signal, sys
 from pathlib import Path
 from tests.support.sample_missions import mission
-from storage.mission_store import StoreError, open_store
+from storage.mission_store import open_store
+from storage.store_error import StoreError
 
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -77,7 +79,8 @@ def test_a_full_disk_is_reported_and_keeps_earlier_missions(tmp_path: Path, limi
 AS_NOBODY = """
 import os, sys
 from pathlib import Path
-from storage.mission_store import StoreError, open_store
+from storage.mission_store import open_store
+from storage.store_error import StoreError
 from storage.state_lock import StateLock
 
 if os.geteuid() == 0:
