@@ -19,6 +19,7 @@ from pathlib import Path
 from tests.support.sample_missions import mission
 from storage.mission_store import open_store
 from storage.state_lock import StateLock
+from storage.store_error import StoreError
 
 directory = Path(sys.argv[1])
 try:
