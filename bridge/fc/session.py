@@ -67,8 +67,6 @@ class FcSession:
         self._incident = ""
         self._on_change = on_change
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
-        #: Its readings, kept when it is lost.
-        self.vehicle = self._port.vehicle
 
     @property
     def controller(self) -> FlightController | None:
