@@ -159,7 +159,10 @@ def test_unwritable_logs_are_reported_once_and_delay_nothing(start: Starter, con
     daemon = start.daemon("sim:")
     daemon.wait()
     listener = connect(daemon)
-    until(lambda: listener.has_heard(HEARTBEAT, 5), "telemetry")
+    until(lambda: daemon.has_logged("tlog.stopped"), "a failed write")
+    listener.listen()
+    listener.heard.clear()
+    until(lambda: listener.has_heard(HEARTBEAT, 2), "telemetry after it")
     shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
     assert "telemetry log: stopped, File exists" in shown
     assert daemon.end() == 0
