@@ -14,29 +14,30 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
 
-#: The longest files, and those that wait for other programs. They start first, or one of them would run alone at the
-#: end (make test).
+#: The longest files. They start first, or one of them would run alone at the end (make test).
 _LONG = (
-    "tests/firmware/test_firmware_core",
     "tests/service/test_debian_package",
-    "tests/e2e/test_soak",
+    "tests/firmware/test_firmware_core",
     "tests/e2e/test_mission_planner",
-    "tests/e2e/test_mavproxy",
-    "tests/e2e/test_board_faults",
-    "tests/e2e/test_bad_start",
-    "tests/fleet/test_fleet_faults",
-    "tests/cli/test_direct_boards",
-    "tests/conformance",
-    "tests/web",
-    "tests/fleet",
-    "tests/e2e",
-    "tests/attack",
-    "tests/cli",
-    "tests/links",
-    "tests/firmware",
+    "tests/bridge/test_push_faults",
+    "tests/e2e/test_soak",
+    "tests/simulator/test_sim_links",
+    "tests/web/test_page_accessibility",
 )
+#: Folders of tests that mostly wait for programs.
+_WAITING = tuple(f"tests/{name}/" for name in ("attack", "cli", "doctor", "e2e", "fleet", "links", "settings", "web"))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sort the files by `_LONG`; the order within a file stays."""
-    items.sort(key=lambda item: next((at for at, long in enumerate(_LONG) if item.nodeid.startswith(long)), len(_LONG)))
+    """Put the long files first, then spread the rest: files that wait and files that compute, side by side, fill the
+    cores better than one kind after the other. The order within a file stays."""
+    files = list(dict.fromkeys(_file(item) for item in items))
+    waiting = [file for file in files if file.startswith(_WAITING)]
+    computing = [file for file in files if not file.startswith(_WAITING)]
+    place = {file: at / len(kind) for kind in (waiting, computing) for at, file in enumerate(kind)}
+    place |= {file: at - len(_LONG) for file in files for at, long in enumerate(_LONG) if file.startswith(long)}
+    items.sort(key=lambda item: place[_file(item)])
+
+
+def _file(item: pytest.Item) -> str:
+    return item.nodeid.partition("::")[0]

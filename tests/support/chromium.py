@@ -89,9 +89,42 @@ class Browser:
         assert self.driver.save_screenshot(str(path))
 
 
-@contextmanager
-def browser(port: int, size: tuple[int, int] = LAPTOP, *, dark: bool = False) -> Iterator[Browser]:
-    """A browser with a window of `size` pixels: Debian's packages chromium and chromium-driver."""
+class Browsers:
+    """Chromium with light and with dark pages: each is started once and kept until `close`, because its start takes
+    longer than most tests. Needs Debian's packages chromium and chromium-driver."""
+
+    def __init__(self) -> None:
+        self._drivers: dict[bool, Chrome] = {}
+
+    @contextmanager
+    def tab(self, port: int, size: tuple[int, int] = LAPTOP, *, dark: bool = False) -> Iterator[Browser]:
+        """A new tab of `size` pixels for the page at `port`."""
+        if dark not in self._drivers:
+            self._drivers[dark] = _start(dark=dark)
+        driver = self._drivers[dark]
+        before = driver.current_window_handle
+        driver.switch_to.new_window("tab")
+        width, height = size
+        # The window has a minimum width, and a phone is narrower.
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        page = Browser(driver, port)
+        page.traffic()
+        page.complaints()
+        try:
+            yield page
+        finally:
+            driver.execute_cdp_cmd("Storage.clearDataForOrigin", {"origin": page.url, "storageTypes": "all"})
+            driver.close()
+            driver.switch_to.window(before)
+
+    def close(self) -> None:
+        """End the programs."""
+        for driver in self._drivers.values():
+            driver.quit()
+
+
+def _start(*, dark: bool) -> Chrome:
     programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
     assert all(programs.values()), "install Debian's packages: apt-get install chromium chromium-driver"
     options = ChromeOptions()
@@ -102,12 +135,6 @@ def browser(port: int, size: tuple[int, int] = LAPTOP, *, dark: bool = False) ->
         options.add_argument("--blink-settings=preferredColorScheme=0")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = Chrome(options, ChromeService(str(programs["chromedriver"])))
-    try:
-        driver.set_page_load_timeout(PATIENCE * 2)
-        width, height = size
-        # The window has a minimum width, and a phone is narrower.
-        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
-        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-        yield Browser(driver, port)
-    finally:
-        driver.quit()
+    driver.set_page_load_timeout(PATIENCE * 2)
+    driver.set_script_timeout(PATIENCE)
+    return driver

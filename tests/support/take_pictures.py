@@ -3,9 +3,10 @@
 
 import sys
 import tempfile
+from contextlib import closing
 from pathlib import Path
 
-from tests.support.chromium import PHONE, browser
+from tests.support.chromium import PHONE, Browsers
 from tests.support.plan import plain_plan
 from tests.support.web_bench import EXAMPLE, web_bench
 
@@ -16,10 +17,10 @@ PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
 
 def take_pictures(folder: Path) -> None:
     """Save pictures of the page on a laptop and a phone, light and dark."""
-    with tempfile.TemporaryDirectory() as name, web_bench(Path(name)) as bench:
+    with tempfile.TemporaryDirectory() as name, web_bench(Path(name)) as bench, closing(Browsers()) as browsers:
         bench.daemon.push(plain_plan(9))
         bench.push_example()
-        with browser(bench.port, _LAPTOP) as laptop:
+        with browsers.tab(bench.port, _LAPTOP) as laptop:
             laptop.open()
             laptop.wait_for_looks(2)
             laptop.picture(folder / "status-page.png")
@@ -30,7 +31,7 @@ def take_pictures(folder: Path) -> None:
             laptop.wait_for_looks(2)
             laptop.run("document.getElementById('file-title').scrollIntoView()")
             laptop.picture(folder / "checked-file.png")
-        with browser(bench.port, PHONE, dark=True) as phone:
+        with browsers.tab(bench.port, PHONE, dark=True) as phone:
             phone.open()
             phone.wait_for_looks(2)
             phone.run("document.getElementById('map-title').scrollIntoView()")

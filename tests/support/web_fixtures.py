@@ -2,12 +2,13 @@
 """Fixtures for the status page's tests."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
 
 from tests.support.benches import Starter
+from tests.support.chromium import Browsers
 from tests.support.web_bench import WebBench, web_bench
 
 
@@ -15,6 +16,13 @@ from tests.support.web_bench import WebBench, web_bench
 def start(tmp_path: Path) -> Iterator[Starter]:
     with ExitStack() as stack:
         yield Starter(tmp_path, stack)
+
+
+@pytest.fixture(scope="session")
+def browsers() -> Iterator[Browsers]:
+    """Chromium for all tests of a worker."""
+    with closing(Browsers()) as opened:
+        yield opened
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.chromium import LAPTOP, PHONE, Browser, browser
+from tests.support.chromium import LAPTOP, PHONE, Browser, Browsers
 from tests.support.plan import plain_plan
 from tests.support.programs import until
 from tests.support.web_bench import EXAMPLE, WebBench
@@ -32,10 +32,11 @@ def violations(page: Browser) -> list[str]:
 
 
 @pytest.mark.parametrize(("size", "dark"), [(LAPTOP, False), (PHONE, True)])
-def test_axe_finds_nothing_in_any_state(web: WebBench, size: tuple[int, int], *, dark: bool) -> None:
+def test_axe_finds_nothing_in_any_state(
+    browsers: Browsers, web: WebBench, size: tuple[int, int], *, dark: bool
+) -> None:
     assert web.board is not None
-    with browser(web.port, size, dark=dark) as page:
-        page.driver.set_script_timeout(60)
+    with browsers.tab(web.port, size, dark=dark) as page:
         page.open()
         assert violations(page) == []  # without a mission
         web.daemon.push(plain_plan(9))

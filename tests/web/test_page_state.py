@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from protocols.mavlink.dialect import messages
-from tests.support.chromium import PHONE, Browser, browser
+from tests.support.chromium import PHONE, Browser, Browsers
 from tests.support.plain_station import PlainStation
 from tests.support.plan import plain_plan
 from tests.support.programs import until
@@ -16,9 +16,9 @@ from tests.support.web_bench import WebBench
 pytest_plugins = ("tests.support.web_fixtures",)
 
 
-def test_the_state_stays_in_sight(web: WebBench) -> None:
+def test_the_state_stays_in_sight(browsers: Browsers, web: WebBench) -> None:
     assert web.board is not None
-    with browser(web.port, PHONE) as page:
+    with browsers.tab(web.port, PHONE) as page:
         page.open()
         page.wait_text("#badges", "DISARMED")
         page.run("scrollTo(0, document.body.scrollHeight)")
@@ -44,8 +44,8 @@ def test_the_state_stays_in_sight(web: WebBench) -> None:
 
 
 @pytest.fixture(scope="module")
-def laptop(lasting_web: WebBench) -> Iterator[Browser]:
-    with browser(lasting_web.port) as laptop:
+def laptop(browsers: Browsers, lasting_web: WebBench) -> Iterator[Browser]:
+    with browsers.tab(lasting_web.port) as laptop:
         yield laptop
 
 

@@ -7,7 +7,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from service.web.telemetry_logs import PIECE
-from tests.support.chromium import PHONE, Browser, browser
+from tests.support.chromium import PHONE, Browser, Browsers
 from tests.support.programs import until
 from tests.support.web_bench import WebBench
 
@@ -21,8 +21,8 @@ def place(page: Browser) -> list[float]:
     return found
 
 
-def test_the_map_is_zoomed_and_panned(lasting_web: WebBench) -> None:
-    with browser(lasting_web.port) as page:
+def test_the_map_is_zoomed_and_panned(browsers: Browsers, lasting_web: WebBench) -> None:
+    with browsers.tab(lasting_web.port) as page:
         page.open()
         until(lambda: len(page.all("#map .point")) > 2, "the waypoints")
         fit, scale = place(page), page.text("#map .scale + text")
@@ -44,13 +44,13 @@ def test_the_map_is_zoomed_and_panned(lasting_web: WebBench) -> None:
         assert place(page) == fit
 
 
-def test_a_log_is_downloaded(lasting_web: WebBench, tmp_path: Path) -> None:
+def test_a_log_is_downloaded(browsers: Browsers, lasting_web: WebBench, tmp_path: Path) -> None:
     folder = lasting_web.daemon.state_dir / "logs"
     folder.mkdir(exist_ok=True)
     name, contents = "2026-01-02 03-04-05.tlog", bytes(range(256)) * (PIECE // 100)
     (folder / name).write_bytes(contents)
     downloads = tmp_path / "downloads"
-    with browser(lasting_web.port, PHONE) as page:
+    with browsers.tab(lasting_web.port, PHONE) as page:
         allow = {"behavior": "allow", "downloadPath": str(downloads)}
         page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", allow)
         page.open()

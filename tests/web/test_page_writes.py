@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.chromium import PHONE, Browser, browser
+from tests.support.chromium import PHONE, Browser, Browsers
 from tests.support.plan import plain_plan
 from tests.support.programs import until
 from tests.support.web_bench import EXAMPLE, WebBench
@@ -30,11 +30,11 @@ def is_in_sight(page: Browser, selector: str) -> bool:
     return bool(page.run(script, selector))
 
 
-def test_a_stored_mission_is_written_with_the_token(bench: WebBench) -> None:
+def test_a_stored_mission_is_written_with_the_token(browsers: Browsers, bench: WebBench) -> None:
     assert bench.board is not None
     first = bench.board.records()
     bench.push_example()
-    with browser(bench.port, PHONE) as page:
+    with browsers.tab(bench.port, PHONE) as page:
         page.open()
         page.press("button[aria-label='Show mission 1']")
         page.wait_text("tr.detail h3", "Mission 1")
@@ -65,10 +65,10 @@ def test_a_stored_mission_is_written_with_the_token(bench: WebBench) -> None:
         assert not page.find("tr.detail button.write").is_enabled()
 
 
-def test_a_file_is_checked_drawn_and_written(bench: WebBench) -> None:
+def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench) -> None:
     assert bench.board is not None
     before = bench.board.records()
-    with browser(bench.port, PHONE) as page:
+    with browsers.tab(bench.port, PHONE) as page:
         page.open()
         page.find("#file").send_keys(str(EXAMPLE))
         page.wait_text("#checked", "naze-field.waypoints: 14 items, 6 changed, 1 dropped.")
@@ -88,12 +88,12 @@ def test_a_file_is_checked_drawn_and_written(bench: WebBench) -> None:
         assert page.complaints() == []
 
 
-def test_a_file_is_dropped(bench: WebBench) -> None:
+def test_a_file_is_dropped(browsers: Browsers, bench: WebBench) -> None:
     drop = """
         const files = new DataTransfer();
         files.items.add(new File([arguments[0]], 'dropped.waypoints'));
         document.body.dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: files}));"""
-    with browser(bench.port) as page:
+    with browsers.tab(bench.port) as page:
         page.open()
         page.run(drop, EXAMPLE.read_text())
         page.wait_text("#checked", "dropped.waypoints: 14 items")
@@ -102,10 +102,10 @@ def test_a_file_is_dropped(bench: WebBench) -> None:
         assert page.all("#checked button.write") == []
 
 
-def test_a_list_that_would_be_rejected_cannot_be_written(bench: WebBench, tmp_path: Path) -> None:
+def test_a_list_that_would_be_rejected_cannot_be_written(browsers: Browsers, bench: WebBench, tmp_path: Path) -> None:
     lines = EXAMPLE.read_text().splitlines()
     (tmp_path / "rejected.waypoints").write_text("\n".join([*lines, lines[2].replace("1\t", f"{len(lines) - 1}\t", 1)]))
-    with browser(bench.port) as page:
+    with browsers.tab(bench.port) as page:
         page.open()
         page.find("#file").send_keys(str(tmp_path / "rejected.waypoints"))
         page.wait_text("#checked", "rejected.waypoints would be rejected")

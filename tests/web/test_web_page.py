@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.chromium import LAPTOP, PHONE, Browser, browser
+from tests.support.chromium import LAPTOP, PHONE, Browser, Browsers
 from tests.support.plan import plain_plan
 from tests.support.programs import run_naze_bridge, until
 from tests.support.take_pictures import PICTURES, take_pictures
@@ -27,8 +27,8 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WebBench]:
 
 
 @pytest.fixture(scope="module")
-def laptop(bench: WebBench) -> Iterator[Browser]:
-    with browser(bench.port, LAPTOP) as laptop:
+def laptop(browsers: Browsers, bench: WebBench) -> Iterator[Browser]:
+    with browsers.tab(bench.port, LAPTOP) as laptop:
         yield laptop
 
 
@@ -98,7 +98,7 @@ def test_the_scale_is_true(page: Browser) -> None:
 
 def test_the_last_upload_as_sent_and_as_stored(page: Browser) -> None:
     assert page.text("#upload b") == "VERIFIED"
-    assert len(page.all("#upload tr.changed")) == 7
+    assert len(page.all("#upload tr.changed")) == 6
     dropped = page.text("#upload tr.dropped")
     assert "DO_CHANGE_SPEED" in dropped
     assert "dropped: not stored\nnot supported" in dropped
@@ -131,13 +131,13 @@ def own_bench(tmp_path: Path) -> Iterator[WebBench]:
         yield bench
 
 
-def test_foreign_text_is_not_markup(own_bench: WebBench) -> None:
+def test_foreign_text_is_not_markup(browsers: Browsers, own_bench: WebBench) -> None:
     """A file's name and a ground station's words come from outside."""
     evil = "<img src=x onerror=alert(1)><script>alert(2)</script>"
     item = {"command": 16, "frame": 3, "p1": 0, "p2": 3, "p3": 0, "p4": 0, "lat_e7": 453838000, "lon_e7": 84733000}
     items = [item | {"seq": seq, "alt_m": 10} for seq in range(3)]
     own_bench.daemon.ask({"do": "push", "source": evil, "items": items})
-    with browser(own_bench.port) as page:
+    with browsers.tab(own_bench.port) as page:
         page.open()
         assert evil in page.text("#missions")
         assert evil in page.text("#upload")
@@ -145,8 +145,8 @@ def test_foreign_text_is_not_markup(own_bench: WebBench) -> None:
         assert page.complaints() == []
 
 
-def test_it_fits_on_a_phone(bench: WebBench) -> None:
-    with browser(bench.port, PHONE) as phone:
+def test_it_fits_on_a_phone(browsers: Browsers, bench: WebBench) -> None:
+    with browsers.tab(bench.port, PHONE) as phone:
         phone.open()
         phone.press("button[aria-label='Show mission 2']")
         phone.wait_text("tr.detail h3", "Mission 2")
@@ -165,8 +165,8 @@ def test_it_fits_on_a_phone(bench: WebBench) -> None:
         assert phone.run(f"return [...document.querySelectorAll('button, input')].filter({small}).length") == 0
 
 
-def test_without_a_mission_and_without_a_position(tmp_path: Path) -> None:
-    with web_bench(tmp_path) as bench, browser(bench.port) as page:
+def test_without_a_mission_and_without_a_position(browsers: Browsers, tmp_path: Path) -> None:
+    with web_bench(tmp_path) as bench, browsers.tab(bench.port) as page:
         page.open()
         page.wait_text("#missions", "No mission has been received yet.")
         page.wait_text("#upload", "No mission has been received yet.")
