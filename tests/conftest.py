@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""For all tests."""
+"""Settings for all tests."""
 
 import signal
 
@@ -7,14 +7,14 @@ import pytest
 from hypothesis import settings
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    # A shell starts its background jobs so, and programs started by tests would inherit it.
+    # A shell starts background jobs with SIGINT ignored, and programs started by tests would inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# Elapsed time is never judged: the machine may be busy with something else.
+# No deadlines: the machine may be busy.
 settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
 
-#: The longest files. They start first, or one of them would run alone at the end (make test).
+#: The longest files. They start first; otherwise one of them could run alone at the end.
 _LONG = (
     "tests/service/test_debian_package",
     "tests/firmware/test_firmware_core",
@@ -29,8 +29,9 @@ _WAITING = tuple(f"tests/{name}/" for name in ("attack", "cli", "doctor", "e2e",
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the long files first, then spread the rest: files that wait and files that compute, side by side, fill the
-    cores better than one kind after the other. The order within a file stays."""
+    """Sort the long files first, then alternate between files that wait and files that compute.
+
+    This uses the cores better than one kind after the other. The order within a file is kept."""
     files = list(dict.fromkeys(_file(item) for item in items))
     waiting = [file for file in files if file.startswith(_WAITING)]
     computing = [file for file in files if not file.startswith(_WAITING)]

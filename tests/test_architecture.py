@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Imports run one way: service -> bridge -> protocols, storage below service, and down inside bridge/ and service/."""
+"""Imports go one way: service -> bridge -> protocols, storage below service, and down within bridge/ and service/."""
 
 import ast
 from collections import Counter
@@ -13,7 +13,7 @@ import pytest
 from tests.support.forked import PRELOADED
 
 REPOSITORY = Path(__file__).parents[1]
-#: The packages that each one may import besides itself.
+#: The other packages that each one may import.
 BRIDGE = {
     "bridge.model": set[str](),
     "bridge.line": {"bridge.model"},
@@ -41,29 +41,29 @@ SERVICE["service.daemon"] = {*SERVICE}
 SERVICE["service.web"] = SERVICE["service.zenoh_link"] = {*SERVICE}
 SERVICE["service.cli"] = {*SERVICE}
 INSIDE = BRIDGE | SERVICE
-#: Owning a clock, a port or a loop is for service/ and simulator/.
+#: Only service/ and simulator/ may use a clock, a port or an event loop.
 IMPURE = {"asyncio", "selectors", "serial", "socket", "subprocess", "threading", "time"}
 
 
 def imports(folder: Path) -> Iterator[tuple[str, str]]:
-    """Each file below a folder with each module that it imports."""
+    """Pairs of a file below a folder and a module it imports."""
     for file in folder.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and node.module:
-                # `from bridge.vehicle import vehicle_messages` imports a module, too.
+                # `from bridge.vehicle import vehicle_messages` also imports a module.
                 yield from ((str(file), f"{node.module}.{alias.name}") for alias in node.names)
             elif isinstance(node, ast.Import):
                 yield from ((str(file), alias.name) for alias in node.names)
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_between_packages(package: str) -> None:
+def test_imports_between_packages(package: str) -> None:
     ours = PACKAGES.keys() - PACKAGES[package] - {package}
     assert [(file, name) for file, name in imports(REPOSITORY / package) if name.split(".")[0] in ours] == []
 
 
 @pytest.mark.parametrize("package", INSIDE)
-def test_inside(package: str) -> None:
+def test_imports_within_a_package(package: str) -> None:
     allowed = INSIDE[package] | {package}
     whole = package.partition(".")[0]
     found = [
@@ -75,7 +75,7 @@ def test_inside(package: str) -> None:
 
 
 def test_no_cycle_in_the_simulator() -> None:
-    """Between its modules, of which the package emulated_naze counts as one. CycleError names it."""
+    """Between its modules; the package emulated_naze counts as one. CycleError names the cycle."""
     graph: dict[str, set[str]] = {}
     for file, name in imports(REPOSITORY / "simulator"):
         module = Path(file).relative_to(REPOSITORY / "simulator").parts[0].removesuffix(".py")
@@ -84,14 +84,14 @@ def test_no_cycle_in_the_simulator() -> None:
     TopologicalSorter(graph).prepare()
 
 
-def test_no_package_of_the_service_is_left_out() -> None:
-    # A folder without modules is what byte code keeps of a package that is gone.
+def test_every_package_of_the_service_is_listed() -> None:
+    # A folder without modules is the byte code of a removed package.
     found = [path for path in (REPOSITORY / "service").glob("[!_.]*") if path.is_file() or any(path.glob("*.py"))]
     assert {f"service.{path.name}" for path in found} == {*SERVICE}
 
 
 def test_class_names_are_unique() -> None:
-    """Among ourselves; a simulated firmware may use a name of its own for what it simulates."""
+    """Except in the simulator, which may use the same name for a simulated part."""
     files = (file for package in PACKAGES.keys() - {"simulator"} for file in (REPOSITORY / package).rglob("*.py"))
     nodes = (node for file in files for node in ast.walk(ast.parse(file.read_text())))
     names = Counter(node.name for node in nodes if isinstance(node, ast.ClassDef) and node.name[0] != "_")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/events.md lists every event that the log can have, and no other."""
+"""docs/events.md lists exactly the events that the log can have."""
 
 import ast
 import re
@@ -7,7 +7,7 @@ from pathlib import Path
 
 _REPOSITORY = Path(__file__).parents[1]
 _EVENT = re.compile(r"[a-z]+\.[a-z_]+")
-#: What is called with an event's name, be it the first or the second argument.
+#: Functions called with an event's name as the first or second argument.
 _LEVELS = {"debug", "info", "warning", "error", "exception", "level"}
 _SPEAKERS = _LEVELS | {"log_event", "_log_event", "note", "_note", "_complain"}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every source file names its licence at its top."""
+"""Every source file begins with its licence."""
 
 import subprocess
 from pathlib import Path

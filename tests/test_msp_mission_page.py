@@ -11,12 +11,12 @@ from tests.support.naze_bench import Bench
 
 PAGE = Path(__file__).parent.parent / "docs" / "msp-mission.md"
 HOME = WpRecord(473977420, 85455940, 2, 0, 0, 2, 0, WpCommand.WAYPOINT)
-# A height of 13 m with a brake: bytes 0D 00 00 00 01, one of the runs that Harakiri trips over in plain form.
+# A height of 13 m with a brake: bytes 0D 00 00 00 01, a hazard run for Harakiri in plain form.
 WAYPOINT = WpRecord(473980000, 85460000, 13, 0, 1, 2, 0, WpCommand.WAYPOINT)
 
 
 def exchange() -> list[str]:
-    """Push the two records to a simulated Naze; every frame on the wire as "companion -> ..." or "... <-"."""
+    """Push the two records to a simulated Naze; return every frame as "companion -> ..." or "... <-"."""
     bench = Bench()
     records = [HOME, WAYPOINT]
     chunk_1 = ext.encode_chunk(records, 0, 15)
@@ -29,7 +29,7 @@ def exchange() -> list[str]:
         ext.encode_commit(identify(records)),
         ext.encode_read(0, 2),
     ]
-    bench.ask(ext.INFO_REQUEST)  # out of AUTOSENSE, and its heartbeats out of the picture
+    bench.ask(ext.INFO_REQUEST)  # ends AUTOSENSE, whose heartbeats would be in the exchange
     lines = []
     for request in requests:
         reply = bench.ask(request)

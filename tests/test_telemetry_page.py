@@ -13,7 +13,7 @@ from protocols.mavlink.dialect import messages as m
 
 PAGE = (Path(__file__).parents[1] / "docs" / "telemetry.md").read_text()
 STREAMS = {number: name.removeprefix("MAV_DATA_STREAM_") for name, number in vars(m).items() if "DATA_STREAM_" in name}
-#: Fields that say what the message is about, and extensions that are left at MAVLink's "not given".
+#: Fields that only identify the message, and extensions left at MAVLink's "not given".
 UNTOLD = {"alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "hdg_acc", "yaw", "id", "temperature", "time_remaining",
               "charge_state", "voltages_ext", "mode", "fault_bitmask", "battery_function", "type", "time_boot_ms",
               "time_usec", "port", "chancount", "name", "value"}  # fmt: skip
@@ -25,7 +25,7 @@ def name_of(row: Row) -> str:
 
 
 @pytest.mark.parametrize("row", TELEMETRY, ids=name_of)
-def test_each_message_is_on_the_page_as_it_is_in_the_code(row: Row) -> None:
+def test_each_message_on_the_page_matches_the_code(row: Row) -> None:
     (line,) = re.findall(rf"^\| {name_of(row)} \| (.*) \|$", PAGE, re.MULTILINE)
     after, _, rate, stream = line.split(" | ")
     poll = POLL_FOR.get(row.reading)

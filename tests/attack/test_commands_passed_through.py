@@ -19,7 +19,7 @@ COMMANDS = {
     "forced disarm": m.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0),
     "reboot": m.MAVLink_command_long_message(1, 1, 246, 0, 1, 0, 0, 0, 0, 0, 0),
     "motor test": m.MAVLink_command_long_message(1, 1, 209, 0, 1, 0, 50, 5, 0, 0, 0),
-    "a command of the future": m.MAVLink_command_int_message(1, 1, 0, 31999, 0, 0, 1, 1, 1, 1, 1, 1, 1),
+    "a future command": m.MAVLink_command_int_message(1, 1, 0, 31999, 0, 0, 1, 1, 1, 1, 1, 1, 1),
     "RC override": m.MAVLink_rc_channels_override_message(1, 1, *[1900] * 8),
     "SET_MODE": m.MAVLink_set_mode_message(1, 1, 3),
     "manual control": m.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0),
@@ -58,7 +58,7 @@ class Autopilot(threading.Thread):
                     return
 
     def kinds(self) -> list[str]:
-        """The received MAVLink; before that the bridge searches for an MSP board."""
+        """The received MAVLink messages, without the bridge's earlier MSP probes."""
         return [message.get_type() for message in self.received if message.get_type() != "BAD_DATA"]
 
     def was_asked_for(self, parameter: str) -> bool:
@@ -121,13 +121,13 @@ def test_missions_and_parameters_pass_an_open_link(start: Starter, autopilot: Au
         for message in allowed:
             station.send(message)
         kinds = {message.get_type() for message in allowed}
-        until(lambda: kinds <= set(autopilot.kinds()), "what an open link lets through")
+        until(lambda: kinds <= set(autopilot.kinds()), "the messages that pass an open link")
 
 
 @pytest.mark.parametrize(
     "settings", ['pass_through = "everything"\n', 'gcs = [{address = "LINK", writers = ["127.0.0.1"]}]\n']
 )
-def test_commands_pass_if_the_owner_says_so(start: Starter, autopilot: Autopilot, settings: str) -> None:
+def test_commands_pass_with_a_list_of_writers(start: Starter, autopilot: Autopilot, settings: str) -> None:
     daemon = passing(start, autopilot, settings)
     with udp_station(daemon.address) as station:
         for message in COMMANDS.values():
@@ -136,7 +136,7 @@ def test_commands_pass_if_the_owner_says_so(start: Starter, autopilot: Autopilot
         assert comes(lambda: kinds <= set(autopilot.kinds())), autopilot.kinds()
 
 
-def test_commands_pass_if_they_are_signed(start: Starter, autopilot: Autopilot, tmp_path: Path) -> None:
+def test_signed_commands_pass(start: Starter, autopilot: Autopilot, tmp_path: Path) -> None:
     key_file = tmp_path / "gcs.key"
     key_file.write_text("loop the loop\n")
     key_file.chmod(0o600)

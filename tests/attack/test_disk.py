@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strangers that want the disk or the control socket for themselves, and a disk that is not there, or hangs."""
+"""Floods of the disk and the control socket, and a disk that is missing or hangs."""
 
 import os
 import signal
@@ -22,7 +22,7 @@ def logs(state_dir: Path) -> list[Path]:
     return sorted((state_dir / "logs").glob("*.tlog"))
 
 
-def test_the_log_of_a_flight_outlives_a_flood(start: Starter, stack: ExitStack) -> None:
+def test_the_log_of_a_flight_survives_a_flood(start: Starter, stack: ExitStack) -> None:
     config = start.directory / "naze-bridge.toml"
     config.write_text("tlog_file_mb = 1\ntlog_total_mb = 3\n")
     bench = start.bench(daemon_options=("--config", str(config)))
@@ -40,11 +40,11 @@ def test_the_log_of_a_flight_outlives_a_flood(start: Starter, stack: ExitStack) 
     with Watch(bench.daemon), Attack(lambda: stranger.send(*[text] * 50), per_s=40) as attack:
         assert comes(lambda: attack.count > 300)
     assert flight in logs(state)
-    # 1.2 MB were sent; the flood is not recorded.
+    # The 1.2 MB of the flood are not recorded.
     assert sum(path.stat().st_size for path in logs(state)) < 600_000
 
 
-def test_what_is_refused_is_not_recorded(start: Starter, stack: ExitStack, tmp_path: Path) -> None:
+def test_refused_frames_are_not_recorded(start: Starter, stack: ExitStack, tmp_path: Path) -> None:
     key_file = tmp_path / "gcs.key"
     key_file.write_text("loop the loop\n")
     key_file.chmod(0o600)
@@ -62,9 +62,9 @@ def test_what_is_refused_is_not_recorded(start: Starter, stack: ExitStack, tmp_p
     assert 77 not in {frame.sysid for frame in MavlinkSplitter().feed(recorded)}
 
 
-def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path: Path) -> None:
+def test_without_a_state_directory_the_daemon_keeps_working(start: Starter, tmp_path: Path) -> None:
     blocked = tmp_path / "blocked"
-    blocked.write_text("a file where the folder should be")
+    blocked.write_text("a file in place of the folder")
     board = start.board()
     port = free_port(socket.SOCK_STREAM)
     config = tmp_path / "naze-bridge.toml"
@@ -89,7 +89,7 @@ def test_without_a_state_directory_the_daemon_flies_on(start: Starter, tmp_path:
 
 
 class DaemonWithoutDisk(Daemon):
-    """Its disk never answers: as an SD card that hangs in the kernel."""
+    """Its disk never answers, like an SD card that hangs in the kernel."""
 
     _HANGING = """
 import os, threading
@@ -106,7 +106,7 @@ main(prog_name="naze-bridge")
             return subprocess.Popen(command, cwd=REPOSITORY, stdout=output, stderr=output)
 
 
-def test_a_disk_that_hangs_keeps_no_daemon_from_flying_and_ending(start: Starter, stack: ExitStack) -> None:
+def test_with_a_hung_disk_the_daemon_works_and_stops(start: Starter, stack: ExitStack) -> None:
     board = start.board()
     options = ("--record-uart", str(start.directory / "naze.uart"))
     daemon = DaemonWithoutDisk(start.directory, str(board.link), options=options)
@@ -118,7 +118,7 @@ def test_a_disk_that_hangs_keeps_no_daemon_from_flying_and_ending(start: Starter
     assert "store.hangs" in daemon.printed
 
 
-def test_connections_that_ask_nothing(start: Starter) -> None:
+def test_idle_connections(start: Starter) -> None:
     bench = start.bench()
     path = str(bench.daemon.state_dir / "control.sock")
     with Watch(bench.daemon) as witness, ExitStack() as clients:
@@ -136,7 +136,7 @@ def test_connections_that_ask_nothing(start: Starter) -> None:
     assert comes(lambda: bench.daemon.status() is not None)
 
 
-def test_a_long_source_is_cut(start: Starter) -> None:
+def test_a_long_source_is_truncated(start: Starter) -> None:
     bench = start.bench()
     with Watch(bench.daemon) as witness:
         until(lambda: len(witness.gaps_s) >= 1, "a heartbeat")
@@ -146,7 +146,7 @@ def test_a_long_source_is_cut(start: Starter) -> None:
     assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] < 60
 
 
-def test_answers_that_nobody_reads(start: Starter) -> None:
+def test_unread_replies(start: Starter) -> None:
     bench = start.bench()
     bench.daemon.push(plain_plan(140))
     number = bench.daemon.missions()[0]["number"]
@@ -175,7 +175,7 @@ def test_requests_of_a_megabyte(start: Starter) -> None:
         for _ in range(16):
             client = clients.enter_context(socket.socket(socket.AF_UNIX))
             client.connect(str(bench.daemon.state_dir / "control.sock"))
-            with suppress(OSError):  # it has hung up
+            with suppress(OSError):  # the daemon has disconnected
                 client.sendall(request)
         until(lambda: len(witness.gaps_s) >= 2, "heartbeats")
     assert _memory_kb(bench.daemon.process.pid, "VmHWM") - before < 15_000

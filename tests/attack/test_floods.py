@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Floods: each requests so much that the pilot, the board or its flash would suffer."""
+"""Floods of requests, each enough to harm the pilot, the board or its flash."""
 
 import socket
 from contextlib import ExitStack, suppress
@@ -24,8 +24,8 @@ def command(number: int, p1: float = 0.0, p2: float = 0.0) -> Message:
     return m.MAVLink_command_long_message(1, 1, number, 0, p1, p2, 0, 0, 0, 0, 0)
 
 
-def test_texts(bench: Bench, stack: ExitStack) -> None:
-    """Texts caused by a stranger go only to the stranger."""
+def test_texts_go_only_to_their_cause(bench: Bench, stack: ExitStack) -> None:
+    """A stranger's refusals do not reach the pilot."""
     stranger = Stranger(bench.daemon.address)
     stack.callback(stranger.close)
     loud = (command(42428), command(400, 1.0), m.MAVLink_set_mode_message(1, 1, 3), command(22, 1.0))
@@ -38,8 +38,8 @@ def test_texts(bench: Bench, stack: ExitStack) -> None:
         assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4
 
 
-def test_floods_of_tcp_and_of_the_page_and_of_the_control_socket(start: Starter) -> None:
-    """Each connection asks for something costly, and hangs up without reading it."""
+def test_floods_of_tcp_the_page_and_the_control_socket(start: Starter) -> None:
+    """Each connection makes an expensive request and disconnects without reading the reply."""
     page, tcp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
     config = start.directory / "naze-bridge.toml"
     config.write_text(f'[web]\nlisten = "127.0.0.1:{page}"\n')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strangers that fill every place on a link, or impersonate the pilot."""
+"""Strangers fill every place on a link or impersonate the pilot."""
 
 import itertools
 import socket
@@ -17,7 +17,7 @@ from tests.support.plan import plain_plan
 from tests.support.programs import comes, free_port, until
 
 PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
-#: More than there are places on a link.
+#: More than the places on a link.
 CROWD = 48
 
 
@@ -39,7 +39,7 @@ def guarded(start: Starter, key_file: Path) -> Bench:
 
 
 def crowd(bench: Bench, stack: ExitStack, *spoken: Message, per_s: float = 30) -> Attack:
-    """Strangers from several machines that each say hello, or something else, now and then."""
+    """Strangers from several machines; each sends a heartbeat, or something else, from time to time."""
     strangers = [Stranger(bench.daemon.address, f"127.0.1.{1 + number % 9}") for number in range(CROWD)]
     for stranger in strangers:
         stack.callback(stranger.close)
@@ -48,7 +48,7 @@ def crowd(bench: Bench, stack: ExitStack, *spoken: Message, per_s: float = 30) -
 
 
 def hears_heartbeats(station: PlainStation, count: int) -> bool:
-    """Say hello every second, as ground stations do, until so many heartbeats came."""
+    """Send a heartbeat every second until `count` heartbeats have been received."""
     for _ in range(20):
         station.send(HELLO)
         count -= len([heard for heard in station._messages(1.0) if heard.get_type() == "HEARTBEAT"])
@@ -57,8 +57,8 @@ def hears_heartbeats(station: PlainStation, count: int) -> bool:
     return False
 
 
-def test_a_crowd_locks_no_newcomer_out_of_an_open_link(start: Starter, stack: ExitStack) -> None:
-    """Nor from writing: a hundred lists a second are announced, ten times what all newcomers together may."""
+def test_a_crowd_does_not_lock_a_pilot_out_of_an_open_link(start: Starter, stack: ExitStack) -> None:
+    """The pilot can also write, though the crowd announces ten times as many lists as all newcomers together may."""
     bench = start.bench()
     with crowd(bench, stack, HELLO, m.MAVLink_mission_count_message(1, 1, 9), per_s=100) as attack:
         assert comes(lambda: attack.count > 2 * CROWD)
@@ -68,13 +68,13 @@ def test_a_crowd_locks_no_newcomer_out_of_an_open_link(start: Starter, stack: Ex
             assert_uploads(pilot, bench.board, plain_plan(30))
 
 
-def test_a_crowd_does_not_take_the_place_of_a_pilot_that_was_there(start: Starter, stack: ExitStack) -> None:
+def test_a_crowd_does_not_displace_a_connected_pilot(start: Starter, stack: ExitStack) -> None:
     bench = start.bench()
     with udp_station(bench.daemon.address) as pilot:
         pilot.send(HELLO)
         pilot.wait_for("HEARTBEAT")
         with Watch(bench.daemon), crowd(bench, stack) as attack:
-            # Longer than the 5 s of silence after which a place was given away: the pilot's radio fades.
+            # The pilot's radio fades for more than 5 s, after which places used to be given away.
             assert comes(lambda: attack.count > 240)
             places = bench.daemon.ask({"do": "status"})["ground_stations"]
             assert any(str(pilot.own_address[1]) in place for place in places)
@@ -86,7 +86,7 @@ def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, sta
     with crowd(bench, stack) as attack:
         assert comes(lambda: attack.count > 2 * CROWD)
         with udp_station(bench.daemon.address) as pilot:
-            # As Mission Planner: it signs once it has seen a signed heartbeat.
+            # Like Mission Planner, sign once a signed heartbeat was received.
             assert hears_heartbeats(pilot, 2)
             sign(pilot._codec, PASSPHRASE)
             assert_uploads(pilot, bench.board, plain_plan(30))
@@ -95,7 +95,7 @@ def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, sta
             assert listener.upload(plain_plan(3)) is MissionResult.DENIED
             listener.send(m.MAVLink_command_long_message(1, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             assert listener.wait_for("COMMAND_ACK").result == m.MAV_RESULT_DENIED
-    # The pilot's texts do not go to strangers, even if there is room for them.
+    # Texts to the pilot do not go to strangers, even if there is room.
     with udp_station(bench.daemon.address) as pilot, udp_station(bench.daemon.address) as listener:
         assert hears_heartbeats(listener, 2)
         sign(pilot._codec, PASSPHRASE)
@@ -105,7 +105,7 @@ def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, sta
 
 
 def test_an_unsigned_frame_does_not_change_the_pilots_rates(start: Starter, stack: ExitStack, key_file: Path) -> None:
-    """Unsigned, from the pilot's own address: as a forged UDP packet is."""
+    """Forged: unsigned, from the pilot's own address."""
     bench = guarded(start, key_file)
     with udp_station(bench.daemon.address) as pilot:
         sign(pilot._codec, PASSPHRASE)
@@ -125,7 +125,7 @@ def test_an_unsigned_frame_does_not_change_the_pilots_rates(start: Starter, stac
         assert "PARAM_VALUE" not in {message.get_type() for message in pilot.heard}
 
 
-def test_idle_connections_lock_no_newcomer_out(start: Starter, stack: ExitStack) -> None:
+def test_idle_connections_do_not_lock_a_pilot_out(start: Starter, stack: ExitStack) -> None:
     port = free_port(socket.SOCK_STREAM)
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
     with tcp_station(port) as first:
@@ -138,12 +138,12 @@ def test_idle_connections_lock_no_newcomer_out(start: Starter, stack: ExitStack)
             pilot.send(HELLO)
             pilot.wait_for("HEARTBEAT")
             assert_uploads(pilot, bench.board, plain_plan(15))
-        # The one that came first is still there.
+        # The first one is still connected.
         assert_uploads(first, bench.board, plain_plan(9))
 
 
-def test_slow_uploads_and_made_up_addresses_hold_up_no_pilot(start: Starter, stack: ExitStack) -> None:
-    """Twenty announce a list and give one item; six hundred addresses say hello, a hundred a second."""
+def test_slow_uploads_and_forged_addresses_do_not_delay_the_pilot(start: Starter, stack: ExitStack) -> None:
+    """Twenty stations announce a list and send one item; 600 addresses send a heartbeat, 100 a second."""
     bench = start.bench()
     with udp_station(bench.daemon.address) as pilot:
         pilot.send(HELLO)

@@ -31,7 +31,7 @@ def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet
         fleet.open("pilot", "guest") as guest,
         fleet.open("vehicle", "naze-2") as other,
     ):
-        # The guest looks on.
+        # The guest only subscribes.
         assert Reader(guest, key("telemetry/*")).wait("telemetry/attitude")
         truth = ask_surely(pilot, "state")
         heard = Reader(pilot)
@@ -39,7 +39,7 @@ def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet
         pilot.liveliness().declare_subscriber("fleet/**", lambda sample: tokens.append(str(sample.key_expr)))
         for liar in (guest, other):
             _lie(liar)
-        time.sleep(2.0)  # for the forged samples to arrive, if they do
+        time.sleep(2.0)  # time for forged samples to arrive
         heard.wait("telemetry/attitude")
         assert [sample for sample in heard.samples if sample.payload.to_bytes() == b"forged"] == []
         assert zenoh.SampleKind.DELETE not in [sample.kind for sample in heard.samples]

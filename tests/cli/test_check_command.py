@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge check` as a person and as a script use it."""
+"""`naze-bridge check` as used by a person and by a script."""
 
 import json
 from dataclasses import replace
@@ -62,11 +62,11 @@ def files(tmp_path: Path) -> dict[str, Path]:
     ],
 )
 @pytest.mark.parametrize("mode", [[], ["--json"]])
-def test_the_exit_code_is_the_worst_files(files: dict[str, Path], names: list[str], code: int, mode: list[str]) -> None:
+def test_the_exit_code_of_several_files(files: dict[str, Path], names: list[str], code: int, mode: list[str]) -> None:
     assert run(*mode, *[files[name] for name in names]).exit_code == code
 
 
-def test_strict_counts_changes_as_rejection(files: dict[str, Path]) -> None:
+def test_strict_treats_changes_as_rejection(files: dict[str, Path]) -> None:
     assert run("--strict", files["clean"]).exit_code == 0
     assert run(FIELD).exit_code == 0
     assert run("--strict", FIELD).exit_code == 1
@@ -74,7 +74,7 @@ def test_strict_counts_changes_as_rejection(files: dict[str, Path]) -> None:
     assert run("--strict", FIELD, files["damaged"]).exit_code == 2
 
 
-def test_json_has_one_object_a_file_with_the_promised_keys(files: dict[str, Path]) -> None:
+def test_json_has_one_object_per_file_with_the_documented_keys(files: dict[str, Path]) -> None:
     result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
     accepted, rejected, cleared, missing = objects(result)
     keys = ["file", "result", "ack", "items", "records", "count", "checksum", "findings"]
@@ -113,11 +113,11 @@ def test_radius_and_capacity_are_the_flight_controllers(files: dict[str, Path]) 
 
 
 @pytest.mark.parametrize("option", [["--wp-radius-cm", "-1"], ["--capacity", "x"], []])
-def test_wrong_use_is_refused(option: list[str]) -> None:
+def test_wrong_usage_is_refused(option: list[str]) -> None:
     assert run(*option).exit_code == 2
 
 
-def test_a_person_sees_sent_alongside_stored_and_why() -> None:
+def test_a_person_sees_sent_and_stored_values_with_reasons() -> None:
     output = run(FIELD).stdout
     for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
         assert words in output
@@ -138,7 +138,7 @@ def test_an_unreadable_file_is_one_sentence_on_stderr(files: dict[str, Path]) ->
 
 
 @pytest.mark.parametrize("name", ["", "[bold]x.waypoints", "ü\u2028.waypoints"])
-def test_any_path_is_shown_as_it_is(tmp_path: Path, name: str) -> None:
+def test_any_path_is_shown_unchanged(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     if name:
         path.write_text(write_qgc_wpl([HOME, POINT]))
@@ -153,7 +153,7 @@ def test_an_endless_file_is_refused() -> None:
     assert "larger than" in result.stderr
 
 
-def test_the_examples_show_what_they_are_meant_to() -> None:
+def test_the_examples_have_the_intended_results() -> None:
     documents = objects(run("--json", FIELD, PLAN, LONG))
     assert [document["result"] for document in documents] == ["ACCEPTED"] * 3
     assert [len(document["items"]) for document in documents] == [13, 10, 146]
@@ -204,7 +204,7 @@ def test_the_take_off_limit_is_the_daemons(tmp_path: Path, monkeypatch: pytest.M
     assert "takeoff_max_m" in run(path).stderr
 
 
-def test_a_list_that_is_too_long_is_refused_before_its_rows_are_drawn(tmp_path: Path) -> None:
+def test_a_list_that_is_too_long_is_refused_without_a_table(tmp_path: Path) -> None:
     path = tmp_path / "long.waypoints"
     path.write_text(write_qgc_wpl([HOME, *(replace(POINT, seq=seq) for seq in range(1, 60000))]))
     output = run(path).stdout
@@ -212,7 +212,7 @@ def test_a_list_that_is_too_long_is_refused_before_its_rows_are_drawn(tmp_path: 
     assert "60000 items, but only 146 fit" in output
 
 
-def test_filled_in_defaults_are_in_the_table_alone(tmp_path: Path) -> None:
+def test_filled_in_defaults_appear_only_in_the_table(tmp_path: Path) -> None:
     path = tmp_path / "no-radius.waypoints"
     path.write_text(write_qgc_wpl([replace(HOME, p2=0.0), replace(POINT, p2=0.0, alt_m=10.5)]))
     output = run(path).stdout

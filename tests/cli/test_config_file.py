@@ -10,7 +10,7 @@ from service.settings.addresses import GcsAddress, SerialFc, SimulatedFc
 from tests.support.programs import run_naze_bridge
 
 
-def test_flags_go_before_the_file(tmp_path: Path) -> None:
+def test_flags_override_the_file(tmp_path: Path) -> None:
     config = tmp_path / "naze.toml"
     config.write_text('fc = "/dev/serial0,57600"\ngcs = ["udpin:127.0.0.1:1"]\nsysid = 7\nstate_dir = "/elsewhere"\n')
     settings = load_settings(config, None, (), None)
@@ -23,7 +23,7 @@ def test_flags_go_before_the_file(tmp_path: Path) -> None:
     assert (settings.sysid, settings.state_dir) == (7, tmp_path)
 
 
-def test_a_byte_order_mark_is_taken(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_accepted(tmp_path: Path) -> None:
     config = tmp_path / "naze.toml"
     config.write_bytes(b"\xef\xbb\xbfsysid = 9\r\n")
     assert load_settings(config, "sim:", (), tmp_path).sysid == 9
@@ -36,7 +36,7 @@ WRONG = {
     "brackets without end": (b"gcs = %b" % (b"[" * 5000), ["not valid TOML"]),
     "too large": (b"#" * ((1 << 20) + 1), ["larger than 1 MB"]),
     "a number in quotes": (b'sysid = "1"', ["sysid", "a whole number", "1..255"]),
-    "a number that is none": (b"sysid = true", ["sysid", "a whole number"]),
+    "not a number": (b"sysid = true", ["sysid", "a whole number"]),
     "a number out of range": (b"sysid = 300", ["sysid is 300", "1..255"]),
     "text without quotes' meaning": (b"fc = 1", ["fc", "text in quotes", "flight controller"]),
     "no list": (b'gcs = "udpin:0.0.0.0:14550"', ["gcs", "a list in brackets"]),
@@ -48,7 +48,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_reported_with_the_file(tmp_path: Path, name: str) -> None:
+def test_errors_are_reported_with_the_file(tmp_path: Path, name: str) -> None:
     text, words = WRONG[name]
     config = tmp_path / "naze.toml"
     config.write_bytes(text)

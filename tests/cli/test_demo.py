@@ -22,18 +22,18 @@ TEMPORARY = "naze-bridge-demo-"
 
 @pytest.fixture
 def folder() -> Iterator[Path]:
-    """A short path: that of a Unix socket has 107 characters at most."""
+    """A short path, because a Unix socket's path is limited to 107 characters."""
     with tempfile.TemporaryDirectory() as folder:
         yield Path(folder)
 
 
 @pytest.fixture
 def demo(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Program]:
-    """A demonstration that stays up, with its temporary files in `folder`."""
+    """A running demonstration with its temporary files in `folder`."""
     monkeypatch.setenv("TMPDIR", str(folder))
     with ExitStack() as stack:
         program = Program(tmp_path / "printed", "demo", "--port", str(free_port()))
-        # Not SIGKILL, which would leave its daemon behind.
+        # Not SIGKILL, which would leave its daemon running.
         stack.callback(program.end)
         until(
             lambda: "keeps running" in program.printed or not program.is_alive,
@@ -43,7 +43,7 @@ def demo(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-def test_it_takes_its_daemon_and_its_files_with_it(demo: Program, folder: Path, number: signal.Signals) -> None:
+def test_its_daemon_and_files_are_removed_at_the_end(demo: Program, folder: Path, number: signal.Signals) -> None:
     (state,) = folder.glob(f"{TEMPORARY}*")
     daemon = int((state / "lock").read_text())
     os.kill(daemon, 0)
@@ -54,7 +54,7 @@ def test_it_takes_its_daemon_and_its_files_with_it(demo: Program, folder: Path, 
     assert "Traceback" not in demo.printed
 
 
-def test_what_is_installed_has_its_example(tmp_path: Path) -> None:
+def test_an_installation_has_the_example(tmp_path: Path) -> None:
     """The packages of the wheel, without the rest of the repository."""
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())
     for package in project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
@@ -78,7 +78,7 @@ def test_what_is_installed_has_its_example(tmp_path: Path) -> None:
     assert "Sent 14 items; the flight controller holds 13" in ended.stdout
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_a_missing_file(tmp_path: Path) -> None:
     ended = run_naze_bridge("demo", "--once", tmp_path / "none")
     assert ended.returncode == 1
     assert ended.stderr.startswith(f"naze-bridge: {tmp_path / 'none'}: no such file")

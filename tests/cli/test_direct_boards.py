@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every command that takes `--fc`, against every board that can be simulated."""
+"""Every command with `--fc`, on every simulated board."""
 
 import json
 from collections.abc import Iterator
@@ -77,7 +77,7 @@ def test_status_and_doctor(board: Board) -> None:
     assert_status(board)
 
 
-def test_a_board_without_missions_says_so_and_its_status_works(other_board: Board, plan_file: Path) -> None:
+def test_a_board_without_missions_gives_the_reason_and_its_status(other_board: Board, plan_file: Path) -> None:
     sentence = "This flight controller stores no missions"
     for command in (("push", plan_file), ("clear",)):
         refused = run_naze_bridge(*command, "--fc", other_board.link)
@@ -88,7 +88,7 @@ def test_a_board_without_missions_says_so_and_its_status_works(other_board: Boar
     assert_status(other_board)
 
 
-def test_pull_all_reads_the_missions_that_are_not_loaded(tmp_path: Path) -> None:
+def test_pull_all_reads_missions_that_are_not_loaded(tmp_path: Path) -> None:
     with ExitStack() as stack:
         eeprom = tmp_path / "eeprom"
         ends = {3: FLAG_LAST, 8: FLAG_LAST}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands that talk to a flight controller directly (`--fc`), and faults outside naze-bridge."""
+"""Commands that use a flight controller directly (`--fc`), and faults outside naze-bridge."""
 
 import json
 import os
@@ -36,7 +36,7 @@ def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *par
     assert not [part for part in parts if part not in sentence], sentence
 
 
-def test_a_mission_there_and_back(board: Board, tmp_path: Path) -> None:
+def test_a_round_trip_of_a_mission(board: Board, tmp_path: Path) -> None:
     plan = plain_plan(5)
     file = tmp_path / "plan"
     file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plan)]))
@@ -48,7 +48,7 @@ def test_a_mission_there_and_back(board: Board, tmp_path: Path) -> None:
 
 
 def test_status_waits_for_telemetry(tmp_path: Path) -> None:
-    """At 9600 baud a round of it takes longer than to find the flight controller's name."""
+    """At 9600 baud a round of polls takes longer than identifying the flight controller."""
     with ExitStack() as stack:
         board = Starter(tmp_path, stack).board("--baud", "9600")
         status = json.loads(run_naze_bridge("status", "--json", "--fc", f"{board.link},9600").stdout)
@@ -57,11 +57,11 @@ def test_status_waits_for_telemetry(tmp_path: Path) -> None:
     assert status["satellites"] > 4
 
 
-def test_a_port_that_is_missing(tmp_path: Path) -> None:
+def test_a_missing_port(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--fc", tmp_path / "naze"), 1, "is missing", str(tmp_path))
 
 
-def test_a_port_that_another_program_has(board: Board) -> None:
+def test_a_port_used_by_another_program(board: Board) -> None:
     script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", script, str(board.link)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -72,11 +72,11 @@ def test_a_port_that_another_program_has(board: Board) -> None:
         other.kill()
 
 
-def test_a_tcp_port_that_nobody_listens_on() -> None:
+def test_a_tcp_port_without_a_listener() -> None:
     assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"), 1, "tcp:127.0.0.1:9 cannot be reached")
 
 
-def test_a_host_that_is_not_known() -> None:
+def test_an_unknown_host() -> None:
     advice = "check the name and the network"
     assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:[fe80::1%no-card]:9"), 1, advice)
 
@@ -93,7 +93,7 @@ def test_a_full_disk_behind_standard_output(tmp_path: Path) -> None:
     assert_one_sentence(ended, os.EX_IOERR, "cannot be written", "File too large")
 
 
-def test_a_full_disk_behind_the_log_stops_nothing(tmp_path: Path) -> None:
+def test_a_full_disk_behind_the_log_does_not_stop_the_program(tmp_path: Path) -> None:
     def leave_nothing() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
@@ -135,8 +135,8 @@ def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, command: list[st
     assert "--state-dir" in ended.stderr
 
 
-def test_a_daemon_does_not_load_what_only_commands_use() -> None:
-    """On a Pi with 512 MB each library counts."""
+def test_a_daemon_does_not_load_libraries_of_commands() -> None:
+    """A Pi may have only 512 MB."""
     script = (
         "import sys, click; from service.cli.main import main; main.get_command(click.Context(main), 'run');"
         "print(*sorted({'rich', 'pygments', 'zenoh', 'starlette', 'prometheus_client'} & set(sys.modules)))"
@@ -146,7 +146,7 @@ def test_a_daemon_does_not_load_what_only_commands_use() -> None:
 
 
 def test_help_loads_neither_the_daemon_nor_large_libraries() -> None:
-    """On a Pi each of them takes a part of a second."""
+    """Each takes a noticeable part of a second on a Pi."""
     script = (
         "import sys, click; from service.cli.main import main; context = click.Context(main); main.get_help(context);"
         "print(*sorted({'asyncio', 'bridge', 'pymavlink', 'rich', 'service.settings'} & set(sys.modules)));"

@@ -20,7 +20,7 @@ from tests.support.programs import NAZE_BRIDGE, PATIENCE, REPOSITORY, Board, run
 EXAMPLES = REPOSITORY / "examples"
 LONG = EXAMPLES / "long-146.waypoints"
 CTRL_C = b"\x03"
-#: Some of the records are written.
+#: By now some of the records are written.
 UNDER_WAY = r"[1-9][0-9]*/146"
 
 
@@ -31,12 +31,12 @@ def start(tmp_path: Path) -> Iterator[Starter]:
 
 
 def slow_board(start: Starter) -> Board:
-    """It takes 5 s to write 146 records."""
+    """A board that takes 5 s to write 146 records."""
     return start.board("--baud", "9600")
 
 
 class Terminal:
-    """A command in a terminal of its own, where Ctrl-C works however the tests were started."""
+    """A command in its own terminal, so that Ctrl-C works however the tests were started."""
 
     def __init__(self, *arguments: str | Path) -> None:
         self._master, slave = pty.openpty()
@@ -97,7 +97,7 @@ def interrupted_push(start: Starter) -> tuple[Board, Terminal]:
     return board, terminal
 
 
-def test_a_daemon_continues_and_its_result_follows(start: Starter) -> None:
+def test_a_daemon_continues_and_its_result_is_shown(start: Starter) -> None:
     board, terminal = interrupted_push(start)
     terminal.wait_for("naze-bridge: the daemon continues with the mission")
     assert terminal.end() == 0
@@ -105,7 +105,7 @@ def test_a_daemon_continues_and_its_result_follows(start: Starter) -> None:
     assert len(board.records()) == 146
 
 
-def test_a_second_one_leaves(start: Starter) -> None:
+def test_a_second_ctrl_c_exits(start: Starter) -> None:
     _, terminal = interrupted_push(start)
     terminal.wait_for("press Ctrl-C again")
     terminal.type(CTRL_C)

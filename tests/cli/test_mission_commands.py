@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`push`, `pull`, `clear` and `status` as a person and as a script use them, against a running daemon."""
+"""`push`, `pull`, `clear` and `status` as used by a person and by a script, with a running daemon."""
 
 import json
 import math
@@ -25,7 +25,7 @@ from tests.support.programs import Daemon, run_naze_bridge
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A daemon on the simulated Naze within it."""
+    """A daemon with its built-in simulated Naze."""
     with ExitStack() as stack:
         daemon = Starter(tmp_path_factory.mktemp("cli"), stack).daemon("sim:")
         daemon.wait()
@@ -51,7 +51,7 @@ def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *par
 
 
 def strict(text: str) -> Any:
-    """Read JSON as other languages do, which know no NaN."""
+    """Read JSON strictly, without NaN."""
 
     def refuse(token: str) -> None:
         raise AssertionError(f"{token} is not JSON")
@@ -67,10 +67,10 @@ def write_plan(path: Path, plan: list[PlanRow]) -> Path:
 _READING = (("list",), ("show", "2"), ("diff", "1", "2"))
 
 
-# -- what is printed -----------------------------------------------------------------------------------------
+# -- output -----------------------------------------------------------------------------------------
 
 
-def test_a_mission_there_and_back(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_round_trip_of_a_mission(daemon: Daemon, tmp_path: Path) -> None:
     plan = plain_plan(7, start=20)
     pushed = ask(daemon, "push", write_plan(tmp_path / "plan", plan))
     assert pushed.returncode == 0
@@ -84,13 +84,13 @@ def test_a_mission_there_and_back(daemon: Daemon, tmp_path: Path) -> None:
     assert ask(daemon, "clear").stdout == "ACCEPTED: The flight controller already held no mission\n"
 
 
-def test_a_refusal_is_reported_and_ends_with_1(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_refusal_is_reported_with_exit_status_1(daemon: Daemon, tmp_path: Path) -> None:
     refused = ask(daemon, "push", write_plan(tmp_path / "plan", [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]))
     assert refused.returncode == 1
     assert refused.stdout.splitlines()[-1] == "INVALID: Rejected, WP 1: LAND must be last"
 
 
-def test_a_list_that_would_erase_the_mission_is_asked_for(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_list_that_would_erase_the_mission_needs_confirmation(daemon: Daemon, tmp_path: Path) -> None:
     ask(daemon, "push", write_plan(tmp_path / "plan", plain_plan(7, start=20)))
     held = daemon.held()["records"]
     nothing = write_plan(tmp_path / "nothing", [HOME, PlanRow(Command.DO_CHANGE_SPEED)])
@@ -120,7 +120,7 @@ def test_a_person_at_a_terminal_is_asked_before_the_mission_is_erased(
     assert len(daemon.held()["records"]) == left
 
 
-def test_a_list_that_is_too_long_is_refused_without_its_rows(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_list_that_is_too_long_is_refused_without_a_table(daemon: Daemon, tmp_path: Path) -> None:
     refused = ask(daemon, "push", write_plan(tmp_path / "long", plain_plan(1000)))
     assert refused.returncode == 1
     assert refused.stdout == "NO_SPACE: Mission rejected: 1000 items, but only 146 fit\n"
@@ -129,11 +129,11 @@ def test_a_list_that_is_too_long_is_refused_without_its_rows(daemon: Daemon, tmp
     assert "no flight controller stores such a long mission" in refused.stderr
 
 
-def test_an_unreadable_file_ends_with_2(daemon: Daemon, tmp_path: Path) -> None:
+def test_an_unreadable_file_gives_exit_status_2(daemon: Daemon, tmp_path: Path) -> None:
     assert_one_sentence(ask(daemon, "push", tmp_path / "none"), 2, "none", "no such file")
 
 
-def test_json_says_null_where_nothing_was_given(daemon: Daemon, tmp_path: Path) -> None:
+def test_unset_values_are_null_in_json(daemon: Daemon, tmp_path: Path) -> None:
     plan = [replace(row, p1=math.nan, p4=math.nan) for row in plain_plan(4, start=30)]
     file = write_plan(tmp_path / "plan", plan)
     file.write_text(file.read_text().replace("\tNaN\t45", "\tinf\t45"))
@@ -143,7 +143,7 @@ def test_json_says_null_where_nothing_was_given(daemon: Daemon, tmp_path: Path) 
     number = delivery["mission"]
     shown = strict(ask(daemon, "missions", "show", str(number), "--json").stdout)
     assert shown["received"]["items"] == delivery["sent"]
-    # Values that were not given are still not given.
+    # Unset values stay unset.
     again = strict(ask(daemon, "missions", "restore", str(number), "--json").stdout)
     assert again["sent"] == delivery["sent"]
     assert strict(ask(daemon, "missions", "diff", str(number), str(again["mission"]), "--json").stdout)["equal"]
@@ -159,7 +159,7 @@ def test_a_checksum_looks_the_same_everywhere(daemon: Daemon, tmp_path: Path) ->
     } == {daemon.held()["checksum"]}
 
 
-def test_tables_fit_and_end_where_their_text_ends(daemon: Daemon, tmp_path: Path) -> None:
+def test_tables_fit_and_have_no_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
     far = replace(waypoint(1), lat=-45.3838, lng=-178.4733, alt=1000.5, p1=400.5)
     plan = [HOME, replace(far, command=Command.NAV_LOITER_TIME), far, PlanRow(Command.NAV_RETURN_TO_LAUNCH, alt=15)]
     file = write_plan(tmp_path / "plan", plan)
@@ -176,7 +176,7 @@ def test_tables_fit_and_end_where_their_text_ends(daemon: Daemon, tmp_path: Path
 # -- pull into a file ----------------------------------------------------------------------------------------
 
 
-def test_pull_writes_a_file_that_push_takes(daemon: Daemon, tmp_path: Path) -> None:
+def test_pull_writes_a_file_that_push_accepts(daemon: Daemon, tmp_path: Path) -> None:
     daemon.push(plain_plan(5))
     file = tmp_path / "held.waypoints"
     file.write_text("what was there before")
@@ -186,7 +186,7 @@ def test_pull_writes_a_file_that_push_takes(daemon: Daemon, tmp_path: Path) -> N
     assert ask(daemon, "push", file).returncode == 0
 
 
-def test_pull_through_a_link_replaces_what_it_leads_to(daemon: Daemon, tmp_path: Path) -> None:
+def test_pull_through_a_link_replaces_its_target(daemon: Daemon, tmp_path: Path) -> None:
     target, link = tmp_path / "target", tmp_path / "link"
     link.symlink_to(target)
     for _ in ("a new file", "the same again"):
@@ -210,7 +210,7 @@ def a_directory(path: Path) -> None:
 
 
 @pytest.mark.parametrize("make", [a_pipe, a_link_to_a_pipe, a_directory])
-def test_pull_replaces_nothing_but_files(daemon: Daemon, tmp_path: Path, make: object) -> None:
+def test_pull_replaces_only_files(daemon: Daemon, tmp_path: Path, make: object) -> None:
     assert callable(make)
     path = tmp_path / "in the way"
     make(path)
@@ -219,14 +219,14 @@ def test_pull_replaces_nothing_but_files(daemon: Daemon, tmp_path: Path, make: o
     assert stat.S_IFMT(path.stat().st_mode) == kind
 
 
-def test_pull_into_a_link_that_leads_to_itself(daemon: Daemon, tmp_path: Path) -> None:
+def test_pull_into_a_link_to_itself(daemon: Daemon, tmp_path: Path) -> None:
     path = tmp_path / "loop"
     path.symlink_to(path)
     assert_one_sentence(ask(daemon, "pull", path), 1, str(path), "loop")
     assert path.is_symlink()
 
 
-def test_pull_into_a_folder_that_is_not_there(daemon: Daemon, tmp_path: Path) -> None:
+def test_pull_into_a_missing_folder(daemon: Daemon, tmp_path: Path) -> None:
     assert_one_sentence(ask(daemon, "pull", tmp_path / "none" / "held"), 1, "no such file or directory")
 
 
@@ -238,7 +238,7 @@ def test_pull_into_standard_output_is_a_mission_file(daemon: Daemon) -> None:
     assert ask(daemon, "pull", "-", "--json").returncode == 2
 
 
-# -- whom to ask ---------------------------------------------------------------------------------------------
+# -- with and without a daemon ---------------------------------------------------------------------------------
 
 
 def test_no_daemon(tmp_path: Path) -> None:
@@ -262,7 +262,7 @@ def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: 
     assert_one_sentence(run_naze_bridge("missions", "list", "--state-dir", tmp_path), 1, "no missions are stored")
 
 
-def test_status_is_for_people(daemon: Daemon) -> None:
+def test_status_is_readable(daemon: Daemon) -> None:
     lines = dict(line.split("  ", 1) for line in ask(daemon, "status").stdout.splitlines())
     assert ", firmware 2.1.1, on sim:, MSP" in lines["Flight controller"]
     assert ", for " in lines["Flight controller"]
@@ -279,7 +279,7 @@ def test_status_is_for_people(daemon: Daemon) -> None:
         (["status", "--jsn"], "Did you mean"),
     ],
 )
-def test_a_misspelt_word_is_answered_with_the_nearest(words: list[str], hint: str) -> None:
+def test_a_misspelt_word_gets_a_suggestion(words: list[str], hint: str) -> None:
     ended = run_naze_bridge(*words)
     assert ended.returncode == 2
     assert ended.stderr.startswith("naze-bridge: ")
@@ -294,7 +294,7 @@ def test_the_list_of_commands_imports_none_of_them() -> None:
 
 
 def test_another_users_daemon(daemon: Daemon) -> None:
-    """No one may look into root's directory; who is not root is kept out of a directory of his own."""
+    """As root, the daemon's directory is root's; otherwise it is the tester's own with no permissions."""
     as_nobody = (
         "import os; from service.cli.main import main; import service.cli.status, service.settings;"
         "os.geteuid() or os.setuid(65534); main(prog_name='naze-bridge')"
@@ -312,13 +312,13 @@ def test_another_users_daemon(daemon: Daemon) -> None:
     assert_one_sentence(ended, 1, "no permission", "sudo", "group", str(daemon.state_dir))
 
 
-def test_missions_are_a_daemons() -> None:
+def test_missions_needs_a_daemon() -> None:
     ended = run_naze_bridge("missions", "list", "--fc", "sim:")
     assert ended.returncode == 2
     assert "No such option" in ended.stderr
 
 
-def test_numbers_that_are_no_missions(daemon: Daemon) -> None:
+def test_numbers_of_missing_missions(daemon: Daemon) -> None:
     for wrong in (["show", "99999999999999999999"], ["list", "--limit", "99999999999999999999"], ["show", "-1"]):
         ended = ask(daemon, "missions", *wrong)
         assert ended.returncode == 2, ended
@@ -326,7 +326,7 @@ def test_numbers_that_are_no_missions(daemon: Daemon) -> None:
     assert_one_sentence(ask(daemon, "missions", "show", "2147483647"), 1, "there is no mission 2147483647")
 
 
-def test_a_list_of_nothing_says_so(tmp_path: Path) -> None:
+def test_an_empty_list_of_missions(tmp_path: Path) -> None:
     with ExitStack() as stack:
         daemon = Starter(tmp_path, stack).daemon("sim:")
         daemon.wait_up()

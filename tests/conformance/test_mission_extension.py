@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/msp-mission.md, tested on the firmware's C core and on the simulator's model of it.
 
-The first half tests each against the page. In the second half both get the same long random conversations and must
+The first half compares each with the page. In the second half both get the same long random conversations and must
 reply with the same bytes.
 """
 
@@ -25,7 +25,7 @@ CAPACITY, CHUNK, READ = 146, 15, 6
 
 
 def mission(count: int, seed: int = 0) -> tuple[WpRecord, ...]:
-    """A list with every command in it."""
+    """A list with every command."""
     return tuple(
         WpRecord(480_000_000 + 977 * n + seed, -110_000_000 - 13 * n, 13 + n, n & 1, n, 2, -n % 128, n % 8)
         for n in range(count)
@@ -33,7 +33,7 @@ def mission(count: int, seed: int = 0) -> tuple[WpRecord, ...]:
 
 
 class Companion:
-    """Requests and replies as objects; every reply has the length that the page gives it."""
+    """Requests and replies as objects; the length of every reply must be that on the page."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -100,7 +100,7 @@ def chunk_frame(first: int, records: bytes) -> bytes:
 
 
 OLD, NEW = mission(4, seed=1), mission(20, seed=2)
-#: In the other slot: what BEGIN has to erase.
+#: In the other slot, so that BEGIN has to erase.
 OLDER = mission(CAPACITY, seed=3)
 NOTHING = Staged(ReplyStatus.OK, 0, 0)
 
@@ -113,10 +113,10 @@ def fc(request: pytest.FixtureRequest) -> Companion:
     return companion
 
 
-# -- what the page says ------------------------------------------------------------------------------------------
+# -- the page ------------------------------------------------------------------------------------------
 
 
-def test_info_tells_limits_and_state(fc: Companion) -> None:
+def test_info_has_limits_and_state(fc: Companion) -> None:
     assert fc.begin(identify(NEW)) == NOTHING
     fc.chunk(NEW, 0)
     fc.device.set_busy(True)
@@ -198,12 +198,12 @@ def test_a_chunk_past_the_announced_count_is_refused(fc: Companion) -> None:
     assert fc.chunk(NEW, 0, 5).status is ReplyStatus.OK
 
 
-def test_without_a_transfer_nothing_is_taken(fc: Companion) -> None:
+def test_without_a_transfer_chunks_are_refused(fc: Companion) -> None:
     assert fc.chunk(NEW, 0) == Staged(ReplyStatus.NO_TRANSFER, 0, 0)
     assert fc.commit(identify(NEW)) == Stored(ReplyStatus.NO_TRANSFER, identify(OLD))
 
 
-def test_more_records_than_there_is_room_for(fc: Companion) -> None:
+def test_more_records_than_the_capacity(fc: Companion) -> None:
     assert fc.begin(ListIdentity(CAPACITY + 1, 1)) == Staged(ReplyStatus.NO_SPACE, 0, 0)
 
 
@@ -292,7 +292,7 @@ def test_malformed_requests_change_nothing(fc: Companion) -> None:
     before = fc.info()
     lengths = {MissionCommand.ABORT: 1, MissionCommand.READ: 3, MissionCommand.RADIUS: 3}
     for size in range(244):
-        # On a UART all this takes longer than a silent transfer stays open.
+        # On a UART all of this takes longer than the timeout of a silent transfer.
         fc.begin(identify(NEW))
         well_formed = {
             MissionCommand.BEGIN: size == 7,
@@ -317,7 +317,7 @@ def test_other_commands_are_left_to_the_firmware(fc: Companion) -> None:
 
 
 def begin_until_refused(fc: Companion) -> tuple[int, ReplyStatus]:
-    """Begin one list after the other, and stage a record of each, so that the next must erase it."""
+    """Begin lists and stage one record of each, so that each BEGIN has to erase."""
     for count in range(1000):
         status = fc.begin(ListIdentity(len(NEW), count)).status
         if status is not ReplyStatus.OK:
@@ -326,14 +326,14 @@ def begin_until_refused(fc: Companion) -> tuple[int, ReplyStatus]:
     raise AssertionError("nothing is ever refused")
 
 
-def test_a_blank_slot_costs_no_write(fc: Companion) -> None:
+def test_a_blank_slot_needs_no_erase(fc: Companion) -> None:
     assert fc.begin(identify(NEW)).status is ReplyStatus.OK
     fc.device.cut_power_at(1)  # the next flash operation
     for records in (OLDER, NEW) * 100:
         assert fc.begin(identify(records)).status is ReplyStatus.OK
 
 
-def test_flash_writes_are_on_a_budget(fc: Companion) -> None:
+def test_flash_writes_are_limited(fc: Companion) -> None:
     fc.device.power_cycle()
     assert begin_until_refused(fc) == (64, ReplyStatus.BUSY)
     assert fc.info().flags == InfoFlag.WRITES_SPENT
@@ -404,12 +404,12 @@ def test_a_power_cut_leaves_the_old_list(fc: Companion, act: Callable[[Companion
 
 LISTS = [mission(count, seed) for count in (0, 1, 3, 15, 16, CAPACITY) for seed in (3, 5)]
 lists = st.sampled_from(LISTS)
-#: Binary fractions of a second, so that the model's float clock meets the timeouts exactly.
+#: Binary fractions of a second, so that the model's float clock hits the timeouts exactly.
 times = st.sampled_from([125, 1000, 2500, 5000, 5125])
 
 
 class SameAnswers(RuleBasedStateMachine):
-    """All are asked the same; every answer must be the same, and the core must keep the flash's rules."""
+    """All devices get the same requests and must give the same replies; the core must obey the flash's rules."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -464,7 +464,7 @@ class SameAnswers(RuleBasedStateMachine):
         self._follow(self.send(chunk_frame(self.next, records)))
 
     def _send_chunk(self, first: int, count: int) -> None:
-        # Past the list's end go records that no one announced.
+        # Beyond the list's end come records that were not announced.
         records = (self.records + LISTS[-1])[first : first + count]
         if records:
             self._follow(self.send(chunk_frame(first, pack_records(records))))

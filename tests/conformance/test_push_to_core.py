@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's conversations over bad lines to the firmware's own C core, in simulated time."""
+"""The daemon's conversations with the firmware's C core over bad lines, in simulated time."""
 
 import random
 from collections.abc import Callable
@@ -61,7 +61,7 @@ def cut_frames(rate: float, seed: int) -> Disturb:
 
 
 class Line:
-    """Runner, link, wire and board. Bytes arrive when the last of their frame has crossed the wire."""
+    """Runner, link, wire and board. Bytes arrive with the end of their frame."""
 
     def __init__(self, disturb: Disturb = clean) -> None:
         self.core = CCore()
@@ -166,11 +166,9 @@ def test_146_records_bit_for_bit_and_back() -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize(("disturb", "rate"), [(bit_errors, 1e-3), (cut_frames, 0.2)])
-def test_bad_lines_cost_time_but_never_a_record(
-    disturb: Callable[[float, int], Disturb], rate: float, seed: int
-) -> None:
+def test_bad_lines_delay_but_change_no_record(disturb: Callable[[float, int], Disturb], rate: float, seed: int) -> None:
     line = Line(disturb(rate, seed))
-    # Damage that the XOR misses may even turn a reply into a refusal, but never into a success.
+    # Damage undetected by the XOR may turn a reply into a refusal, but never into a success.
     for _ in range(20):
         result = line.push(NEW)
         assert_whole(line)
@@ -180,8 +178,8 @@ def test_bad_lines_cost_time_but_never_a_record(
 
 
 @pytest.mark.parametrize("operation", [1, 2, 3, 4, 5, 124, 600, 1171, 1172, 1179, 1180])
-def test_a_reset_in_mid_flash_leaves_a_whole_list(operation: int) -> None:
-    """Operations 1..3 erase, then come 8 half-words a record, then 9 of the header."""
+def test_a_reset_during_a_flash_write_leaves_a_whole_list(operation: int) -> None:
+    """Operations 1..3 erase; then come 8 half-words per record and 9 of the header."""
     line = Line()
     line.core.cut_power_at(operation)
     line.push(NEW)
@@ -192,7 +190,7 @@ def test_a_reset_in_mid_flash_leaves_a_whole_list(operation: int) -> None:
     assert line.core.list == pack_records(NEW)
 
 
-def test_failing_flash_is_tried_again() -> None:
+def test_a_failed_flash_write_is_retried() -> None:
     line = Line()
     line.core.fail_at(50)
     assert line.push(NEW) == PushResult(None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Doctor finds and names each injected fault, with its remedy."""
+"""Doctor finds each injected fault and gives its remedy."""
 
 import os
 import sqlite3
@@ -67,13 +67,13 @@ def assert_ok(found: Checked | Iterable[Checked] | None, named: str) -> None:
     assert named in checked.found
 
 
-def nobody() -> dict[str, object]:
+def no_answer() -> dict[str, object]:
     raise ControlError("no flight controller answers on /dev/serial0")
 
 
 def test_a_healthy_pi(pi: FaultyMachine, tmp_path: Path) -> None:
     settings = Settings(PORT, GCS, tmp_path / "state")
-    found = list(examine(pi, settings, nobody, lambda: STATUS))
+    found = list(examine(pi, settings, no_answer, lambda: STATUS))
     # Only root can give a file to the group dialout.
     assert {each.check for each in found if each.grade is not Grade.OK} <= {"permission", "flight controller"}
     told = " ".join(each.found for each in found)
@@ -85,13 +85,13 @@ def test_a_healthy_pi(pi: FaultyMachine, tmp_path: Path) -> None:
 # -- the port ------------------------------------------------------------------------------------------------
 
 
-def test_a_port_that_is_missing(pi: FaultyMachine) -> None:
+def test_a_missing_port(pi: FaultyMachine) -> None:
     pi.path("/dev/serial0").unlink()
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup")
     pi.write("/dev/ttyUSB0")
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "set fc to a port that exists: /dev/ttyUSB0")
     assert_problem(check_port(pi, SerialFc("/dev/naze", None)), "/dev/naze is missing", "plug the flight controller in")
-    # There is nothing to say of what is not there.
+    # There are no further checks of a missing port.
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
 
 
@@ -103,9 +103,9 @@ def test_serial0_is_the_wrong_port_on_a_pi_5(pi: FaultyMachine) -> None:
     assert_problem(check_port(pi, PORT), "debug socket on a Raspberry Pi 5", 'fc = "/dev/ttyAMA0"')
 
 
-def test_every_port_is_looked_at_if_none_is_named(pi: FaultyMachine, tmp_path: Path) -> None:
+def test_without_a_named_port_every_port_is_checked(pi: FaultyMachine, tmp_path: Path) -> None:
     def checked() -> dict[str, Checked]:
-        return {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), nobody, lambda: STATUS)}
+        return {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), no_answer, lambda: STATUS)}
 
     assert_ok(checked()["flight controller"], "Harakiri")
     pi.runs(412, "/sbin/agetty", "ttyAMA0")
@@ -121,18 +121,18 @@ def test_a_port_that_the_group_may_not_use(pi: FaultyMachine) -> None:
     assert_problem(check_permission(pi, PORT), "-rw-------", "sudo chmod g+rw /dev/ttyAMA0")
 
 
-def test_a_login_console_that_runs(pi: FaultyMachine) -> None:
+def test_a_running_login_console(pi: FaultyMachine) -> None:
     pi.runs(412, "/sbin/agetty", "--keep-baud", "115200,57600", "ttyAMA0", "vt220", has_open="/dev/ttyAMA0")
     assert_problem(
         check_console(pi, PORT),
         "serial-getty@ttyAMA0 runs there",
         "sudo systemctl disable --now serial-getty@ttyAMA0.service",
     )
-    # It is one fault and told once.
+    # It is one fault and reported once.
     assert check_holder(pi, PORT) is None
 
 
-def test_a_login_console_that_begins_with_the_next_boot(pi: FaultyMachine) -> None:
+def test_a_login_console_that_starts_at_the_next_boot(pi: FaultyMachine) -> None:
     pi.write("/etc/systemd/system/getty.target.wants/serial-getty@ttyAMA0.service")
     assert_problem(check_console(pi, PORT), "is enabled", "disable --now serial-getty@ttyAMA0.service")
 
@@ -153,7 +153,7 @@ def test_a_console_of_a_machine_with_another_boot_loader(pi: FaultyMachine) -> N
     assert_problem(check_console(pi, PORT), "started with console=ttyAMA0,9600", "reboot")
 
 
-def test_a_console_on_another_port_is_no_fault(pi: FaultyMachine) -> None:
+def test_a_console_on_another_port_is_fine(pi: FaultyMachine) -> None:
     pi.runs(412, "/sbin/agetty", "ttyAMA10")
     pi.write("/proc/cmdline", "console=ttyAMA10,115200 console=tty1")
     assert_ok(check_console(pi, PORT), "no login console on /dev/ttyAMA0")
@@ -164,14 +164,14 @@ def test_another_program_on_the_port(pi: FaultyMachine) -> None:
     assert_problem(check_holder(pi, PORT), "gpsd (pid 99) has /dev/ttyAMA0 open", "sudo kill 99")
 
 
-def test_the_daemon_on_the_port_is_no_fault_and_is_left_alone(pi: FaultyMachine, tmp_path: Path) -> None:
+def test_a_daemon_on_the_port_is_fine_and_left_alone(pi: FaultyMachine, tmp_path: Path) -> None:
     pi.runs(99, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="/dev/ttyAMA0")
     assert_ok(check_holder(pi, PORT), "the daemon has /dev/ttyAMA0 open")
 
     def never() -> dict[str, object]:
-        raise AssertionError("the port was opened beside the daemon")
+        raise AssertionError("the port was opened although the daemon uses it")
 
-    found = list(examine(pi, Settings(PORT, GCS, tmp_path), nobody, never))
+    found = list(examine(pi, Settings(PORT, GCS, tmp_path), no_answer, never))
     assert [each.found for each in found if each.check == "flight controller"] == ["/dev/serial0 was not checked"]
 
 
@@ -189,8 +189,8 @@ def test_modem_manager(pi: FaultyMachine) -> None:
 # -- the flight controller -----------------------------------------------------------------------------------
 
 
-def test_a_flight_controller_that_says_nothing() -> None:
-    assert_problem(check_flight_controller(PORT, nobody, nobody), "no flight controller answers", "TX goes to RX")
+def test_a_silent_flight_controller() -> None:
+    assert_problem(check_flight_controller(PORT, no_answer, no_answer), "no flight controller answers", "TX goes to RX")
     silent = STATUS | {"flight_controller": None, "state": "searching"}
     (_, found) = check_flight_controller(PORT, lambda: silent, None)
     assert_problem(found, "no reply on /dev/serial0: searching", "TX goes to RX")
@@ -205,11 +205,11 @@ def test_a_flight_controller_in_its_command_line() -> None:
     def listened() -> Json:
         raise ControlError(Cli.trouble)
 
-    assert_problem(check_flight_controller(PORT, nobody, listened), Cli.trouble, "naze-bridge doctor` again")
+    assert_problem(check_flight_controller(PORT, no_answer, listened), Cli.trouble, "naze-bridge doctor` again")
 
 
 def test_a_daemon_is_asked_and_the_port_left_alone() -> None:
-    (daemon, found) = check_flight_controller(PORT, lambda: STATUS, nobody)
+    (daemon, found) = check_flight_controller(PORT, lambda: STATUS, no_answer)
     assert_ok(daemon, "runs, and was asked")
     assert_ok(found, "Harakiri, MSP at 115200 baud, disarmed")
 
@@ -229,20 +229,20 @@ def test_wifi(pi: FaultyMachine) -> None:
     assert_note(check_wifi(pi, GCS), "no Wi-Fi card")
 
 
-def test_a_port_that_is_taken(pi: FaultyMachine) -> None:
+def test_an_occupied_port(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
     assert_problem(check_ports(pi, GCS), "UDP port 14550 is used by another program", "give gcs another port")
     pi.runs(55, "/usr/bin/python3", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
     assert_problem(check_ports(pi, GCS), "python3 (pid 55)", "stop it")
 
 
-def test_a_port_that_is_our_own(pi: FaultyMachine) -> None:
+def test_a_port_used_by_our_daemon(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
     pi.runs(55, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="socket:[4711]")
     assert_ok(check_ports(pi, GCS), "the running daemon's")
 
 
-def test_a_connection_from_a_port_does_not_take_it(pi: FaultyMachine) -> None:
+def test_an_outgoing_connection_does_not_occupy_its_port(pi: FaultyMachine) -> None:
     pi.sockets(tcp=TCP_14550)
     assert_ok(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is free")
     pi.sockets(tcp=TCP_14550.replace(" 01 ", " 0A "))
@@ -277,7 +277,7 @@ def test_the_disk(tmp_path: Path) -> None:
     assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove unneeded files")
 
 
-def test_a_state_directory_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unusable_state_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     assert_problem(check_disk(tmp_path / "file" / "state"), f"{tmp_path}/file is a file", "name another state_dir")
     monkeypatch.setattr(os, "access", lambda _path, _mode: False)

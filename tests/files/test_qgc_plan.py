@@ -61,7 +61,7 @@ def test_home_is_item_0_and_null_is_not_given() -> None:
     assert math.isnan(point.p4)
 
 
-def test_an_item_without_a_position_has_none() -> None:
+def test_an_item_without_a_position() -> None:
     item = read(plan(simple(178, 2, [1, 4, -1, 0, None, None, None])))[1]
     assert (item.command, item.frame, item.lat_e7, item.lon_e7) == (178, 2, None, None)
     assert math.isnan(item.alt_m)
@@ -77,7 +77,7 @@ def test_an_item_without_a_position_has_none() -> None:
         (None, None, None, 0.0),
     ],
 )
-def test_what_is_missing_of_home_is_left_to_the_rules(
+def test_missing_parts_of_home_are_left_to_the_rules(
     home: Any, lat_e7: int | None, lon_e7: int | None, alt_m: float
 ) -> None:
     item = read(plan(simple(), home=home))[0]
@@ -85,7 +85,7 @@ def test_what_is_missing_of_home_is_left_to_the_rules(
 
 
 def test_mission_planners_own_json_is_read() -> None:
-    """Its .mission has no fileType, versions of its own, and an item's place apart from its params."""
+    """Its .mission has no fileType, other versions, and an item's position outside its params."""
     point = {"command": 16, "coordinate": [45.3840141, 8.4741389, 13], "frame": 3, "params": [0, 3, 0, 0]}
     document = {
         "groundStation": "MissionPlanner",
@@ -99,7 +99,7 @@ def test_mission_planners_own_json_is_read() -> None:
     assert notes == ["read as Mission Planner's own JSON: it has no fileType"]
 
 
-def test_a_survey_becomes_the_items_it_is_flown_as() -> None:
+def test_a_survey_becomes_the_items_that_fly_it() -> None:
     survey = {
         "type": "ComplexItem",
         "complexItemType": "survey",
@@ -110,7 +110,7 @@ def test_a_survey_becomes_the_items_it_is_flown_as() -> None:
     assert [item.seq for item in items] == list(range(6))
 
 
-def test_a_plan_is_known_by_what_is_in_it() -> None:
+def test_a_plan_is_recognised_by_its_contents() -> None:
     assert len(read_mission_file(b"\xef\xbb\xbf\n " + json.dumps(plan(simple())).encode(), "mission.txt")) == 2
 
 
@@ -152,7 +152,7 @@ def test_a_plan_is_known_by_what_is_in_it() -> None:
         (plan(simple(5001)), ["holds a fence"]),
     ],
 )
-def test_a_damaged_plan_is_refused_with_the_place(document: Any, words: list[str]) -> None:
+def test_a_damaged_plan_is_refused_with_the_position_of_the_error(document: Any, words: list[str]) -> None:
     text = error(document)
     for word in words:
         assert word in text
@@ -161,12 +161,12 @@ def test_a_damaged_plan_is_refused_with_the_place(document: Any, words: list[str
 @pytest.mark.parametrize(
     "data", [b"", b"{", b'{"fileType":\n "Plan",\n "mission": {"items": [', b"\xff\xfe{", b"{}" * 9]
 )
-def test_a_plan_that_is_not_a_json_is_refused(data: bytes) -> None:
+def test_a_plan_that_is_not_json_is_refused(data: bytes) -> None:
     with pytest.raises(MissionFileError, match=r"^field\.plan"):
         read_mission_file(data, "field.plan")
 
 
-def test_a_plan_cut_off_anywhere_is_refused_with_its_line() -> None:
+def test_a_truncated_plan_is_refused_with_its_line() -> None:
     whole = json.dumps(plan(simple(), simple()), indent=1).encode()
     for length in range(1, len(whole)):
         with pytest.raises(MissionFileError, match=r"line \d+: not valid JSON"):
@@ -199,7 +199,7 @@ def test_any_seven_numbers_make_an_item(params: list[float | None], home: Any) -
     assert refused is None or "plannedHomePosition" in refused or (beyond and "item 1" in refused)
 
 
-def test_a_plan_that_was_written_reads_back() -> None:
+def test_a_written_plan_reads_back() -> None:
     items = read_mission_file((Path(__file__).parents[2] / "examples/naze-field.waypoints").read_bytes(), "x")
     home, *rest = read_mission_file(write_mission_file(items, "field.plan").encode(), "field.plan")
     assert (home.lat_e7, home.lon_e7, home.alt_m) == (items[0].lat_e7, items[0].lon_e7, items[0].alt_m)

@@ -43,11 +43,11 @@ def refusal(data: bytes) -> str | None:
 
 
 def same(one: list[MissionItem], other: list[MissionItem]) -> bool:
-    return repr(one) == repr(other)  # NaN equals itself here
+    return repr(one) == repr(other)  # here NaN equals NaN
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_a_file_as_mission_planner_writes_it(end: str) -> None:
+def test_a_file_written_by_mission_planner(end: str) -> None:
     assert same(read(HEADER, HOME, POINT, end=end), ITEMS)
 
 
@@ -81,36 +81,36 @@ def noted(*lines: str) -> tuple[list[MissionItem], list[str]]:
     ],
     ids=["a gap", "a repeat", "home with command 0", "11 fields", "commas", "current = 2"],
 )
-def test_what_mission_planners_own_reader_takes_is_read_and_noted(lines: list[str], note: str | None) -> None:
+def test_files_that_mission_planner_accepts_are_read_with_a_note(lines: list[str], note: str | None) -> None:
     items, notes = noted(HEADER, *lines)
     assert same(items, ITEMS)
     assert notes == ([note] if note else [])
 
 
-def test_a_file_without_home_gets_one_without_a_place() -> None:
+def test_a_file_without_home_gets_one_without_a_position() -> None:
     items, notes = noted(HEADER, POINT)
     assert notes == ["there is no item 0: home is missing"]
     assert (items[0].seq, items[0].command, items[0].lat_e7) == (0, 16, None)
     assert same(items[1:], ITEMS[1:])
 
 
-def test_a_last_line_that_lacks_its_end_and_autocontinue_is_cut_off() -> None:
+def test_a_last_line_without_its_end_and_autocontinue_is_truncated() -> None:
     with pytest.raises(MissionFileError, match="11 fields"):
         read_mission_file("\n".join([HEADER, HOME, POINT.removesuffix("\t1")]).encode(), "x")
 
 
-def test_the_last_line_needs_no_end() -> None:
+def test_the_last_line_needs_no_newline() -> None:
     assert same(read_mission_file("\n".join([HEADER, HOME, POINT]).encode(), "x"), ITEMS)
 
 
 @pytest.mark.parametrize(
     ("degrees", "e7"),
     [
-        ("45.38401415", 453840142),  # rounded, not cut off
-        ("-0.00000005", 0),  # to even, as IEEE 754 has it
+        ("45.38401415", 453840142),  # rounded, not truncated
+        ("-0.00000005", 0),  # to even, as in IEEE 754
         ("-0.00000006", -1),
         ("1e1", 100000000),
-        ("999", 9990000000),  # for the rules to judge
+        ("999", 9990000000),  # left to the rules
         ("nan", None),
     ],
 )
@@ -154,11 +154,11 @@ def test_a_damaged_file_is_refused_with_its_line(lines: list[str], words: list[s
     assert text.startswith("field.waypoints")
     for word in words:
         assert word in text
-    assert "; " in text  # and what to do
+    assert "; " in text  # and the remedy
 
 
-def test_a_file_cut_off_anywhere_never_reads_as_another_mission() -> None:
-    """Only a cut at the end of an item leaves a shorter list; a cut inside a line is seen."""
+def test_a_truncated_file_never_reads_as_another_mission() -> None:
+    """Only truncation at the end of an item leaves a shorter list; within a line it is detected."""
     whole = "\n".join([HEADER, HOME, POINT]).encode()
     for length in range(len(whole)):
         try:
@@ -191,7 +191,7 @@ any_items = st.lists(
 
 @settings(max_examples=300)
 @given(any_items)
-def test_what_is_written_reads_back_the_same(items: list[MissionItem]) -> None:
+def test_a_written_file_reads_back_the_same(items: list[MissionItem]) -> None:
     assert same(read_mission_file(write_qgc_wpl(items).encode(), "x"), items)
 
 

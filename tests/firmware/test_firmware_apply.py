@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""firmware/apply on a made-up tree: applying, removing, and refusals."""
+"""firmware/apply on a small test tree: applying, removing, and refusals."""
 
 import hashlib
 import re
@@ -48,7 +48,7 @@ UTIL = b"int two(void);\n"
 
 
 class Workshop:
-    """A copy of firmware/ that knows one tree, and that tree."""
+    """A copy of firmware/ that knows one tree, and the tree."""
 
     def __init__(self, path: Path) -> None:
         self.firmware, self.tree = path / "firmware", path / "Tree"
@@ -89,7 +89,7 @@ def test_applies_and_removes_without_a_trace(workshop: Workshop) -> None:
     assert workshop.files() == before
 
 
-def test_applying_again_brings_the_core_up_to_date(workshop: Workshop) -> None:
+def test_applying_again_updates_the_core(workshop: Workshop) -> None:
     workshop.run()
     patched = workshop.files()
     (workshop.tree / "src" / "naze_mission.c").write_text("an older version")
@@ -97,7 +97,7 @@ def test_applying_again_brings_the_core_up_to_date(workshop: Workshop) -> None:
     assert workshop.files() == patched
 
 
-def test_removing_what_is_not_there(workshop: Workshop) -> None:
+def test_removing_a_patch_that_is_not_applied(workshop: Workshop) -> None:
     assert workshop.run("--remove") == (0, "Tree: the patch is not in it, nothing to do\n")
 
 
@@ -123,7 +123,7 @@ def test_another_tree_is_left_alone(workshop: Workshop, remove: bool, applied: b
 
 @pytest.mark.parametrize("remove", [False, True])
 @pytest.mark.parametrize("applied", [False, True])
-def test_a_checkout_with_dos_line_ends_is_named(workshop: Workshop, remove: bool, applied: bool) -> None:
+def test_a_checkout_with_dos_line_ends_is_reported(workshop: Workshop, remove: bool, applied: bool) -> None:
     if applied:
         workshop.run()
     for name in ("main.c", "mw.h"):
@@ -140,7 +140,7 @@ def test_a_checkout_with_dos_line_ends_is_named(workshop: Workshop, remove: bool
     assert workshop.files() == before
 
 
-def test_dos_line_ends_of_one_file_are_named_among_other_differences(workshop: Workshop) -> None:
+def test_dos_line_ends_of_one_file_are_reported_with_other_differences(workshop: Workshop) -> None:
     main = workshop.tree / "src" / "main.c"
     main.write_bytes(MAIN.replace(b"\n", b"\r\n"))
     (workshop.tree / "src" / "mw.h").write_bytes(b"another\n")
@@ -151,7 +151,7 @@ def test_dos_line_ends_of_one_file_are_named_among_other_differences(workshop: W
 
 
 def half_patch(workshop: Workshop) -> None:
-    """Leave what an interrupted copy leaves: a file with the patch, a file without, one of the core's files."""
+    """Leave the state of an interrupted copy: a patched file, an unpatched file, one of the core's files."""
     workshop.run()
     (workshop.tree / "src" / "util.c").write_bytes(UTIL)
     for name in CORE[1:]:
@@ -173,7 +173,7 @@ def test_a_half_patched_tree_is_restored(workshop: Workshop) -> None:
     assert workshop.files() == before
 
 
-def test_a_file_that_has_a_core_files_name_is_not_overwritten(workshop: Workshop) -> None:
+def test_a_foreign_file_with_a_core_files_name_is_not_overwritten(workshop: Workshop) -> None:
     (workshop.tree / "src" / "naze_mission.c").write_text("/* my own */")
     before = workshop.files()
     code, printed = workshop.run()
@@ -183,7 +183,7 @@ def test_a_file_that_has_a_core_files_name_is_not_overwritten(workshop: Workshop
     assert workshop.files() == before
 
 
-def test_removing_keeps_a_file_that_it_did_not_make(workshop: Workshop) -> None:
+def test_removing_keeps_foreign_files(workshop: Workshop) -> None:
     workshop.run()
     (workshop.tree / "src" / "naze_mission.c").write_text("/* changed by hand */")
     code, printed = workshop.run("--remove")
@@ -198,13 +198,13 @@ def test_removing_keeps_a_file_that_it_did_not_make(workshop: Workshop) -> None:
 def load_apply(workshop: Workshop) -> ModuleType:
     loader = SourceFileLoader("firmware_apply", str(workshop.firmware / "apply"))
     module = module_from_spec(spec_from_loader("firmware_apply", loader))  # type: ignore[arg-type]
-    sys.modules["firmware_apply"] = module  # where dataclass looks for it
+    sys.modules["firmware_apply"] = module  # required by dataclass
     loader.exec_module(module)
     return module
 
 
 def failing_at(number: int, operation: Callable[..., Any]) -> Callable[..., Any]:
-    """The operation, but its n-th call fails."""
+    """`operation`, but its n-th call fails."""
     calls = count(1)
 
     def call(path: Path, *args: Any, **kwargs: Any) -> Any:
@@ -220,7 +220,7 @@ def failing_at(number: int, operation: Callable[..., Any]) -> Callable[..., Any]
 def test_all_files_change_or_none(
     workshop: Workshop, remove: bool, operation: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Let the first, second, ... write, rename or deletion fail, as on a full disk."""
+    """The first, second, ... write, rename or deletion fails, as on a full disk."""
     apply = load_apply(workshop)
     if remove:
         workshop.run()
@@ -247,8 +247,8 @@ def test_no_tree_at_all(workshop: Workshop) -> None:
 
 
 @pytest.mark.parametrize("path", PATCHES, ids=lambda path: path.stem)
-def test_shipped_patches_hold_only_lines_of_ours(path: Path) -> None:
-    """No context, no line taken away, no function name of Harakiri's behind a hunk header."""
+def test_shipped_patches_have_only_our_own_lines(path: Path) -> None:
+    """No context, no removed line, no function name of Harakiri after a hunk header."""
     header, _, body = path.read_text().partition("diff --git")
     assert len(re.findall(r"^base [0-9a-f]{64} \S+$", header, re.MULTILINE)) == 11
     for line in body.splitlines()[1:]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything that `make -C firmware test` builds and runs, and a short run of the core's fuzzer."""
+"""The tests of `make -C firmware test`, and a short run of the core's fuzzer."""
 
 import re
 import subprocess
@@ -11,7 +11,7 @@ FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 
 def make(*arguments: str) -> str:
-    """Run make in firmware/ and return what it printed; skip the test if the tools for it are not on this machine."""
+    """Run make in firmware/ and return its output; skip the test if its tools are missing."""
     run = subprocess.run(["make", "-s", "-C", FIRMWARE, "APT=no", *arguments], capture_output=True, text=True)
     printed = run.stdout + run.stderr
     assert run.returncode == 0, printed
@@ -40,7 +40,7 @@ def test_core_on_an_emulated_cortex_m3() -> None:
 
 
 def test_core_stays_small() -> None:
-    """The budget is for the whole patch, 4 KB of flash; the core must leave room for Harakiri's side of it."""
+    """The whole patch may use 4 KB of flash; the core must leave room for the changes in Harakiri."""
     printed = make("size")
     sizes = re.search(r"^\s*(\d+)\s+(\d+)\s+(\d+)\s", printed, re.MULTILINE)
     assert sizes is not None
@@ -54,8 +54,8 @@ def test_fuzzer_finds_nothing_in_a_few_seconds() -> None:
 
 
 @pytest.mark.parametrize(("pages", "compiles"), [(128, True), (64, False)])
-def test_slots_and_linker_script_cannot_part(pages: int, compiles: bool) -> None:
-    """A build for 64 KB of flash would put the slots where stm32_flash.ld lets the program go."""
+def test_slots_must_match_the_linker_script(pages: int, compiles: bool) -> None:
+    """A build for 64 KB of flash would put the slots into the program's area of stm32_flash.ld."""
     flags = [
         "-std=c99",
         "-fsyntax-only",

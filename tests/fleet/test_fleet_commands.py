@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge fleet` as a person and a script use it: three daemons behind a router."""
+"""`naze-bridge fleet` as used by a person and by a script: three daemons behind a router."""
 
 import json
 import shlex
@@ -24,7 +24,7 @@ NAMES = ("kite", "owl", "swift")
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
-    """`owl` speaks CBOR, and `swift` has its flight controller elsewhere, where it can be armed."""
+    """`owl` uses CBOR; `swift` has an external flight controller, which can be armed."""
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
         board = fleet.board("swift")
@@ -64,7 +64,7 @@ def test_list(fleet: Fleet) -> None:
     assert [line for line in table.splitlines() if len(line) > 80 or line != line.rstrip()] == []
 
 
-def test_push_to_all_and_pull_it_back(fleet: Fleet, tmp_path: Path) -> None:
+def test_push_to_all_and_pull_again(fleet: Fleet, tmp_path: Path) -> None:
     plan = plain_plan(9, start=20)
     pushed = fleet.ask("push", plan_file(tmp_path, plan), "--all")
     assert (pushed.returncode, pushed.stderr) == (0, ""), pushed
@@ -81,7 +81,7 @@ def test_push_to_all_and_pull_it_back(fleet: Fleet, tmp_path: Path) -> None:
         assert [item.lat_e7 for item in held[1:]] == [int(row.lat * 1e7) for row in plan[1:]]
 
 
-def test_push_to_one_and_pull_it_into_a_file(fleet: Fleet, tmp_path: Path) -> None:
+def test_push_to_one_and_pull_into_a_file(fleet: Fleet, tmp_path: Path) -> None:
     before = fleet.daemons["kite"].held()["records"]
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=60)), "--vehicle", "owl", code=0)
     assert (list(pushed), pushed["owl"]["ok"]) == (["owl"], True)
@@ -114,13 +114,13 @@ def test_a_list_against_the_rules(fleet: Fleet, tmp_path: Path) -> None:
     )
 
 
-def test_one_is_armed(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_push_while_one_vehicle_is_armed(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, plain_plan(5, start=100))
     swift, board = fleet.daemons["swift"], fleet.boards["swift"]
     before = board.records()
     board.set("armed 1")
     try:
-        until(lambda: fleet.listed()["swift"]["armed"], "the news that it is armed")
+        until(lambda: fleet.listed()["swift"]["armed"], "the state with armed")
         assert "ARMED" in fleet.ask("list").stdout
         pushed = fleet.pushed(file, "--all", code=1)
         assert {name: each["ok"] for name, each in pushed.items()} == {"kite": True, "owl": True, "swift": False}
@@ -134,7 +134,7 @@ def test_one_is_armed(fleet: Fleet, tmp_path: Path) -> None:
         until(lambda: (swift.status() or {}).get("armed") is False, "the landing")
 
 
-def test_a_name_that_nobody_has(fleet: Fleet, tmp_path: Path) -> None:
+def test_an_unknown_name(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, plain_plan(4))
     for command in (["push", file], ["pull"]):
         ended = fleet.ask(*command, "--vehicle", "kita")
@@ -142,8 +142,8 @@ def test_a_name_that_nobody_has(fleet: Fleet, tmp_path: Path) -> None:
         assert ended.stderr == "naze-bridge: no vehicle 'kita' is alive; there are kite, owl, swift\n"
 
 
-def test_strangers_say_strange_things(fleet: Fleet) -> None:
-    """Tokens and states of what is no bridge of ours neither stop the list nor reach the terminal."""
+def test_invalid_states_of_strangers(fleet: Fleet) -> None:
+    """Tokens and states of other programs neither stop the list nor reach the terminal."""
     with ExitStack() as stack:
         session = stack.enter_context(session_of(fleet))
         liveliness = session.liveliness()
@@ -189,7 +189,7 @@ def test_the_examples(fleet: Fleet, tmp_path: Path) -> None:
         positions.wait()
 
 
-def test_the_line_for_the_shell(fleet: Fleet, tmp_path: Path) -> None:
+def test_the_shell_one_liner(fleet: Fleet, tmp_path: Path) -> None:
     page = (EXAMPLES.parent / "docs" / "fleet.md").read_text()
     (line,) = [line.strip() for line in page.splitlines() if line.startswith("    python -u -c")]
     program, flag, option, code = shlex.split(line)
@@ -205,7 +205,7 @@ def test_the_line_for_the_shell(fleet: Fleet, tmp_path: Path) -> None:
         reader.wait()
 
 
-def test_a_name_for_two(fleet: Fleet, tmp_path: Path) -> None:
+def test_two_bridges_with_one_name(fleet: Fleet, tmp_path: Path) -> None:
     other = fleet.start("other", name="owl")
     try:
         until(lambda: fleet.listed()["owl"]["bridges"] == 2, "the second owl")
@@ -217,7 +217,7 @@ def test_a_name_for_two(fleet: Fleet, tmp_path: Path) -> None:
         assert "several bridges use this name" in fleet.ask("pull", "--vehicle", "owl").stderr
     finally:
         other.end()
-    until(lambda: fleet.listed()["owl"]["bridges"] == 1, "the end of the second owl")
+    until(lambda: fleet.listed()["owl"]["bridges"] == 1, "the second owl's disappearance")
 
 
 def test_commands_are_off(fleet: Fleet, tmp_path: Path) -> None:
@@ -230,6 +230,6 @@ def test_commands_are_off(fleet: Fleet, tmp_path: Path) -> None:
         deaf.end()
 
 
-def test_help_names_every_command() -> None:
+def test_help_lists_every_command() -> None:
     told = run_naze_bridge("fleet", "--help").stdout
     assert [name for name in ("list", "watch", "push", "pull") if f"  {name} " not in told] == []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Conditions of --where."""
+"""Conditions for --where."""
 
 import pytest
 
@@ -41,6 +41,6 @@ def test_conditions(text: str, found: list[FleetVehicle]) -> None:
         ("session_id=1", "no 'session_id'"),
     ],
 )
-def test_conditions_that_are_none(text: str, said: str) -> None:
+def test_invalid_conditions(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         parse_condition(text)

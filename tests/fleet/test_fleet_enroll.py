@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fleet enroll`: its router lets each member do what its role allows, and no more."""
+"""`fleet enroll`: the router allows each member only the actions of its role."""
 
 import json
 import socket
@@ -17,7 +17,7 @@ from tests.support.zenoh_router import running_router
 
 
 class Enrolled:
-    """A router, and sessions of the members."""
+    """A router and the members' sessions."""
 
     def __init__(self, folder: Path, stack: ExitStack) -> None:
         self.folder = folder / "fleet"
@@ -54,7 +54,7 @@ def asked(session: zenoh.Session, key: str) -> list[str]:
     return [each.ok.payload.to_string() for each in session.get(key, timeout=5.0) if each.ok]
 
 
-def test_a_vehicle_speaks_under_its_own_name_alone(enrolled: Enrolled) -> None:
+def test_a_vehicle_publishes_only_under_its_own_name(enrolled: Enrolled) -> None:
     owl, pilot = enrolled.open("owl"), enrolled.open("pilot")
     queryables = [
         owl.declare_queryable(key, replies_with("owl"))
@@ -72,7 +72,7 @@ def test_a_vehicle_speaks_under_its_own_name_alone(enrolled: Enrolled) -> None:
     del queryables
 
 
-def test_a_guest_may_look_and_nothing_else(enrolled: Enrolled) -> None:
+def test_a_guest_may_only_read(enrolled: Enrolled) -> None:
     kite, guest, pilot = enrolled.open("kite"), enrolled.open("guest"), enrolled.open("pilot")
     taken: list[str] = []
     inputs = [
@@ -99,7 +99,7 @@ def test_a_guest_may_look_and_nothing_else(enrolled: Enrolled) -> None:
     del inputs, queryables, looks, forged, token
 
 
-def test_logins_are_secret_and_stay(enrolled: Enrolled) -> None:
+def test_logins_are_secret_and_kept(enrolled: Enrolled) -> None:
     for name in ("passwords.txt", "kite.json5"):
         assert stat.S_IMODE((enrolled.folder / name).stat().st_mode) == 0o600
     before = (enrolled.folder / "kite.json5").read_text()
@@ -109,7 +109,7 @@ def test_logins_are_secret_and_stay(enrolled: Enrolled) -> None:
     assert "zenoh.vehicle is 'a/b'" in enrolled.enroll("a/b").stderr
 
 
-def test_errors_say_which(enrolled: Enrolled, tmp_path: Path) -> None:
+def test_a_wrong_and_a_missing_login_are_told_apart(enrolled: Enrolled, tmp_path: Path) -> None:
     config = json.loads((enrolled.folder / "pilot.json5").read_text())
     config["transport"]["auth"]["usrpwd"]["password"] += "?"
     wrong = tmp_path / "wrong.json5"
@@ -120,7 +120,7 @@ def test_errors_say_which(enrolled: Enrolled, tmp_path: Path) -> None:
     assert "requires a user and a password" in nobody.stderr, nobody
 
 
-def test_a_router_without_room_says_so(tmp_path: Path) -> None:
+def test_a_full_router_is_reported(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     config = tmp_path / "router.json5"
     config.write_text(json.dumps({"listen": {"endpoints": [endpoint]}, "transport": {"unicast": {"max_sessions": 1}}}))

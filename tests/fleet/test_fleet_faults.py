@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vehicles and routers that disappear or hang during fleet commands do not stop the others."""
+"""Vehicles and routers that disappear or hang during fleet commands do not affect the others."""
 
 import json
 import os
@@ -25,17 +25,17 @@ from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import NAZE_BRIDGE, PATIENCE, until
 from tests.support.zenoh_bench import ask, session
 
-#: 146 records at this speed take some seconds: time enough for something to go wrong.
+#: At this speed 146 records take seconds, enough time to inject a fault.
 _SLOW_BAUD = 9600
 _COUNT = 146
-#: On a metered link a vehicle that hangs is taken for alive for 30 s instead of 10.
+#: On a metered link a hung vehicle is considered alive for 30 s instead of 10.
 _PATIENT = f'{I_KNOW}profile = "metered"\n'
 _FLEET = [*NAZE_BRIDGE, "fleet"]
 
 
 @pytest.fixture(scope="module")
 def lasting_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
-    """`kite` is quick, `snail` has a slow line."""
+    """`kite` is fast, `snail` has a slow line."""
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
         board = fleet.board("snail", "--baud", str(_SLOW_BAUD))
@@ -46,17 +46,17 @@ def lasting_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
 
 @pytest.fixture
 def fleet(lasting_fleet: Fleet) -> Fleet:
-    """Both are there, whatever the test before did to them, and idle."""
+    """Both vehicles are present and idle again after the previous test."""
     for daemon in lasting_fleet.daemons.values():
         if not daemon.is_alive:
             daemon.kill_and_restart()
     lasting_fleet.wait("kite", "snail")
-    until(lasting_fleet.daemons["snail"].clears, "the end of an earlier push")
+    until(lasting_fleet.daemons["snail"].clears, "the end of a previous push")
     return lasting_fleet
 
 
 class Command:
-    """A `fleet` command that runs while something happens to the fleet."""
+    """A `fleet` command that runs while faults are injected."""
 
     def __init__(self, fleet: Fleet, *arguments: str | Path) -> None:
         self.process = subprocess.Popen(
@@ -67,7 +67,7 @@ class Command:
         )
 
     def end(self) -> tuple[int, str, str]:
-        """Return exit status, standard output and standard error."""
+        """Wait for it; return exit status, standard output and standard error."""
         try:
             output, error = self.process.communicate(timeout=60)
         finally:
@@ -76,7 +76,7 @@ class Command:
 
 
 def long_push(fleet: Fleet, *options: str) -> Command:
-    """Start to write the long mission to all, and return when the slow vehicle is in the middle of it."""
+    """Start to push the long mission to all; return while the slow vehicle is receiving it."""
     file = fleet.folder / "long.waypoints"
     file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(_COUNT))]))
 
@@ -85,7 +85,7 @@ def long_push(fleet: Fleet, *options: str) -> Command:
 
     before = pushes()
     command = Command(fleet, "push", file, "--all", *options)
-    until(lambda: pushes() > before, "the beginning of the slow push")
+    until(lambda: pushes() > before, "the start of the slow push")
     return command
 
 
@@ -100,8 +100,8 @@ def outcomes(ended: tuple[int, str, str]) -> dict[str, Any]:
     return {vehicle["vehicle"]: vehicle for vehicle in json.loads(output)["vehicles"]}
 
 
-def test_the_router_stops_in_the_middle_of_a_push(fleet: Fleet) -> None:
-    """The command says that it does not know; the vehicle ends what it has begun; the fleet is seen again."""
+def test_the_router_stops_during_a_push(fleet: Fleet) -> None:
+    """The result is reported as unknown, the vehicle finishes the push, and the fleet is visible again later."""
     command = long_push(fleet, "--json")
     fleet.router.stop()
     snail = outcomes(command.end())["snail"]
@@ -120,7 +120,7 @@ def test_the_router_stops_in_the_middle_of_a_push(fleet: Fleet) -> None:
     fleet.boards["snail"].assert_was_treated_well()
 
 
-def test_a_vehicle_vanishes_in_the_middle_of_a_push(fleet: Fleet) -> None:
+def test_a_vehicle_disappears_during_a_push(fleet: Fleet) -> None:
     command = long_push(fleet, "--json")
     fleet.daemons["snail"].end(signal.SIGKILL)
     found = outcomes(command.end())
@@ -129,17 +129,17 @@ def test_a_vehicle_vanishes_in_the_middle_of_a_push(fleet: Fleet) -> None:
     assert list(fleet.listed()) == ["kite"]
 
 
-def test_ctrl_c_in_the_middle_of_a_push(fleet: Fleet) -> None:
+def test_ctrl_c_during_a_push(fleet: Fleet) -> None:
     def ends() -> int:
         return sum(event["event"] == "mission.push_ended" for event in fleet.daemons["kite"].events())
 
     before = ends()
     command = long_push(fleet)
     snail = fleet.daemons["snail"].process
-    snail.send_signal(signal.SIGSTOP)  # its push does not end before the other's, however busy the machine is
+    snail.send_signal(signal.SIGSTOP)  # so that its push ends after the other's even on a busy machine
     try:
-        until(lambda: ends() > before, "the end of the quick push")
-        fleet.listed()  # its replies come by the same router, after that of the push
+        until(lambda: ends() > before, "the end of the fast push")
+        fleet.listed()  # its replies come through the same router, after the push's
         command.process.send_signal(signal.SIGINT)
         code, output, error = command.end()
     finally:
@@ -151,7 +151,7 @@ def test_ctrl_c_in_the_middle_of_a_push(fleet: Fleet) -> None:
     assert len(error.splitlines()) == 1
 
 
-def test_a_second_push_meanwhile_is_refused(fleet: Fleet) -> None:
+def test_a_second_push_during_the_first_is_refused(fleet: Fleet) -> None:
     with session(connect=fleet.router.endpoint) as opened:
         command = long_push(fleet, "--json")
         (second,) = ask(opened, UPLOAD.suffix, (fleet.folder / "long.waypoints").read_bytes(), vehicle="snail")
@@ -160,11 +160,11 @@ def test_a_second_push_meanwhile_is_refused(fleet: Fleet) -> None:
     assert code == 0
 
 
-def test_a_bridge_that_hangs_is_listed_as_such(fleet: Fleet) -> None:
+def test_a_hung_bridge_is_listed_as_silent(fleet: Fleet) -> None:
     kite = fleet.daemons["kite"].process
     kite.send_signal(signal.SIGSTOP)
     try:
-        until(lambda: not fleet.listed()["kite"]["answers"], "the silence of the one that hangs")
+        until(lambda: not fleet.listed()["kite"]["answers"], "the silence of the hung bridge")
         vehicles = fleet.listed()
         assert (vehicles["kite"]["answers"], vehicles["snail"]["answers"]) == (False, True)
         assert "kite: alive, but sends no state" in fleet.ask("list").stdout
@@ -174,7 +174,7 @@ def test_a_bridge_that_hangs_is_listed_as_such(fleet: Fleet) -> None:
 
 
 class Terminal:
-    """A `fleet watch` on a terminal of its own; `text` is what was shown so far."""
+    """A `fleet watch` on its own terminal; `text` is all output so far."""
 
     def __init__(self, fleet: Fleet) -> None:
         near, far = pty.openpty()
@@ -189,7 +189,7 @@ class Terminal:
         self._reader.start()
 
     def _read(self) -> None:
-        # A terminal whose other end is closed gives an error.
+        # Reading fails once the terminal's other end is closed.
         try:
             while data := os.read(self._near, 4096):
                 self.text += data.decode(errors="replace")
@@ -198,11 +198,11 @@ class Terminal:
 
     @property
     def newest(self) -> str:
-        """The last picture that is complete."""
+        """The last complete screen."""
         return (self.text.split("Ctrl-C ends.")[-2:] or [""])[0]
 
     def shows(self, text: str) -> None:
-        """Wait until something is shown that was not shown before."""
+        """Wait until the text is shown after the present output."""
         seen = len(self.text)
         until(lambda: text in self.text[seen:], f"{text!r} on the terminal")
 
@@ -216,7 +216,7 @@ class Terminal:
             os.close(self._near)
 
 
-def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
+def test_watch_shows_vehicles_that_come_and_go(fleet: Fleet) -> None:
     terminal = Terminal(fleet)
     try:
         terminal.shows("kite")
@@ -225,7 +225,7 @@ def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
         terminal.shows("ARMED")
         fleet.boards["snail"].set("armed 0")
         fleet.daemons["snail"].end()
-        until(lambda: "kite" in terminal.newest and "snail" not in terminal.newest, "its end on the terminal")
+        until(lambda: "kite" in terminal.newest and "snail" not in terminal.newest, "its exit on the terminal")
         fleet.router.stop()
         terminal.shows("The router is gone")
         fleet.router.start_again()
@@ -236,8 +236,8 @@ def test_watch_shows_who_comes_and_goes(fleet: Fleet) -> None:
     assert "Traceback" not in terminal.text
 
 
-def test_a_router_that_hangs_is_not_an_empty_fleet(fleet: Fleet) -> None:
-    """The session is open, and the router then says nothing more."""
+def test_a_hung_router_is_not_an_empty_fleet(fleet: Fleet) -> None:
+    """The router hangs after the session was opened."""
     router = fleet.router.process
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
@@ -254,6 +254,6 @@ def test_a_router_that_hangs_is_not_an_empty_fleet(fleet: Fleet) -> None:
 
 
 def _is_stopped(pid: int) -> bool:
-    """A signal reaches one thread after the other, and the last one may still answer."""
+    """SIGSTOP stops the threads one by one, and the last may still answer."""
     stats = [stat.read_text() for stat in Path(f"/proc/{pid}/task").glob("*/stat")]
     return all(stat.rpartition(")")[2].split()[0] == "T" for stat in stats)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""examples/fleet: each metric that a dashboard or an alert names is one that a daemon has."""
+"""Every metric in the dashboards and alerts of examples/fleet exists in a daemon."""
 
 import asyncio
 import json
@@ -17,7 +17,7 @@ from tests.support.programs import until
 from tests.support.zenoh_router import EXAMPLES
 
 _NAME = re.compile(r"\b(?:naze_bridge|process)_[a-z_]+")
-#: Counted only once something has happened, or only with a session.
+#: Metrics that exist only after an event, or only with a session.
 _LATER = {"naze_bridge_missions_total", "naze_bridge_refused_frames_total", "naze_bridge_zenoh_dropped_total"}
 
 
@@ -29,7 +29,7 @@ def wanted() -> set[str]:
     return set(_NAME.findall(" ".join([*expressions, alerts])))
 
 
-async def test_the_metrics_are_there(tmp_path: Path) -> None:
+async def test_the_metrics_exist(tmp_path: Path) -> None:
     daemon = Daemon(Settings(parse_fc("sim:"), [], tmp_path, zenoh=ZenohSettings(vehicle="kite")))
     metrics = Metrics(daemon)
     running = asyncio.create_task(daemon.run())

@@ -14,7 +14,7 @@ from tests.support.programs import Program, free_port, until
 
 
 class Relay(Program):
-    """The command, as a program of its own."""
+    """The command as a process."""
 
     def __init__(self, folder: Path, fleet: Fleet, vehicle: str, gcs: str) -> None:
         where = ("--connect", fleet.router.endpoint)
@@ -48,7 +48,7 @@ def test_mission_planner_writes_and_reads_a_mission(fleet: Fleet, tmp_path: Path
     assert code in (0, 130, -15)
 
 
-def test_a_vehicle_that_is_not_there(fleet: Fleet) -> None:
+def test_an_unknown_vehicle(fleet: Fleet) -> None:
     ended = fleet.ask("mavlink", "--vehicle", "owl")
     assert (ended.returncode, ended.stderr) == (1, "naze-bridge: no vehicle 'owl' is alive; there is kite\n")
     assert fleet.ask("mavlink", "--vehicle", "kite", "--gcs", "smoke:1").returncode == 2

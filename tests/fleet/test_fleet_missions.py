@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One mission for many: a trial that writes nothing, stages, a comparison by checksum, vehicles chosen by state."""
+"""One mission for many vehicles: dry runs, stages, comparison by checksum, selection by state."""
 
 import json
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ def plan_file(folder: Path, plan: list[PlanRow]) -> Path:
     return path
 
 
-def test_a_trial_tells_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_dry_run_reports_the_corrections_and_writes_nothing(fleet: Fleet, tmp_path: Path) -> None:
     before = [fleet.daemons[name].held() for name in NAMES]
     file = plan_file(tmp_path, [*plain_plan(4, start=90), PlanRow(178, p2=5.0)])
     tried = fleet.ask("push", file, "--all", "--dry-run")
@@ -81,7 +81,7 @@ def test_a_staged_push_stops_at_the_first_failure(fleet: Fleet, tmp_path: Path) 
     assert [pushed[name]["ok"] for name in NAMES] == [True] * 3
 
 
-def test_vehicles_are_chosen_by_their_state(fleet: Fleet, tmp_path: Path) -> None:
+def test_vehicles_are_selected_by_state(fleet: Fleet, tmp_path: Path) -> None:
     fleet.pushed(plan_file(tmp_path, plain_plan(8)), "--vehicle", "owl", code=0)
     until(lambda: fleet.listed()["owl"]["mission_count"] == 8, "the news")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bookkeeping of a push to many vehicles: whatever comes when, each ends once and for its own reason."""
+"""The bookkeeping of a push to many vehicles: with events in any order, each ends exactly once with its own reason."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +15,7 @@ def push_to(*names: str) -> FleetPush:
     return FleetPush.of(names, [BridgeState(name, f"{number}") for number, name in enumerate(names)])
 
 
-def test_one_that_fails_leaves_the_others_alone() -> None:
+def test_a_failure_does_not_affect_the_others() -> None:
     fleet = push_to(*NAMES)
     fleet.replied("a", {"progress": 2, "of": 3})
     fleet.refused("b", {"error": "Armed: disarm to change the mission"})
@@ -29,7 +29,7 @@ def test_one_that_fails_leaves_the_others_alone() -> None:
     assert fleet.vehicles["a"].result == ACCEPTED["result"]
 
 
-def test_a_vehicle_that_goes_after_its_success_has_not_failed() -> None:
+def test_a_vehicle_that_disappears_after_its_success_has_not_failed() -> None:
     fleet = push_to("a")
     fleet.replied("a", ACCEPTED)
     fleet.ended("a", is_alive=True)
@@ -47,13 +47,13 @@ def test_silence_has_three_reasons() -> None:
     assert [word in reason for word, reason in zip(words, reasons, strict=True)] == [True] * 3
 
 
-def test_a_name_that_two_bridges_use_gets_nothing() -> None:
+def test_a_name_used_by_two_bridges_gets_nothing() -> None:
     fleet = FleetPush.of(["a", "b"], [BridgeState("a", "1"), BridgeState("a", "2"), BridgeState("b", "3")])
     assert fleet.waiting == ["b"]
     assert "several bridges" in str(fleet.vehicles["a"].error)
 
 
-def test_an_answer_that_is_not_accepted_has_failed() -> None:
+def test_any_result_but_accepted_is_a_failure() -> None:
     fleet = push_to("a")
     fleet.replied("a", {"result": {"ack": "MAV_MISSION_NO_SPACE", "text": "Too many\x1b[2J items"}})
     assert fleet.vehicles["a"].error == "Too many?[2J items"
@@ -80,7 +80,7 @@ _EVENTS = st.tuples(st.sampled_from(["replied", "refused", "ended", "gone"]), st
 
 
 @given(st.lists(_EVENTS, max_size=20))
-def test_whatever_comes(events: list[tuple[str, str, dict[str, object] | None]]) -> None:
+def test_events_in_any_order(events: list[tuple[str, str, dict[str, object] | None]]) -> None:
     fleet = push_to(*NAMES)
     ends: dict[str, tuple[object, object]] = {}
     for kind, name, answer in events:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The examples for a fleet behind a router, unchanged: who comes in, who does not and why, who may do what."""
+"""The unchanged examples for a fleet behind a router: admitted and refused members, and their rights."""
 
 import datetime
 import json
@@ -41,8 +41,8 @@ def secured(request: pytest.FixtureRequest) -> Fleet:
     return found
 
 
-def stands_in_for(stack: ExitStack, session: zenoh.Session, vehicle: str) -> None:
-    """What a bridge declares."""
+def fake_bridge(stack: ExitStack, session: zenoh.Session, vehicle: str) -> None:
+    """Declare a bridge's keys."""
 
     def answer(query: zenoh.Query) -> None:
         with query:
@@ -53,7 +53,7 @@ def stands_in_for(stack: ExitStack, session: zenoh.Session, vehicle: str) -> Non
             result = {"ack": "MAV_MISSION_ACCEPTED", "text": "Mission verified: 15 records", "findings": []}
             query.reply(query.key_expr, json.dumps({"result": result}))
 
-    # The answer is given under the vehicle's own key, as a bridge does: a query's may have wildcards.
+    # Reply under the vehicle's own key, like a bridge; the query's key may have wildcards.
     def state(query: zenoh.Query) -> None:
         with query:
             query.reply(
@@ -70,10 +70,10 @@ def asks(session: zenoh.Session, key: str) -> int:
     return sum(reply.ok is not None for reply in session.get(key, timeout=5.0))
 
 
-def test_a_vehicle_is_seen_by_everybody_and_commanded_by_the_pilot(secured: Fleet) -> None:
+def test_all_members_see_a_vehicle_and_the_pilot_commands_it(secured: Fleet) -> None:
     with ExitStack() as stack:
         vehicle = stack.enter_context(secured.open("vehicle", "naze-1"))
-        stands_in_for(stack, vehicle, "naze-1")
+        fake_bridge(stack, vehicle, "naze-1")
         pilot, guest = (stack.enter_context(secured.open("pilot", name)) for name in ("pilot", "guest"))
         until(lambda: asks(pilot, "fleet/naze-1/@cmd/v1/status") == 1, "the pilot's command")
         assert asks(guest, "fleet/naze-1/v1/state") == 1
@@ -93,13 +93,13 @@ def test_a_vehicle_is_seen_by_everybody_and_commanded_by_the_pilot(secured: Flee
         assert (listed.returncode, "naze-1" in listed.stdout) == (0, True), listed
 
 
-def test_a_push_is_the_pilots(secured: Fleet) -> None:
+def test_only_the_pilot_may_push(secured: Fleet) -> None:
     def push(name: str) -> subprocess.CompletedProcess[str]:
         file, config = EXAMPLES / "naze-field.waypoints", secured.config("pilot", name)
         return run_naze_bridge("fleet", "push", file, "--vehicle", "naze-1", "--zenoh-config", config)
 
     with ExitStack() as stack:
-        stands_in_for(stack, stack.enter_context(secured.open("vehicle", "naze-1")), "naze-1")
+        fake_bridge(stack, stack.enter_context(secured.open("vehicle", "naze-1")), "naze-1")
         until(lambda: "naze-1" in secured.fleet_list(secured.config("pilot", "pilot")).stdout, "the vehicle")
         assert push("pilot").returncode == 0
         denied = push("guest")
@@ -107,13 +107,13 @@ def test_a_push_is_the_pilots(secured: Fleet) -> None:
     assert "the router denies access" in " ".join(denied.stdout.split())
 
 
-def test_a_vehicle_cannot_be_another_one(secured: Fleet) -> None:
+def test_a_vehicle_cannot_impersonate_another(secured: Fleet) -> None:
     with ExitStack() as stack:
         vehicle = stack.enter_context(secured.open("vehicle", "naze-2"))
-        stands_in_for(stack, vehicle, "naze-1")
-        stands_in_for(stack, vehicle, "naze-2")
+        fake_bridge(stack, vehicle, "naze-1")
+        fake_bridge(stack, vehicle, "naze-2")
         pilot = stack.enter_context(secured.open("pilot", "pilot"))
-        until(lambda: asks(pilot, "fleet/naze-2/@cmd/v1/status") == 1, "the answer under its own name")
+        until(lambda: asks(pilot, "fleet/naze-2/@cmd/v1/status") == 1, "the reply under its own name")
         assert asks(pilot, "fleet/naze-1/@cmd/v1/status") == 0
         tokens = [str(reply.ok.key_expr) for reply in pilot.liveliness().get("fleet/*/v1/alive/*") if reply.ok]
         assert [key.split("/")[1] for key in tokens] == ["naze-2"]
@@ -122,7 +122,7 @@ def test_a_vehicle_cannot_be_another_one(secured: Fleet) -> None:
 def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
     with ExitStack() as stack:
         vehicle = stack.enter_context(tls.open("vehicle", "naze-1"))
-        stands_in_for(stack, vehicle, "naze-1")
+        fake_bridge(stack, vehicle, "naze-1")
         pilot, stranger = (stack.enter_context(tls.open("pilot", name)) for name in ("pilot", "stranger"))
         until(lambda: asks(pilot, "fleet/naze-1/v1/state") == 1, "the pilot's question")
         assert asks(stranger, "fleet/naze-1/v1/state") == asks(stranger, "fleet/naze-1/@cmd/v1/status") == 0
@@ -157,13 +157,13 @@ def write(folder: Path, name: str, issued: trustme.LeafCert) -> None:
         ("old", lambda own, _: own.issue_cert("pilot", common_name="pilot", **_PAST), "certificate expired"),
     ],
 )
-def test_a_pilots_certificate_that_does_not_hold(tls: Fleet, name: str, issue: Issue, said: str) -> None:
+def test_an_invalid_pilots_certificate(tls: Fleet, name: str, issue: Issue, said: str) -> None:
     own = trustme.CA.from_pem((tls.folder / "ca.pem").read_bytes(), (tls.folder / "ca.key").read_bytes())
     write(tls.folder, name, issue(own, trustme.CA()))
     assert said in refused(tls.fleet_list(tls.config("pilot", name)))
 
 
-def test_no_certificate_of_ours(tls: Fleet) -> None:
+def test_a_missing_certificate(tls: Fleet) -> None:
     config = tls.config("pilot", "nobody")
     assert f"there is no file {tls.folder / 'nobody.pem'}" in refused(tls.fleet_list(config))
 
@@ -177,7 +177,7 @@ def test_no_certificate_of_ours(tls: Fleet) -> None:
     ],
     ids=["expired", "another name", "not ours"],
 )
-def test_a_routers_certificate_that_does_not_hold(tls: Fleet, tmp_path: Path, issue: Issue, said: str) -> None:
+def test_an_invalid_routers_certificate(tls: Fleet, tmp_path: Path, issue: Issue, said: str) -> None:
     endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
     shutil.copytree(tls.folder, tmp_path, dirs_exist_ok=True)
     own = trustme.CA.from_pem((tmp_path / "ca.pem").read_bytes(), (tmp_path / "ca.key").read_bytes())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""With a storage on `fleet/**`, what is stored of a vehicle is never taken for the vehicle."""
+"""With a storage on `fleet/**`, stored samples of a vehicle are never taken for the vehicle."""
 
 import json
 import signal
@@ -20,7 +20,7 @@ from tests.support.zenoh_storage import client, storage
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Fleet, zenoh.Session]]:
-    """`kite` lives, `owl` has died; the storage knows both."""
+    """`kite` is alive, `owl` is gone; the storage has samples of both."""
     folder = tmp_path_factory.mktemp("fleet")
     with ExitStack() as stack:
         fleet = Fleet(folder, stack)
@@ -47,7 +47,7 @@ def test_dead_vehicles_are_stored_but_not_listed(stored: tuple[Fleet, zenoh.Sess
     assert (listed["kite"]["answers"], listed["kite"]["bridges"]) == (True, 1)
 
 
-def test_missions_are_pulled_and_pushed_as_ever(stored: tuple[Fleet, zenoh.Session], tmp_path: Path) -> None:
+def test_pull_and_push_ignore_the_storage(stored: tuple[Fleet, zenoh.Session], tmp_path: Path) -> None:
     fleet, looking = stored
     file = tmp_path / "plan.waypoints"
     file.write_text(write_qgc_wpl([row.as_sent(seq, use_int=True) for seq, row in enumerate(plain_plan(7))]))
@@ -59,8 +59,8 @@ def test_missions_are_pulled_and_pushed_as_ever(stored: tuple[Fleet, zenoh.Sessi
     assert (dead.returncode, "no vehicle 'owl' is alive" in dead.stderr) == (1, True)
 
 
-def test_a_silent_vehicle_is_not_spoken_for(stored: tuple[Fleet, zenoh.Session]) -> None:
-    """Its bridge hangs and its token is still there: the stored state is not shown as its own."""
+def test_a_storage_does_not_answer_for_a_silent_vehicle(stored: tuple[Fleet, zenoh.Session]) -> None:
+    """Its bridge hangs while its token is alive; the stored state is not shown as current."""
     fleet, _ = stored
     kite = fleet.daemons["kite"].process
     kite.send_signal(signal.SIGSTOP)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How `naze-bridge fleet` connects, and its messages if that fails."""
+"""How `naze-bridge fleet` connects, and its messages on failure."""
 
 import re
 import socket
@@ -39,7 +39,7 @@ def test_the_first_endpoint_to_answer_is_used(router: Router) -> None:
     assert listed.returncode == 0, listed
 
 
-def test_the_daemons_own_file_says_where(router: Router, tmp_path: Path) -> None:
+def test_the_endpoint_comes_from_the_daemons_configuration(router: Router, tmp_path: Path) -> None:
     config = tmp_path / "naze.toml"
     config.write_text(f'[zenoh]\nprefix = "flock"\nconnect = ["{router.endpoint}"]\n')
     listed = run_naze_bridge("fleet", "list", "--config", config)
@@ -54,7 +54,7 @@ def test_no_router() -> None:
     assert sentence == f"naze-bridge: cannot join the fleet: {endpoint}: connection refused"
 
 
-def test_another_program_listens_there() -> None:
+def test_another_program_on_the_routers_port() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
         assert "is a zenoh router" in sentence_of("list", "--connect", endpoint)
@@ -71,16 +71,16 @@ def test_another_program_listens_there() -> None:
         ("", "--connect"),
     ],
 )
-def test_endpoints_that_are_none(endpoint: str, said: str) -> None:
+def test_invalid_endpoints(endpoint: str, said: str) -> None:
     assert said in sentence_of("list", "--connect", endpoint)
 
 
 @pytest.mark.parametrize("prefix", ["fleet/*", "a/b", "@fleet", "fl eet", "fleet?x"])
-def test_a_prefix_that_no_key_can_have(prefix: str) -> None:
+def test_an_invalid_prefix(prefix: str) -> None:
     assert "zenoh.prefix" in sentence_of("list", "--prefix", prefix, code=2)
 
 
-def test_zenoh_files_that_cannot_be_used(tmp_path: Path) -> None:
+def test_unusable_zenoh_files(tmp_path: Path) -> None:
     missing = tmp_path / "none.json5"
     assert f"{missing} cannot be read: no such file" in sentence_of("list", "--zenoh-config", missing)
     broken = tmp_path / "broken.json5"
@@ -97,7 +97,7 @@ def test_vehicles_must_be_named() -> None:
     assert "--vehicle NAME, or --all" in sentence_of("push", file, "--all", "--vehicle", "a", code=2)
 
 
-def test_a_file_that_is_not_a_mission_goes_nowhere(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_mission_is_not_sent(tmp_path: Path) -> None:
     file = tmp_path / "plan"
     file.write_text("I am no mission")
     ended = run_naze_bridge("fleet", "push", file, "--all")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The screen of `fleet watch` in a terminal of 80 x 24, and the age it shows for each state."""
+"""The screen of `fleet watch` in a terminal of 80 x 24, and the ages it shows."""
 
 import json
 from typing import Any
@@ -49,7 +49,7 @@ def test_problems_are_named() -> None:
 
 
 class Sample:
-    """What a zenoh sample is to a watch."""
+    """A zenoh sample as used by `watch`."""
 
     encoding = "application/json"
 
@@ -63,8 +63,8 @@ class Sample:
         return self._data
 
 
-def test_a_backlog_is_shown_as_old_as_it_is() -> None:
-    """The vehicle's clock is an hour behind; 8 s of states come at once after a stall."""
+def test_a_backlog_is_shown_with_its_true_age() -> None:
+    """The vehicle's clock is an hour behind; 8 s of states arrive at once after a stall."""
     import zenoh
 
     now = 5000.0

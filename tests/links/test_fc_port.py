@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flight controller's port on a pty: gathered reading at high rates, and writing faster than a UART takes."""
+"""The flight controller's port on a pty: batched reads at high rates, and writes faster than a UART."""
 
 import asyncio
 import os
@@ -26,7 +26,7 @@ def attitude(number: int) -> bytes:
 
 
 class Line:
-    """A pty with the port at one end, and the test at the other, `wire`."""
+    """A pty with the port at one end and the test at the other, `wire`."""
 
     def __init__(self, directory: Path) -> None:
         self.wire, self._terminal = os.openpty()
@@ -37,7 +37,7 @@ class Line:
         self.heard = bytearray()
         self.opened = 0
         self.lost: list[str] = []
-        #: In how many reads it came.
+        #: The number of reads.
         self.reads = 0
 
     def start(self) -> FcPort:
@@ -56,25 +56,25 @@ class Line:
         os.close(self._terminal)
 
     def take(self, size: int = 65536) -> bytes:
-        """Return at most this many bytes from the wire."""
+        """Read at most this many bytes from the wire."""
         try:
             return os.read(self.wire, size)
         except BlockingIOError:
             return b""
 
     def numbers(self) -> list[int]:
-        """Return the numbers of the frames that came; nothing else may have come."""
+        """The numbers of the received frames; nothing else may have been received."""
         frames = MavlinkSplitter().feed(bytes(self.heard))
         assert b"".join(frame.raw for frame in frames) == self.heard
         return [int.from_bytes(frame.payload[:4].ljust(4, b"\0"), "little") for frame in frames]
 
     async def has_come(self, count: int) -> None:
-        """Wait until this many frames have arrived in total."""
-        await until_async(lambda: len(MavlinkSplitter().feed(bytes(self.heard))) == count, "what was sent")
+        """Wait until `count` frames have arrived in total."""
+        await until_async(lambda: len(MavlinkSplitter().feed(bytes(self.heard))) == count, "the sent frames")
         self.numbers()
 
     async def feed(self, first: int, count: int, rate_hz: int) -> int:
-        """Send frames one by one, evenly; return the number after the last."""
+        """Send frames at a constant rate; return the number after the last."""
         loop = asyncio.get_running_loop()
         for number in range(first, first + count):
             due = loop.time() + 1 / rate_hz
@@ -88,7 +88,7 @@ class Line:
         return first + count
 
     async def feed_until_gathered(self, first: int = 0) -> int:
-        """Send 3000 frames a second until reads are fewer than frames; a busy machine needs several tries."""
+        """Send 3000 frames a second until there are fewer reads than frames; a busy machine may need several tries."""
         async with asyncio.timeout(PATIENCE):
             while True:
                 before = self.reads
@@ -112,14 +112,14 @@ def line(tmp_path: Path) -> Iterator[Line]:
     line.close()
 
 
-async def test_many_frames_a_second_are_gathered_and_few_are_not(line: Line) -> None:
+async def test_reads_are_batched_only_at_high_rates(line: Line) -> None:
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     port.may_gather = True
     sent = 0
     for _ in range(3):
         sent = await line.feed_until_gathered(sent)
-        # The rate falls: each frame is read when it comes.
+        # At a lower rate each frame is read on arrival.
         sent = await line.feed(sent, 50, 50)
         await line.has_come(sent)
         await until_async(lambda: port._gathering is None, "the end of gathering")
@@ -129,7 +129,7 @@ async def test_many_frames_a_second_are_gathered_and_few_are_not(line: Line) -> 
     await line.stop()
 
 
-async def test_a_port_that_falls_silent_while_it_is_gathered_is_not_lost(line: Line) -> None:
+async def test_a_port_that_falls_silent_during_batched_reads_is_not_lost(line: Line) -> None:
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     port.may_gather = True
@@ -141,7 +141,7 @@ async def test_a_port_that_falls_silent_while_it_is_gathered_is_not_lost(line: L
     await line.stop()
 
 
-async def test_a_port_that_hangs_up_while_it_is_gathered_is_opened_again(line: Line, tmp_path: Path) -> None:
+async def test_a_port_that_hangs_up_during_batched_reads_is_reopened(line: Line, tmp_path: Path) -> None:
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     port.may_gather = True
@@ -158,7 +158,7 @@ async def test_a_port_that_hangs_up_while_it_is_gathered_is_opened_again(line: L
     await line.stop()
 
 
-async def test_what_a_uart_does_not_take_is_dropped_by_whole_frames(line: Line) -> None:
+async def test_a_full_uart_drops_whole_frames(line: Line) -> None:
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     sent = [attitude(number) for number in range(2000)]
@@ -175,15 +175,15 @@ async def test_what_a_uart_does_not_take_is_dropped_by_whole_frames(line: Line) 
     frames = [frame.raw for frame in MavlinkSplitter().feed(bytes(taken))]
     assert b"".join(frames) == taken
     assert frames == sent[: len(frames)]
-    # Who reads again gets what is written then.
+    # When it is read again, it gets the new frames.
     port.write(sent[-1])
     taken.clear()
     await until_async(lambda: take_whole() or bytes(taken) == sent[-1], "a frame")
     await line.stop()
 
 
-async def test_a_stuck_uart_continues_with_whole_frames_as_it_takes_them(line: Line) -> None:
-    """The wire is read a little at a time, so that frames are cut everywhere by what the terminal takes."""
+async def test_a_stuck_uart_resumes_with_whole_frames(line: Line) -> None:
+    """The wire is read in small pieces, so that the terminal splits frames anywhere."""
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     sent = [attitude(number) for number in range(4000)]
@@ -207,15 +207,15 @@ async def test_a_stuck_uart_continues_with_whole_frames_as_it_takes_them(line: L
     await line.stop()
 
 
-async def test_what_waits_when_the_speed_changes_is_not_sent_at_another(line: Line) -> None:
-    """It would be garbage to the flight controller, and garbage can be anything."""
+async def test_queued_frames_are_dropped_when_the_speed_changes(line: Line) -> None:
+    """At another speed they would be arbitrary bytes to the flight controller."""
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     port.set_speed(9600)
     await until_async(lambda: port.write(bytes(4000)) or port.dropped_bytes, "a full port")  # type: ignore[func-returns-value]
     port.set_speed(57600)
     while line.take():
-        """That was on the wire already."""
+        """Already on the wire."""
     port.write(b"for the new speed")
     came = bytearray()
 
@@ -223,5 +223,5 @@ async def test_what_waits_when_the_speed_changes_is_not_sent_at_another(line: Li
         came.extend(line.take())
         return came.endswith(b"speed")
 
-    await until_async(has_come, "what was written afterwards")
+    await until_async(has_come, "the frame written afterwards")
     assert bytes(came) == b"for the new speed"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A flight controller behind TCP whose replies come byte by byte, each waiting for the acknowledgement of the last."""
+"""A flight controller on TCP whose replies arrive byte by byte, each after the previous one's acknowledgement."""
 
 import asyncio
 import fcntl
@@ -14,12 +14,12 @@ from tests.support.programs import PATIENCE
 
 
 def unacknowledged(connection: socket.socket) -> int:
-    """How many bytes the other end's kernel has not acknowledged."""
+    """The number of bytes not yet acknowledged by the other end's kernel."""
     (count,) = struct.unpack("i", fcntl.ioctl(connection, termios.TIOCOUTQ, bytes(4)))
     return int(count)
 
 
-async def test_what_was_read_is_acknowledged_before_the_next_byte_is_awaited() -> None:
+async def test_received_bytes_are_acknowledged_at_once() -> None:
     loop = asyncio.get_running_loop()
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.setblocking(False)
@@ -34,7 +34,7 @@ async def test_what_was_read_is_acknowledged_before_the_next_byte_is_awaited() -
         board, _ = await asyncio.wait_for(loop.sock_accept(listener), PATIENCE)
         with board:
             left = []
-            # Linux acknowledges late only to an end that it knows to answer.
+            # Linux delays acknowledgements only on connections with traffic both ways.
             for _ in range(30):
                 board.send(b"$")
                 left.append(await asyncio.wait_for(heard.get(), PATIENCE))

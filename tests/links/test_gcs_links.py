@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UDP and TCP links by themselves, on real sockets."""
+"""UDP and TCP links without a daemon, on real sockets."""
 
 import asyncio
 import socket
@@ -86,7 +86,7 @@ async def received(end: socket.socket, size: int = 4096) -> bytes:
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
-async def test_udpin_answers_where_it_was_spoken_to_from(links: Links, host: str) -> None:
+async def test_udpin_answers_to_the_senders_address(links: Links, host: str) -> None:
     port = free_port(socket.SOCK_DGRAM, host)
     link = links.open(f"udpin:{f'[{host}]' if ':' in host else host}:{port}")
     clients = [links.udp(host) for _ in range(2)]
@@ -119,8 +119,8 @@ async def test_ipv4_and_ipv6_have_a_port_each(links: Links) -> None:
     links.open(f"udpin:[::]:{port}")
 
 
-async def test_a_name_is_spoken_to_when_it_is_known(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The network comes up later than the daemon, and what the name stands for changes."""
+async def test_a_host_name_is_used_once_it_resolves(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The network comes up after the daemon, and the name's address changes."""
     first, second = links.udp(), links.udp()
     answers: list[list[tuple[str, int]]] = [[], [], [first.getsockname()], [first.getsockname(), ("127.0.0.9", 9)]]
     answers += [[], [("127.0.0.9", 9), first.getsockname()], [second.getsockname()]]
@@ -148,7 +148,7 @@ async def test_a_name_is_spoken_to_when_it_is_known(links: Links, monkeypatch: p
     assert await received(second) == FRAME
 
 
-async def test_a_real_name_is_looked_up(links: Links) -> None:
+async def test_a_real_name_is_resolved(links: Links) -> None:
     client = links.udp()
     port = client.getsockname()[1]
     link = links.open(f"udpout:localhost:{port}")
@@ -159,18 +159,18 @@ async def test_a_real_name_is_looked_up(links: Links) -> None:
     assert await received(client) == FRAME
 
 
-async def test_a_network_that_is_down_costs_the_datagram_and_nothing_else(links: Links) -> None:
+async def test_a_network_that_is_down_loses_only_the_datagram(links: Links) -> None:
     link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
     client = links.udp()
     for unreachable in (("192.0.2.1", 14550), ("255.255.255.255", 14550), ("127.0.0.1", 0)):
-        # From a socket that is bound to the loopback: ENETUNREACH or EINVAL; EACCES; EINVAL.
+        # From a socket bound to loopback: ENETUNREACH or EINVAL; EACCES; EINVAL.
         link.send(Peer(link.name, unreachable), FRAME)
     link.send(Peer(link.name, client.getsockname()), bytes(70000))
     link.send(Peer(link.name, client.getsockname()), FRAME)
     assert await received(client) == FRAME
 
 
-async def test_datagrams_that_nobody_takes_block_nobody(links: Links) -> None:
+async def test_datagrams_to_a_closed_port_block_nothing(links: Links) -> None:
     link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
     deaf, client = links.udp(), links.udp()
     for _ in range(5000):
@@ -179,7 +179,7 @@ async def test_datagrams_that_nobody_takes_block_nobody(links: Links) -> None:
     assert await received(client) == FRAME
 
 
-async def test_a_client_too_many_takes_the_place_of_another(links: Links) -> None:
+async def test_an_extra_client_displaces_another(links: Links) -> None:
     port = free_port(socket.SOCK_STREAM)
     links.open(f"tcpin:127.0.0.1:{port}")
     clients = [links.tcp(port) for _ in range(tcp_link._MAX_CLIENTS)]
@@ -187,11 +187,11 @@ async def test_a_client_too_many_takes_the_place_of_another(links: Links) -> Non
     links.tcp(port)
     await until_async(lambda: links.ears.gone, "the end of another")
     assert len(links.ears.default_peers) == len(clients)
-    # The half that came first stays: the oldest of the others has made room.
+    # The first half keeps its places; the oldest of the others is displaced.
     assert await received(clients[len(clients) // 2]) == b""
 
 
-async def test_a_client_that_reads_nothing_is_disconnected(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_client_that_does_not_read_is_disconnected(links: Links, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp_link, "_STALL_MS", 500)
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
@@ -208,8 +208,8 @@ async def test_a_client_that_reads_nothing_is_disconnected(links: Links, monkeyp
     assert links.ears.default_peers == {}
 
 
-async def test_who_does_not_read_answers_is_disconnected_after_all_were_sent_to(links: Links) -> None:
-    """No one is told in the middle of a round: what others are sent would get out of order."""
+async def test_clients_that_do_not_read_are_disconnected_after_a_round(links: Links) -> None:
+    """Not during the round, which would reorder frames for other clients."""
     port = free_port(socket.SOCK_STREAM)
     link = links.open(f"tcpin:127.0.0.1:{port}")
     links.tcp(port)
@@ -230,7 +230,7 @@ async def test_who_does_not_read_answers_is_disconnected_after_all_were_sent_to(
         ("udpout:pc.local:1", "pc.local", 1),
     ],
 )
-def test_addresses_are_written_as_they_are_read(text: str, host: str, port: int) -> None:
+def test_addresses_are_written_like_they_are_read(text: str, host: str, port: int) -> None:
     address = parse_gcs(text)
     assert (address.host, address.port, str(address)) == (host, port, text)
     assert isinstance(address, GcsAddress)
@@ -251,7 +251,7 @@ def test_addresses_are_written_as_they_are_read(text: str, host: str, port: int)
         ("tcpin:5760", "tcpin:0.0.0.0:5760"),
     ],
 )
-def test_other_programs_words_are_understood(text: str, meant: str) -> None:
+def test_other_programs_notations_are_accepted(text: str, meant: str) -> None:
     assert str(parse_gcs(text)) == meant
 
 
@@ -265,7 +265,7 @@ def test_other_programs_words_are_understood(text: str, meant: str) -> None:
         ("/dev/ttyUSB0:57600", "is not a ground station connection: use udpin"),
     ],
 )
-def test_what_could_mean_two_things_is_answered_with_its_spelling(text: str, words: str) -> None:
+def test_ambiguous_connections_are_explained(text: str, words: str) -> None:
     with pytest.raises(AddressError) as caught:
         parse_gcs(text)
     assert words in str(caught.value)
@@ -284,11 +284,11 @@ def test_what_could_mean_two_things_is_answered_with_its_spelling(text: str, wor
         ("tcp://127.0.0.1:5760", "tcp:127.0.0.1:5760"),
     ],
 )
-def test_flight_controllers_by_other_programs_words(text: str, meant: str) -> None:
+def test_other_programs_notations_of_flight_controllers(text: str, meant: str) -> None:
     assert str(parse_fc(text)) == meant
 
 
-def test_several_links_in_one_word() -> None:
+def test_several_links_in_one_value() -> None:
     assert split_gcs("udpin:14550,tcpin:5760, udpout:pc,14551") == ["udpin:14550", "tcpin:5760", "udpout:pc,14551"]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`[[share]]`: another program speaks MSP through the bridge, beside telemetry and missions."""
+"""`[[share]]`: another program uses MSP through the bridge, alongside telemetry and missions."""
 
 import asyncio
 import socket
@@ -18,14 +18,14 @@ from service.settings.addresses import SimulatedFc, parse_gcs
 from service.settings.share import ShareSettings, parse_share
 from tests.support.programs import PATIENCE, free_port
 
-#: As configurators do: the bridge, too, gives up a reply that comes late.
+#: Repeat like configurators, because the bridge also gives up late replies.
 _ASKED_AGAIN_S = 2.0
 IDENT, SET_PID, REBOOT, SET_MOTOR, EEPROM_WRITE = 100, 202, 68, 214, 250
 DATAFLASH_ERASE, V2_FRAME, SET_AUX_RC = 72, 255, 0x2230
 
 
 class Program:
-    """A configurator at one end of a TCP connection."""
+    """A configurator on a TCP connection."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader = reader
@@ -33,7 +33,7 @@ class Program:
         self._parser = MspParser(takes_low_v2=True)
 
     async def ask(self, command: int, payload: bytes = b"", *, is_v2: bool = False, times: int = 1) -> list[MspFrame]:
-        """Send requests at once, and wait for as many replies. What is not answered in time is asked again."""
+        """Send requests at once and wait for as many replies. Unanswered ones are repeated."""
         frame = MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2).encode()
         replies: list[MspFrame] = []
         async with asyncio.timeout(PATIENCE):
@@ -73,7 +73,7 @@ async def shared(*, write: bool = False) -> AsyncIterator[tuple[Daemon, Program]
 
 
 @pytest.mark.parametrize("is_v2", [False, True])
-async def test_questions_are_answered_alongside_telemetry(is_v2: bool) -> None:
+async def test_requests_are_answered_alongside_telemetry(is_v2: bool) -> None:
     async with shared() as (daemon, program):
         polled = daemon.traffic["fc"].pieces_received
         replies = await program.ask(IDENT, is_v2=is_v2, times=10)
@@ -98,7 +98,7 @@ async def test_questions_are_answered_alongside_telemetry(is_v2: bool) -> None:
         (True, SET_PID, b"\x0d\x0d\x0d" + bytes(27), "could open this flight controller's command line"),
     ],
 )
-async def test_what_is_refused_is_answered_with_an_error(write: bool, command: int, payload: bytes, why: str) -> None:
+async def test_a_refused_request_gets_an_error(write: bool, command: int, payload: bytes, why: str) -> None:
     async with shared(write=write) as (daemon, program):
         (reply,) = await program.ask(command, payload)
         assert reply.direction is Direction.ERROR
@@ -106,13 +106,13 @@ async def test_what_is_refused_is_answered_with_an_error(write: bool, command: i
         assert why in refusal
 
 
-async def test_a_change_is_carried_if_it_is_allowed() -> None:
+async def test_a_change_is_passed_on_if_allowed() -> None:
     async with shared(write=True) as (_, program):
         (reply,) = await program.ask(EEPROM_WRITE)
         assert reply.direction is Direction.REPLY
 
 
-async def test_armed_nothing_is_carried(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_nothing_is_passed_on_while_armed(monkeypatch: pytest.MonkeyPatch) -> None:
     async with shared(write=True) as (daemon, program):
         monkeypatch.setattr(type(daemon.bridge.session.vehicle), "armed", True)
         (reply,) = await program.ask(IDENT)
@@ -151,14 +151,14 @@ async def test_over_udp_each_program_gets_its_own_replies() -> None:
         with socket.socket(type=socket.SOCK_DGRAM) as first, socket.socket(type=socket.SOCK_DGRAM) as second:
             for program in first, second:
                 program.setblocking(False)
-            await loop.sock_sendto(first, question[:-2], ("127.0.0.1", port))  # cut short, so it is dropped
+            await loop.sock_sendto(first, question[:-2], ("127.0.0.1", port))  # truncated, so it is dropped
             answered, refused = await asyncio.gather(ask(first, question), ask(second, change))
     assert (answered.direction, answered.payload[0]) == (Direction.REPLY, 211)
     assert (refused.direction, refused.command) == (Direction.ERROR, SET_PID)
     assert len(daemon.share_refused) == 1
 
 
-async def test_noise_is_not_carried() -> None:
+async def test_noise_is_not_passed_on() -> None:
     async with shared() as (daemon, program):
         program._writer.write(b"###\r\r\rRRR#\n" * 100)
         (reply,) = await program.ask(IDENT)
@@ -175,6 +175,6 @@ async def test_noise_is_not_carried() -> None:
         ({"address": "tcpin:5761", "write": "yes"}, "must be true or false"),
     ],
 )
-def test_a_share_that_cannot_be_used(entry: object, words: str) -> None:
+def test_invalid_shares(entry: object, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         parse_share(entry, Path())

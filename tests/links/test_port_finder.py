@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fc = "auto"`: a flight controller among GPS receivers, radios and other programs' ports, on pseudo-terminals."""
+"""`fc = "auto"`: finding the flight controller among GPS receivers, radios and ports in use, on pseudo-terminals."""
 
 import asyncio
 import json
@@ -35,7 +35,7 @@ class Pi(FaultyMachine):
         self.wires: dict[str, int] = {}
 
     def usb(self, name: str, socket: str, chip: tuple[str, str, str, str] = CP2102) -> None:
-        """Plug a chip into a USB socket, without its terminal."""
+        """Plug a USB serial chip in, without a terminal."""
         device = f"/sys/devices/usb1/{socket}"
         for fact, text in zip(("idVendor", "idProduct", "manufacturer", "product"), chip, strict=True):
             self.write(f"{device}/{fact}", f"{text}\n")
@@ -44,7 +44,7 @@ class Pi(FaultyMachine):
         self.path(f"/sys/class/tty/{name}/device").symlink_to(self.path(f"{device}/{socket}:1.0/{name}"))
 
     def terminal(self, name: str) -> None:
-        """Give a port a terminal, whose other end the test has in `wires`."""
+        """Give a port a terminal; its other end is in `wires`."""
         wire, terminal = os.openpty()
         tty.setraw(terminal)
         os.set_blocking(wire, False)
@@ -81,7 +81,7 @@ def plug_naze(pi: Pi, name: str) -> PtyLink:
     return link
 
 
-async def test_the_flight_controller_is_found_behind_a_gps_receiver(pi: Pi, tmp_path: Path) -> None:
+async def test_the_flight_controller_is_found_after_a_gps_receiver(pi: Pi, tmp_path: Path) -> None:
     pi.usb("ttyUSB0", "1-1")
     pi.usb("ttyUSB1", "1-2")
     pi.terminal("ttyUSB0")
@@ -105,7 +105,7 @@ async def test_the_flight_controller_is_found_behind_a_gps_receiver(pi: Pi, tmp_
     talking.cancel()
     kept = json.loads((state / "ports.json").read_text())
     assert kept["flight_controller"] == "usb 1-2 10c4:ea60"
-    # After a restart it is the first port to be tried, and a GPS receiver that is silent now is still none.
+    # After a restart its port is tried first, and a GPS receiver is remembered even while silent.
     async with running(pi, state) as (daemon, jobs):
         await until_async(lambda: daemon.bridge.session.controller, "the flight controller")
         assert jobs.status()["ports_passed_over"] == []
@@ -114,7 +114,7 @@ async def test_the_flight_controller_is_found_behind_a_gps_receiver(pi: Pi, tmp_
         assert pi.sent_to("ttyUSB0") == b""
 
 
-async def test_a_silent_port_is_left_for_the_next_one(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_silent_port_is_skipped(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("service.links.port_finder._SEARCH_S", 1.0)
     pi.terminal("ttyAMA0")
     pi.usb("ttyACM0", "1-1.4", ("0483", "5740", "STMicroelectronics", "STM32 Virtual ComPort"))
@@ -123,13 +123,13 @@ async def test_a_silent_port_is_left_for_the_next_one(pi: Pi, tmp_path: Path, mo
         await until_async(lambda: daemon.bridge.session.controller, "the flight controller")
         assert jobs.status()["port"] == "/dev/ttyACM0"
         assert jobs.status()["ports_passed_over"] == ["/dev/ttyAMA0: no flight controller answers"]
-        # Only whole requests that ask who is there.
+        # Only complete identification requests were sent.
         frames = re.findall(rb"\$M<\x00(?:dd|\x02\x02)", sent := pi.sent_to("ttyAMA0"))
         assert frames
         assert b"".join(frames) == sent
 
 
-async def test_a_port_that_another_program_uses_is_not_opened(pi: Pi, tmp_path: Path) -> None:
+async def test_a_port_used_by_another_program_is_not_opened(pi: Pi, tmp_path: Path) -> None:
     pi.terminal("ttyAMA0")
     pi.usb("ttyUSB0", "1-1")
     pi.terminal("ttyUSB0")

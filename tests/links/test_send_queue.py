@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames kept and dropped for a TCP client that does not read."""
+"""The frames kept and dropped for a TCP client that does not read."""
 
 from collections.abc import Sequence
 
@@ -35,7 +35,7 @@ def drain(queue: SendQueue, step: int = 1 << 20) -> bytes:
 
 
 @given(st.lists(st.integers(0, 2), max_size=60), st.integers(1, 50), st.data())
-def test_whole_frames_in_order_and_nothing_that_matters_lost(kinds: list[int], step: int, data: st.DataObject) -> None:
+def test_frames_are_whole_and_ordered_and_important_ones_kept(kinds: list[int], step: int, data: st.DataObject) -> None:
     queue = SendQueue(LIMIT)
     out, offered = b"", []
     for chunk, kind in zip(chunks(kinds), kinds, strict=True):
@@ -58,7 +58,7 @@ def test_whole_frames_in_order_and_nothing_that_matters_lost(kinds: list[int], s
     assert places == sorted(places)
 
 
-def test_the_newest_telemetry_is_there_after_a_stall() -> None:
+def test_after_a_stall_the_newest_telemetry_is_sent() -> None:
     queue = SendQueue(LIMIT)
     made = chunks([0] * 100)
     for chunk in made:
@@ -69,6 +69,6 @@ def test_the_newest_telemetry_is_there_after_a_stall() -> None:
     assert queue.dropped == 100 - left.count(b"\xfd")
 
 
-def test_what_must_be_kept_and_does_not_fit_is_reported() -> None:
+def test_an_overflow_of_important_frames_is_reported() -> None:
     queue = SendQueue(LIMIT)
     assert not all(queue.add(chunk) for chunk in chunks([1] * 100))

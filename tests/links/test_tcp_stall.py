@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""TCP clients that stop reading cost no one anything, and find what matters when they read again."""
+"""TCP clients that stop reading affect no others, and get important frames when they resume."""
 
 import asyncio
 import os
@@ -21,14 +21,14 @@ from tests.support.programs import PATIENCE, free_port
 
 
 class Listener:
-    """Notes what the link tells."""
+    """Records the link's events."""
 
     def __init__(self) -> None:
         self.peers: list[Peer] = []
         self.came = asyncio.Event()
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        raise AssertionError("nobody speaks here")
+        raise AssertionError("no data expected")
 
     def gcs_gone(self, peer: Peer) -> None:
         """The connection is closed."""
@@ -55,13 +55,13 @@ async def connected(listener: Listener, link: TcpLink, port: int) -> tuple[socke
 
 
 def number_of(frame: MavlinkFrame) -> int | None:
-    """The number of an attitude."""
+    """The number in an ATTITUDE."""
     is_attitude = frame.msgid == m.MAVLINK_MSG_ID_ATTITUDE
     return int.from_bytes(frame.payload[:4], "little") if is_attitude else None
 
 
 async def read_to(client: socket.socket, last: int) -> list[MavlinkFrame]:
-    """Read until the attitude of that number comes; all that comes must be whole frames."""
+    """Read up to the attitude with that number; only whole frames may be received."""
     loop, splitter, data = asyncio.get_running_loop(), MavlinkSplitter(), b""
     frames: list[MavlinkFrame] = []
     async with asyncio.timeout(PATIENCE):
@@ -74,7 +74,7 @@ async def read_to(client: socket.socket, last: int) -> list[MavlinkFrame]:
     return frames
 
 
-async def test_a_stalled_client_loses_old_telemetry_and_nothing_else() -> None:
+async def test_a_stalled_client_loses_only_old_telemetry() -> None:
     listener, port = Listener(), free_port(socket.SOCK_STREAM)
     link = TcpLink(GcsAddress("tcpin", "127.0.0.1", port), listener)
     stalled, stalled_peer = await connected(listener, link, port)
@@ -103,7 +103,7 @@ async def test_a_stalled_client_loses_old_telemetry_and_nothing_else() -> None:
     reading.close()
 
 
-async def test_without_a_descriptor_left_it_does_not_spin(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_without_free_descriptors_the_loop_does_not_spin(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp_link, "_REST_S", 0.05)
     loop = asyncio.get_running_loop()
     listener, port = Listener(), free_port(socket.SOCK_STREAM)
@@ -118,7 +118,7 @@ async def test_without_a_descriptor_left_it_does_not_spin(monkeypatch: pytest.Mo
         async with asyncio.timeout(10):
             while link._resting is None:  # noqa: ASYNC110 - a product's timer, not an event of ours
                 await asyncio.sleep(0)
-        # No one wakes the loop up for the one that waits.
+        # The loop is not woken for the waiting client.
         assert not loop.remove_reader(link._socket.fileno())
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The log of a program, with and without a reader."""
+"""A program's log, with and without a reader."""
 
 import json
 import os
@@ -24,7 +24,7 @@ def run(script: str, *shell: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=PATIENCE, check=True)
 
 
-def test_what_was_left_out_is_reported_even_if_it_never_comes_again() -> None:
+def test_suppressed_lines_are_reported_even_without_a_repeat() -> None:
     printed = run("""
 for _ in range(50): log.info("gcs.found", station="one")
 log.warning("fc.lost")
@@ -42,7 +42,7 @@ log.info("gcs.found", station="two")
     assert (events[21]["of"], events[21]["times"], events[21]["level"]) == ("gcs.found", 30, "warning")
 
 
-def test_a_line_that_is_longer_than_the_pipe_holds_nothing_up_and_spoils_no_other() -> None:
+def test_a_line_longer_than_the_pipe_neither_blocks_nor_damages_others() -> None:
     script = """
 log.info("fc.lost", why="x" * 1_000_000)
 log.info("never.read")

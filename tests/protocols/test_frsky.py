@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""FrSky telemetry: Harakiri's groups are read as sent, damaged ones are dropped, and no bytes raise."""
+"""FrSky telemetry: Harakiri's groups are decoded, damaged ones are dropped, and no bytes raise."""
 
 import dataclasses
 import itertools
@@ -12,7 +12,7 @@ from protocols.frsky import FrskyParser, FrskyReport
 from simulator import frsky
 from simulator.flight import FlightState, fly
 
-#: Both are 0x5E and 0x5D, so they are escaped.
+#: The values 0x5E and 0x5D have to be escaped.
 HEADING_94 = bytes.fromhex("5e 10 0c 00 5e 21 5d3d 00 5e 14 5d3e 00 5e 1c 00 00 5e")
 #: 12.4 V in three cells of 4.1 V, 45 degrees 23.0287 minutes north, 8 degrees 28.4007 minutes east.
 POWER = bytes.fromhex("5e 06 08 02 5e 3a 06 00 5e 3b 05 00")
@@ -35,7 +35,7 @@ def read(data: bytes) -> list[FrskyReport]:
     return FrskyParser().feed(data)
 
 
-def test_a_group_is_read_as_harakiri_sends_it() -> None:
+def test_a_group_sent_by_harakiri_is_read() -> None:
     assert read(HEADING_94 + NEXT) == [FrskyReport(height_m=12.93, heading_deg=94)]
     (report,) = read(TEMPERATURE + POWER + PLACE + NEXT[:1] + NEXT)
     assert report == FrskyReport(voltage_v=12.4, place_e7=(453838117, 84733450))
@@ -44,7 +44,7 @@ def test_a_group_is_read_as_harakiri_sends_it() -> None:
 
 
 @given(FLIGHTS, st.integers(1, 80), st.lists(st.integers(0, 200), max_size=4))
-def test_what_the_simulator_sends_is_what_is_read(flight: FlightState, number: int, cuts: list[int]) -> None:
+def test_frames_from_the_simulator_are_read(flight: FlightState, number: int, cuts: list[int]) -> None:
     sent = frsky.frames(flight, number, 61.0) + NEXT
     borders = [0, *sorted(cuts), len(sent)]
     parser = FrskyParser()
@@ -78,7 +78,7 @@ def test_a_damaged_group_is_dropped_or_in_range(flight: FlightState, data: st.Da
 
 
 @pytest.mark.parametrize("at", range(len(TEMPERATURE + POWER + PLACE)))
-def test_a_lost_byte_costs_the_whole_group(at: int) -> None:
+def test_a_lost_byte_drops_the_whole_group(at: int) -> None:
     whole = TEMPERATURE + POWER + PLACE
     reports = read(whole[:at] + whole[at + 1 :] + NEXT[:1] + NEXT)
     assert [report for report in reports if report.voltage_v or report.place_e7] == []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MAVLink 1 for receivers that know only it: fixed payload sizes, no extension fields."""
+"""MAVLink 1 for receivers that support only it: fixed payload sizes, no extension fields."""
 
 import pytest
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
@@ -34,7 +34,7 @@ SENT = [
 
 
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
-def test_what_we_send_is_what_mavlink_1_knows(message: Message) -> None:
+def test_our_frames_are_valid_mavlink_1(message: Message) -> None:
     frame = FrameWriter(1, 1).frame(pack(message), 1)
     assert frame[1] == mavlink_1.mavlink_map[message.get_msgId()].unpacker.size
     received = mavlink_1.MAVLink(None).decode(bytearray(frame))
@@ -44,7 +44,7 @@ def test_what_we_send_is_what_mavlink_1_knows(message: Message) -> None:
 
 @pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("message", SENT, ids=lambda message: str(message.get_type()))
-def test_we_read_what_we_send(message: Message, version: int) -> None:
+def test_our_frames_are_read(message: Message, version: int) -> None:
     (frame,) = MavlinkSplitter().feed(FrameWriter(1, 1).frame(pack(message), version))
     received = MavlinkDecoder().decode(frame)
     assert received is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damage in a stream of frames: all intact frames are found, and nothing else."""
+"""Damage in a stream of frames: exactly the intact frames are found."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ from protocols.mavlink.message_table import MESSAGE_FORMATS
 SIGNED = "MAVLink 2, signed"
 SENDERS = ("MAVLink 1", "MAVLink 2", SIGNED)
 SIGNATURE_SIZE = 13
-#: What looks like the beginning of a frame stands in the payloads, too.
+#: Payload values that look like the beginning of a frame.
 TEXT = b"\xfe\x09\xfd\x1c\x00\x00" * 8
 
 
 def telemetry(sender: str, count: int, seed: int) -> list[bytes]:
-    """Return an autopilot's frames, packed by pymavlink, no two alike."""
+    """An autopilot's frames, packed by pymavlink, all different."""
     chance = Random(seed)
     mavlink = mavlink_2.MAVLink(None, srcSystem=1, srcComponent=1)
     mavlink.signing.secret_key = bytes(range(32))
@@ -52,7 +52,7 @@ def some_message(number: int, chance: Random) -> Message:
 
 
 def split(pieces: Sequence[bytes], chance: Random) -> list[bytes]:
-    """Feed the line's bytes in reads of any size, then silence."""
+    """Feed the bytes in reads of random size, then silence."""
     data = b"".join(pieces)
     splitter = MavlinkSplitter()
     found: list[MavlinkFrame] = []
@@ -65,14 +65,14 @@ def split(pieces: Sequence[bytes], chance: Random) -> list[bytes]:
 
 
 def without_signature(frame: bytes) -> bytes:
-    """Only the key's owner can check a signature."""
+    """For comparison: damage in a signature cannot be detected without the key."""
     return frame[:-SIGNATURE_SIZE] if frame[0] == 0xFD and frame[2] & 1 else frame
 
 
 @pytest.mark.parametrize("damage", Damage)
 @pytest.mark.parametrize("sender", SENDERS)
-def test_no_whole_frame_is_lost_and_no_damaged_one_found(sender: str, damage: Damage) -> None:
-    """Fixed seeds: a chance of 1 in 65536 for each header that is believed remains."""
+def test_all_intact_frames_and_no_damaged_ones_are_found(sender: str, damage: Damage) -> None:
+    """Fixed seeds, because each false header has a chance of 1 in 65536 to pass."""
     lost = false = 0
     for seed in range(4):
         frames = telemetry(sender, 1500, seed)
@@ -86,7 +86,7 @@ def test_no_whole_frame_is_lost_and_no_damaged_one_found(sender: str, damage: Da
 
 
 @given(st.data())
-def test_any_mix_of_damages_loses_a_frame_only_to_a_false_one(data: st.DataObject) -> None:
+def test_damage_loses_a_frame_only_to_a_false_one(data: st.DataObject) -> None:
     chance = data.draw(st.randoms(use_true_random=False))
     pieces: list[bytes] = []
     frames: list[bytes] = []
@@ -103,7 +103,7 @@ def test_any_mix_of_damages_loses_a_frame_only_to_a_false_one(data: st.DataObjec
 
 
 @pytest.mark.parametrize("damage", Damage)
-def test_all_that_pymavlink_finds_and_more(damage: Damage) -> None:
+def test_everything_pymavlink_finds_is_found(damage: Damage) -> None:
     stream = damaged_stream(telemetry("MAVLink 2", 1500, 5), damage, 0.05, Random(5))
     parser = mavlink_2.MAVLink(None)
     parser.robust_parsing = True
@@ -121,18 +121,18 @@ FRAME = telemetry("MAVLink 2", 2, 0)[1]
 @pytest.mark.parametrize(
     "header",
     [
-        bytes((0xFD, 255, 0, 0, 1, 1, 1, 0xFF, 0xFF, 0xFF)),  # a message that no one knows
-        bytes((0xFD, 255, 2, 0, 1, 1, 1, 0, 0, 0)),  # an incompatibility flag that no one knows
-        bytes((0xFE, 255, 1, 1, 1, 0)),  # no HEARTBEAT of MAVLink 1 is so long
+        bytes((0xFD, 255, 0, 0, 1, 1, 1, 0xFF, 0xFF, 0xFF)),  # an unknown message
+        bytes((0xFD, 255, 2, 0, 1, 1, 1, 0, 0, 0)),  # an unknown incompatibility flag
+        bytes((0xFE, 255, 1, 1, 1, 0)),  # too long for a MAVLink 1 HEARTBEAT
         bytes((0xFE, 255, 1, 1, 1, 3)),
     ],
 )
-def test_a_header_that_cannot_be_one_holds_nothing_back(header: bytes) -> None:
+def test_an_impossible_header_delays_nothing(header: bytes) -> None:
     assert [frame.raw for frame in MavlinkSplitter().feed(header + FRAME)] == [FRAME]
 
 
 @pytest.mark.parametrize("sender", SENDERS)
-def test_a_cut_frame_holds_back_no_more_bytes_than_it_lost(sender: str) -> None:
+def test_a_truncated_frame_delays_only_as_many_bytes_as_it_lost(sender: str) -> None:
     first, *others = telemetry(sender, 60, 3)
     for kept in range(1, len(first)):
         splitter = MavlinkSplitter()
@@ -143,7 +143,7 @@ def test_a_cut_frame_holds_back_no_more_bytes_than_it_lost(sender: str) -> None:
         assert came_at <= max(ends, len(first) - kept + SIGNATURE_SIZE)
 
 
-def test_silence_gives_out_what_a_cut_frame_was_hiding() -> None:
+def test_silence_releases_a_frame_hidden_by_a_truncated_one() -> None:
     splitter = MavlinkSplitter()
     hiding = bytes((0xFD, 255, 0, 0, 1, 1, 1, 0, 0, 0))
     assert splitter.feed(hiding + FRAME + FRAME) == []
@@ -152,8 +152,8 @@ def test_silence_gives_out_what_a_cut_frame_was_hiding() -> None:
     assert splitter.reset() == []
 
 
-def test_bytes_are_missing_in_a_signature() -> None:
-    """It cannot be noticed without the key, but the following frame must not be lost."""
+def test_a_signature_with_missing_bytes() -> None:
+    """It cannot be detected without the key, but the following frame must not be lost."""
     before, cut, after = telemetry(SIGNED, 3, 4)
     for missing in range(1, SIGNATURE_SIZE + 1):
         found = split([before, cut[:-missing], after], Random(missing))
@@ -162,8 +162,8 @@ def test_bytes_are_missing_in_a_signature() -> None:
         assert [without_signature(frame) for frame in found[1:-1]] == [without_signature(cut)]
 
 
-def test_a_hostile_stream_has_each_of_its_bytes_tried_once() -> None:
-    """Each byte that could begin a frame is one check and no more, at a silence too."""
+def test_each_byte_of_a_hostile_stream_is_tried_once() -> None:
+    """Each possible frame start is checked once, also at a silence."""
     header = bytes((0xFD, 255, 0, 0, 1, 1, 1, 0, 0, 0))
     splitter = MavlinkSplitter()
     stream = header * 28 * 10
@@ -180,14 +180,14 @@ def mavlink_1_frame(msgid: int, payload: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(("size", "is_one"), [(36, False), (37, True), (38, True), (39, False)])
-def test_a_mavlink_1_payload_has_its_messages_size(size: int, is_one: bool) -> None:
-    """MISSION_ITEM has 37 bytes, and 38 with the extension that pymavlink packs into MAVLink 1, too."""
+def test_a_mavlink_1_payload_must_have_its_messages_size(size: int, is_one: bool) -> None:
+    """MISSION_ITEM has 37 bytes, or 38 with the extension, which pymavlink also packs into MAVLink 1."""
     assert bool(MavlinkSplitter().feed(mavlink_1_frame(39, bytes(size)))) == is_one
 
 
 @pytest.mark.parametrize("size", [0, 1, 255])
-def test_a_mavlink_2_payload_may_be_cut_or_extended(size: int) -> None:
-    """Trailing zeros are left out, and later definitions add fields: a HEARTBEAT has 9 bytes today."""
+def test_a_mavlink_2_payload_may_be_truncated_or_extended(size: int) -> None:
+    """Trailing zeros are omitted, and later definitions add fields: a HEARTBEAT has 9 bytes today."""
     body = bytes((size, 0, 0, 0, 1, 1, 0, 0, 0)) + bytes(range(1, size + 1))
     raw = b"\xfd" + body + mcrf4xx(body + bytes((MESSAGE_FORMATS[0].crc_extra,))).to_bytes(2, "little")
     (frame,) = MavlinkSplitter().feed(raw)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Signing against pymavlink's, both ways, and the rules for timestamps."""
+"""Signing compared with pymavlink's, both ways, and the rules for timestamps."""
 
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -37,19 +37,19 @@ def frame_of(side: mavlink.MAVLink, message: mavlink.MAVLink_message = HEARTBEAT
     return MavlinkFrame(bytes(message.pack(side)))
 
 
-def test_the_key_is_what_mission_planner_makes_of_a_passphrase() -> None:
+def test_the_key_is_derived_like_mission_planners() -> None:
     assert key_from_passphrase("grüezi") == sha256("grüezi".encode()).digest()
 
 
 def test_timestamps_count_10_us_since_2015() -> None:
     assert ticks(datetime(2015, 1, 1, tzinfo=UTC).timestamp()) == 0
     assert ticks(datetime(2015, 1, 1, 0, 1, tzinfo=UTC).timestamp()) == 60 * TICKS_PER_S
-    # A Pi that has no clock starts in 1970.
+    # A Pi without a clock starts in 1970.
     assert ticks(0.0) == 0
 
 
 @pytest.mark.parametrize("link_id", [0, 3, 255])
-def test_pymavlink_takes_what_we_sign(link_id: int) -> None:
+def test_pymavlink_accepts_our_signatures(link_id: int) -> None:
     signing = our_side()
     writer = FrameWriter(1, 1, lambda frame: signing.signature(frame, link_id))
     receiver = pymavlink_side()
@@ -71,14 +71,14 @@ def test_a_mavlink_1_frame_is_never_signed() -> None:
     assert signed.frame(pack(HEARTBEAT), 1) == FrameWriter(1, 1).frame(pack(HEARTBEAT), 1)
 
 
-def test_we_take_what_pymavlink_signs() -> None:
+def test_we_accept_pymavlinks_signatures() -> None:
     signing = our_side()
     side = pymavlink_side()
     data = b"".join(frame_of(side, mavlink.MAVLink_ping_message(n, n, 1, 1)).raw for n in range(300))
     frames = MavlinkSplitter().feed(data)
     assert len(frames) == 300
     assert {signing.check(frame) for frame in frames} == {Check.VALID}
-    # None of them is worth anything a second time.
+    # None of them is accepted again.
     assert {signing.check(frame) for frame in frames} == {Check.REPLAYED}
 
 
@@ -88,17 +88,17 @@ def test_unsigned_frames_of_both_versions() -> None:
         assert our_side().check(MavlinkFrame(bytes(HEARTBEAT.pack(side, force_mavlink1=mavlink_1)))) is Check.UNSIGNED
 
 
-def test_another_key_is_noticed_and_leaves_no_trace() -> None:
+def test_a_frame_with_another_key_is_refused_and_changes_no_state() -> None:
     signing = our_side()
     far_ahead = ticks(NOON) + TOLERANCE
     assert signing.check(frame_of(pymavlink_side(sha256(b"").digest(), far_ahead))) is Check.WRONG
-    # Mission Planner signs with 32 zeros before it knows which key is asked for.
+    # Mission Planner signs with 32 zero bytes before it has a key.
     assert signing.check(frame_of(pymavlink_side(bytes(32), far_ahead))) is Check.WRONG
     assert signing.check(frame_of(pymavlink_side())) is Check.VALID
 
 
 @given(at=st.integers(1, 21 + 12), bit=st.integers(0, 7))
-def test_no_bit_can_be_changed(at: int, bit: int) -> None:
+def test_any_flipped_bit_is_detected(at: int, bit: int) -> None:
     raw = bytearray(frame_of(pymavlink_side()).raw)
     assert len(raw) == 21 + 13
     raw[at] ^= 1 << bit
@@ -122,7 +122,7 @@ def test_a_new_stream_is_at_most_a_minute_behind_us(lag: int, expected: Check) -
     assert our_side().check(frame_of(pymavlink_side(timestamp=ticks(NOON) - lag))) is expected
 
 
-def test_a_stream_that_is_known_may_fall_behind_others() -> None:
+def test_a_known_stream_may_fall_behind_others() -> None:
     signing = our_side()
     slow = pymavlink_side(timestamp=ticks(NOON) - 100, link_id=1)
     assert signing.check(frame_of(slow)) is Check.VALID
@@ -130,7 +130,7 @@ def test_a_stream_that_is_known_may_fall_behind_others() -> None:
     assert signing.check(frame_of(slow)) is Check.VALID
 
 
-def test_our_timestamps_never_repeat_whatever_the_clock_does() -> None:
+def test_our_timestamps_never_repeat() -> None:
     clock = [NOON, NOON, NOON - 3600, 0.0, NOON + 1, NOON + 1]
     timestamps = Timestamps(lambda: clock.pop(0))
     start = ticks(NOON)
@@ -147,20 +147,20 @@ def test_without_a_clock_timestamps_continue_and_follow_a_peers() -> None:
     assert signing.signature(b"", 0)[1:7] == (later + 1).to_bytes(6, "little")
 
 
-def test_what_an_earlier_run_heard_is_a_replay_in_the_next() -> None:
+def test_frames_received_in_an_earlier_run_are_replays() -> None:
     before = our_side()
     frame = frame_of(pymavlink_side())
     assert before.check(frame) is Check.VALID
     after = our_side(unix_s=NOON + 5)
     after.streams.update(before.streams)
     assert after.check(frame) is Check.REPLAYED
-    # What was recorded while we were off is held to the minute, though its stream is known.
+    # A frame recorded while we were off may be at most a minute old, even from a known stream.
     much_after = our_side(unix_s=NOON + 3600)
     much_after.streams.update(before.streams)
     assert much_after.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + 1))) is Check.LATE
 
 
-def test_the_last_of_all_timestamps_raises_nothing() -> None:
+def test_the_largest_timestamp_raises_nothing() -> None:
     signing = our_side()
     assert signing.check(frame_of(pymavlink_side(timestamp=(1 << 48) - 1))) is Check.VALID
     assert len(signing.signature(b"frame", 0)) == 13

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finding MAVLink frames in any stream: whole or byte by byte, behind false and cut headers, quickly."""
+"""MAVLink frames are found in any stream: byte by byte, after false or truncated headers, in bounded time."""
 
 import random
 from itertools import pairwise
@@ -30,7 +30,7 @@ def make_frames() -> list[bytes]:
 
 
 FRAMES = make_frames()
-#: Bytes that look like the beginning of frames, and any others.
+#: Bytes that look like frame starts, and others.
 pieces = st.one_of(
     st.sampled_from(FRAMES),
     st.sampled_from(FRAMES).flatmap(lambda frame: st.integers(1, len(frame) - 1).map(lambda size: frame[:size])),
@@ -54,7 +54,7 @@ def split(data: bytes, cuts: list[int]) -> tuple[list[MavlinkFrame], MavlinkSpli
 
 @given(streams, st.lists(st.integers(0, 5000), max_size=8))
 @example(b"\xfe\xff" + FRAMES[0], [])
-def test_any_stream_gives_the_same_frames_however_it_is_cut(data: bytes, cuts: list[int]) -> None:
+def test_a_stream_gives_the_same_frames_however_it_is_split(data: bytes, cuts: list[int]) -> None:
     whole, splitter = split(data, [])
     rest = splitter.reset()
     for places in (cuts, list(range(len(data)))):
@@ -76,7 +76,7 @@ def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
 
 
 @given(streams)
-def test_what_is_found_decodes_or_is_refused_and_never_raises(data: bytes) -> None:
+def test_found_frames_decode_or_are_refused(data: bytes) -> None:
     found, splitter = split(data, [])
     decoder = MavlinkDecoder()
     for frame in found + splitter.reset():
@@ -84,8 +84,8 @@ def test_what_is_found_decodes_or_is_refused_and_never_raises(data: bytes) -> No
 
 
 @given(st.binary(max_size=300))
-def test_any_payload_with_a_right_checksum_decodes_or_is_refused(payload: bytes) -> None:
-    """A sender may fill a known message with anything: too long, too short, strings that are none."""
+def test_any_payload_with_a_valid_checksum_decodes_or_is_refused(payload: bytes) -> None:
+    """A known message may have any payload: too long, too short, invalid strings."""
     from fastcrc.crc16 import mcrf4xx
 
     from protocols.mavlink.dialect import CRC_EXTRA
@@ -99,7 +99,7 @@ def test_any_payload_with_a_right_checksum_decodes_or_is_refused(payload: bytes)
         decoder.decode(frame)
 
 
-def test_a_signed_frame_is_taken_with_its_signature() -> None:
+def test_a_signed_frame_includes_its_signature() -> None:
     mavlink = messages.MAVLink(None, srcSystem=255, srcComponent=190)
     mavlink.signing.secret_key = bytes(32)
     mavlink.signing.sign_outgoing = True
@@ -110,7 +110,7 @@ def test_a_signed_frame_is_taken_with_its_signature() -> None:
     assert splitter.skipped_bytes == 0
 
 
-def test_an_incompatibility_flag_that_we_do_not_know_is_refused() -> None:
+def test_an_unknown_incompatibility_flag_is_refused() -> None:
     frame = bytearray(FRAMES[1])
     assert frame[0] == 0xFD
     frame[2] = 0x02
@@ -118,8 +118,8 @@ def test_an_incompatibility_flag_that_we_do_not_know_is_refused() -> None:
     assert splitter.feed(bytes(frame)) + splitter.reset() == []
 
 
-def test_a_megabyte_of_anything_costs_a_bounded_amount_of_work() -> None:
-    """What waits for its end is never more than one frame, so that no byte is looked at more than a few times."""
+def test_a_megabyte_of_any_bytes_takes_bounded_work() -> None:
+    """At most one frame's bytes are buffered, so each byte is examined only a few times."""
     draw = random.Random(1)
     alphabets = (bytes(range(256)), b"\xfe", b"\xfd\x00", b"\xfe\xff\x00", bytes(range(256)) + b"\xfe\xfd" * 128)
     for alphabet in alphabets:

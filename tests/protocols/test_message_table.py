@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table of message formats, held against pymavlink's dialects and against frames that pymavlink packs."""
+"""The table of message formats, compared with pymavlink's dialects and with frames packed by pymavlink."""
 
 from importlib import import_module
 from pathlib import Path
@@ -15,7 +15,7 @@ from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mavlink.message_table import MESSAGE_FORMATS
 from protocols.mavlink.target import target_of
 
-#: Those whose autopilots a user may have, by what speaks for taking their meaning of an id first.
+#: Dialects of autopilots that users may have, in order of precedence for an id.
 DIALECTS = ("common", "ardupilotmega", "all")
 
 
@@ -31,8 +31,8 @@ def packed(kind: type[Message], version: int, **fields: int) -> bytes:
     return bytes(kind(*values).pack(sender, force_mavlink1=version == 1))
 
 
-def test_the_table_is_what_its_maker_makes_of_pymavlink() -> None:
-    """If this fails after an update of pymavlink: make message-table."""
+def test_the_table_is_up_to_date() -> None:
+    """After an update of pymavlink, run `make message-table`."""
     assert Path(message_table.__file__).read_text() == table()
 
 
@@ -47,7 +47,7 @@ def test_every_message_of_the_dialect_is_known(dialect: str) -> None:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_pymavlinks_frames_of_all_messages_are_found_and_their_targets_read(version: int) -> None:
+def test_frames_of_all_messages_are_found_with_their_targets(version: int) -> None:
     kinds = [kind for msgid, kind in mavlink_2.mavlink_map.items() if version == 2 or msgid < 256]
     for kind in kinds:
         for system, component in ((0, 0), (3, 0), (0, 200), (255, 190)):
@@ -62,7 +62,7 @@ def test_pymavlinks_frames_of_all_messages_are_found_and_their_targets_read(vers
 
 
 def test_a_mavlink_1_frame_without_extensions_has_no_target_in_them() -> None:
-    """COMMAND_ACK's target is an extension: MAVLink 1 cannot carry it."""
+    """COMMAND_ACK's target is an extension, which MAVLink 1 cannot carry."""
     ack = mavlink_1.MAVLink_command_ack_message(400, 0)
     raw = bytes(ack.pack(mavlink_1.MAVLink(None, srcSystem=7, srcComponent=8)))
     (frame,) = MavlinkSplitter().feed(raw)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mission extension's requests: never a hazard byte, and the board decodes them correctly."""
+"""The mission extension's requests have no hazard bytes, and the board decodes them correctly."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ from protocols.msp.mission import (
 from protocols.wp_record import RECORD_SIZE, WpRecord, unpack_records
 from simulator.msp_port import MspReceiver
 
-#: Bytes of which a third are hazards: what a mission would have to be made of to be hard to send.
+#: Bytes a third of which are hazards, the worst case for masking.
 hard_bytes = st.one_of(st.sampled_from(sorted(HAZARDS)), st.integers(0, 255))
 records = st.one_of(
     st.binary(min_size=RECORD_SIZE, max_size=RECORD_SIZE),
@@ -34,7 +34,7 @@ identities = st.builds(ListIdentity, st.integers(0, 65535), st.integers(0, 2**32
 
 
 def received(frame: bytes) -> tuple[int, bytes]:
-    """What the firmware's receiver makes of a frame."""
+    """A frame as decoded by the firmware's receiver."""
     receiver = MspReceiver(3 + 15 * RECORD_SIZE)
     heard = [request for byte in frame if (request := receiver.push(byte)) is not None]
     assert len(heard) == 1
@@ -62,7 +62,7 @@ def test_begin_and_commit_carry_the_identity(identity: ListIdentity) -> None:
 
 
 @given(st.integers(0, 65535), st.integers(1, 255))
-def test_read_carries_place_and_number(first: int, count: int) -> None:
+def test_read_carries_start_and_count(first: int, count: int) -> None:
     assert body_of(encode_read(first, count), MissionCommand.READ) == first.to_bytes(2, "little") + bytes((count, 0))
 
 
@@ -102,7 +102,7 @@ def test_a_body_of_up_to_83_bytes_always_has_a_mask(half: bytes, fixed_xor: int)
 
 
 @given(st.binary(max_size=20))
-def test_what_is_not_in_masked_form_is_refused(payload: bytes) -> None:
+def test_an_unmasked_body_is_refused(payload: bytes) -> None:
     body = unmask(payload)
     if len(payload) % 2 == 0:
         assert body is None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""CURRENT_MODE and AVAILABLE_MODES, read by a dialect of pymavlink's that has them."""
+"""CURRENT_MODE and AVAILABLE_MODES, read with a pymavlink dialect that has them."""
 
 import pytest
 from pymavlink.dialects.v20 import development

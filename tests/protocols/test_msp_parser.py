@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finding MSP frames in any stream: whole or byte by byte, behind false and cut headers, quickly."""
+"""MSP frames are found in any stream: byte by byte, after false or truncated headers, in bounded time."""
 
 import random
 from itertools import pairwise
@@ -38,7 +38,7 @@ def parse(data: bytes, cuts: list[int]) -> tuple[list[MspFrame], MspParser]:
 @given(streams, st.lists(st.integers(0, 5000), max_size=8))
 @example(b"$M>\xff" + request(100), [])
 @example(b"$", [])
-def test_any_stream_gives_the_same_frames_however_it_is_cut(data: bytes, cuts: list[int]) -> None:
+def test_a_stream_gives_the_same_frames_however_it_is_split(data: bytes, cuts: list[int]) -> None:
     whole, parser = parse(data, [])
     rest = parser.reset()
     for places in (cuts, list(range(len(data)))):
@@ -60,18 +60,18 @@ def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
 
 
 def _overlapped(before: bytes, frame: MspFrame, found: list[MspFrame]) -> bool:
-    """True if bytes before it and bytes of its own make up another valid frame."""
+    """True if bytes before it and some of its own form another valid frame."""
     stream = before + frame.encode()
     return any(one.encode() in stream and stream.rfind(one.encode()) + len(one.encode()) > len(before) for one in found)
 
 
 @given(frames)
-def test_a_frame_survives_the_way_there_and_back(frame: MspFrame) -> None:
+def test_a_frame_survives_encoding_and_parsing(frame: MspFrame) -> None:
     assert MspParser().feed(frame.encode()) == [frame]
 
 
-def test_a_v2_frame_is_the_bytes_of_inav() -> None:
-    """A question for MSP2_INAV_STATUS, and INAV 9.1's answer to one for nav_wp_multi_mission_index."""
+def test_a_v2_frame_has_inavs_bytes() -> None:
+    """A request for MSP2_INAV_STATUS, and INAV 9.1's reply with nav_wp_multi_mission_index."""
     assert request(0x2000) == bytes.fromhex("24583c000020000032")
     assert MspParser().feed(bytes.fromhex("24583e000310010001f7")) == [MspFrame(Direction.REPLY, 0x1003, b"\x01")]
 
@@ -82,24 +82,24 @@ def test_a_long_reply_is_found_between_others(frame: MspFrame, size: int) -> Non
         long = MspFrame(Direction.REPLY, command, bytes(range(251)) * 17, is_v2=False)
         long.payload = long.payload[:size]
         assert MspParser().feed(frame.encode() + long.encode() + frame.encode()) == [frame, long, frame]
-    assert MspFrame(Direction.REPLY, 116, bytes(255)).encode()[:7] == b"$M>\xff\x74\xff\0"  # as INAV's msp_serial.c
+    assert MspFrame(Direction.REPLY, 116, bytes(255)).encode()[:7] == b"$M>\xff\x74\xff\0"  # as in INAV's msp_serial.c
 
 
-def test_a_request_of_255_bytes_is_no_jumbo_frame() -> None:
+def test_a_request_of_255_bytes_is_not_a_jumbo_frame() -> None:
     chunk = MspFrame(Direction.REQUEST, 192, bytes(255))
     assert len(chunk.encode()) == 6 + 255
     assert MspParser().feed(chunk.encode()) == [chunk]
 
 
 @given(frames, st.data())
-def test_a_flipped_bit_in_what_the_checksum_covers_is_seen(frame: MspFrame, data: st.DataObject) -> None:
+def test_any_flipped_bit_under_the_checksum_is_detected(frame: MspFrame, data: st.DataObject) -> None:
     damaged = bytearray(frame.encode())
     at = data.draw(st.integers(3, len(damaged) - 1))
     damaged[at] ^= 1 << data.draw(st.integers(0, 7))
     assert frame not in MspParser().feed(bytes(damaged))
 
 
-def test_a_reply_behind_a_false_header_comes_with_the_reset_or_the_next_bytes() -> None:
+def test_a_reply_after_a_false_header_is_found_at_a_reset_or_more_bytes() -> None:
     answer = MspFrame(Direction.REPLY, 100, bytes(7))
     parser = MspParser()
     assert parser.feed(b"$M>\xf0\x01" + answer.encode()) == []
@@ -108,7 +108,7 @@ def test_a_reply_behind_a_false_header_comes_with_the_reset_or_the_next_bytes() 
     assert answer in parser.feed(bytes(64))
 
 
-def test_a_megabyte_of_anything_costs_a_bounded_amount_of_work() -> None:
+def test_a_megabyte_of_any_bytes_takes_bounded_work() -> None:
     draw = random.Random(1)
     for alphabet in (
         bytes(range(256)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Telemetry replies: Harakiri's lengths are the least, other firmware's are longer, and nothing shorter is believed."""
+"""Telemetry replies: Harakiri's lengths are the minimum, other firmware sends more, and shorter ones are dropped."""
 
 import struct
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from protocols.msp import telemetry as t
 
-#: Each decoder, and Harakiri's reply: the least that it accepts.
+#: Each decoder and Harakiri's reply, the shortest one accepted.
 LEAST: list[tuple[Callable[[bytes], object], bytes]] = [
     (t.decode_status, struct.pack("<HHHIB", 3000, 7, 0b1011, 0x21, 0)),
     (t.decode_raw_imu, struct.pack("<9h", *range(-4, 5))),
@@ -52,14 +52,14 @@ def test_the_three_lengths_of_raw_gps(more: bytes, course_ddeg: int | None, hdop
     assert gps == t.RawGps(1, 9, 453838000, -84733000, 131, 250, course_ddeg, hdop_e2)
 
 
-def test_below_the_sea() -> None:
-    """Harakiri's altitude is an unsigned number of metres that a signed one was written into."""
+def test_below_sea_level() -> None:
+    """Harakiri stores a signed altitude in metres in an unsigned field."""
     gps = t.decode_raw_gps(struct.pack("<BBiiHH", 1, 9, 0, 0, 0xFFFF - 3, 0))
     assert gps is not None
     assert gps.altitude_m == -4
 
 
-def test_the_current_where_it_is_sent() -> None:
+def test_the_current_if_reported() -> None:
     assert t.decode_analog(struct.pack("<BHH", 124, 0, 920)) == t.Analog(124, 920)
     assert t.decode_analog(struct.pack("<BHHh", 124, 350, 920, 1234)) == t.Analog(124, 920, 350, 1234)
     assert t.decode_analog(struct.pack("<BHHhH", 124, 350, 920, -5, 1240)) == t.Analog(124, 920, 350, -5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests on a real firmware image, patched, which this project does not have: NAZE_IMAGE names one (make real-board)."""
+"""Tests on a real, patched firmware image, which is not in this repository: set NAZE_IMAGE (make real-board)."""
 
 import os
 from pathlib import Path
@@ -22,7 +22,7 @@ def image() -> Image:
 
 @pytest.fixture(scope="session")
 def flash(image: Image) -> bytes:
-    """The flash of a board whose accelerometer is calibrated, and that never stored a list."""
+    """The flash of a board with a calibrated accelerometer and no list."""
     return calibrated_flash(image)
 
 
@@ -33,7 +33,7 @@ def bench(image: Image, flash: bytes) -> RealBench:
 
 @pytest.fixture
 def figure(request: pytest.FixtureRequest) -> Figure:
-    """Puts a row into the table at the end."""
+    """Adds a row to the table printed at the end."""
     rows = request.config.stash.setdefault(_ROWS, [])
     return lambda name, value: rows.append((name, str(value)))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge and the image, in simulated time: an upload that a reset interrupts, and a board in its command line."""
+"""The bridge and the image, in simulated time: an upload interrupted by a reset, and a board in its CLI."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ from tests.support.real_bench import Figure
 from tests.support.world import GroundStation, World
 
 _OLD, _NEW = waypoints(20), waypoints(60, seed=1)
-#: The list is read, and a station that asks for nothing needs little.
+#: Time to read the list, with default telemetry.
 _SETTLED_S = 2.0
 _BOOT_S = 20.0
 
@@ -32,13 +32,13 @@ def station(world: World) -> GroundStation:
 
 
 def is_written(naze: EmulatedNaze) -> Callable[[World], bool]:
-    """The last records are being programmed, eight half-words each, and COMMIT is in the board's ring."""
+    """The last records are being programmed, eight half-words each, and COMMIT is in the receive ring."""
     enough = naze.flash_operations + 8 * (len(_NEW) - 5)
     return lambda _: naze.flash_operations >= enough
 
 
 def is_stored(naze: EmulatedNaze) -> Callable[[World], bool]:
-    """The seal is programmed, and the reply not yet sent."""
+    """The seal is programmed, but the reply not yet sent."""
     return lambda _: len(naze.stored_records) == len(_NEW)
 
 
@@ -49,7 +49,7 @@ def is_stored(naze: EmulatedNaze) -> Callable[[World], bool]:
         (is_stored, f"The mission did arrive: {len(_NEW)} records", _NEW),
     ],
 )
-def test_an_upload_that_a_reset_interrupts_is_settled(
+def test_an_upload_interrupted_by_a_reset_is_settled(
     world: World,
     station: GroundStation,
     figure: Figure,
@@ -72,11 +72,11 @@ def test_an_upload_that_a_reset_interrupts_is_settled(
 
 
 def said(station: GroundStation) -> str:
-    """All texts; each holds 50 characters."""
+    """All texts joined; each has at most 50 characters."""
     return " ".join(station.texts())
 
 
-def test_its_command_line_is_recognised_and_left_alone(world: World, station: GroundStation, figure: Figure) -> None:
+def test_the_cli_is_recognised_and_left_alone(world: World, station: GroundStation, figure: Figure) -> None:
     world.run(_SETTLED_S)
     world.naze.receive(b"\r\r\r", world.now)
     began = world.now
@@ -85,7 +85,7 @@ def test_its_command_line_is_recognised_and_left_alone(world: World, station: Gr
     world.run(8)
     assert isinstance(world.bridge.session.state, Cli)
     assert Upload(station, _OLD).run() is MissionResult.DENIED
-    # On the tree Webstore1 the first one is appended to what the bridge has asked.
+    # On the tree Webstore1 the first one is appended to the bridge's requests.
     for _ in range(2):
         world.naze.receive(b"exit\r", world.now)
         world.run(0.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/msp-mission.md, held against the image: the conformance tests, on the emulated board's UART."""
+"""The conformance tests of docs/msp-mission.md on the image, through the emulated board's UART."""
 
 import pytest
 
@@ -23,20 +23,20 @@ from tests.conformance.test_mission_extension import (  # noqa: F401  (collected
     test_commit_of_other_records_than_announced,
     test_count_zero_clears,
     test_failing_flash_leaves_the_old_list,
-    test_info_tells_limits_and_state,
+    test_info_has_limits_and_state,
     test_malformed_requests_change_nothing,
-    test_more_records_than_there_is_room_for,
+    test_more_records_than_the_capacity,
     test_other_commands_are_left_to_the_firmware,
     test_read_past_the_end,
     test_requests_may_be_repeated,
-    test_without_a_transfer_nothing_is_taken,
+    test_without_a_transfer_chunks_are_refused,
 )
 from tests.support.c_core import PowerCut
 from tests.support.real_bench import RealBench
 
 
 class RealDevice:
-    """The image with the interface of the conformance tests' devices; see mission_devices.Device."""
+    """The image with the interface mission_devices.Device."""
 
     def __init__(self, bench: RealBench) -> None:
         self._bench = bench
@@ -53,7 +53,7 @@ class RealDevice:
         self._bench.run(milliseconds / 1000)
 
     def arm(self, armed: bool) -> None:
-        # With a scheduled write it would refuse.
+        # It refuses to arm with a scheduled write.
         self._bench.hold_write(False)
         self._bench.arm(armed)
         self._bench.hold_write(self._is_busy)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon and the image as two programs, in real time: the power fails during an upload."""
+"""The daemon and the image as two processes, in real time: a power cut during an upload."""
 
 import json
 import os
@@ -17,9 +17,9 @@ from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import comes, control
 from tests.support.real_bench import Figure
 
-#: Short enough to be written within the daemon's time limit by a board at a tenth of its speed, on a slow computer.
+#: Short enough for the daemon's time limit even if a slow computer emulates the board at a tenth of its speed.
 _OLD, _NEW = plain_plan(20), plain_plan(30, start=40)
-#: In the middle of the new list's records: eight half-words each.
+#: During the new list's records, eight half-words each.
 _OPERATION = 120
 _PATIENCE_S = 300.0
 
@@ -56,7 +56,7 @@ def program(tmp_path: Path, flash: bytes) -> Iterator[RealProgram]:
         yield RealProgram(Starter(tmp_path, stack), flash)
 
 
-def test_an_upload_that_a_power_cut_interrupts_is_settled(program: RealProgram, figure: Figure) -> None:
+def test_an_upload_interrupted_by_a_power_cut_is_settled(program: RealProgram, figure: Figure) -> None:
     daemon = program.daemon
     daemon.push(_OLD)
     program.line(f"power_cut_at_flash_operation {_OPERATION}")

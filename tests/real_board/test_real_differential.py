@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same conversation with the image and with the simulated Naze: every reply must be the same."""
+"""The same conversation with the image and the simulated Naze must give the same replies."""
 
 import random
 
@@ -22,12 +22,12 @@ from tests.support.naze_bench import Bench, WireBench, mission
 from tests.support.real_bench import Figure, RealBench
 
 _EXCHANGES = 100
-#: Longer than any answer and any write of the configuration.
+#: Longer than any reply and any write of the configuration.
 _EXCHANGE_S = 0.5
-#: What is measured or chosen by the pilot: here the lengths must be the same.
+#: Measurements and the pilot's settings, of which only the lengths must be equal.
 _MEASURED = {Msp.STATUS, Msp.RAW_IMU, Msp.RC, Msp.RAW_GPS, Msp.COMP_GPS, Msp.ATTITUDE, Msp.ALTITUDE, Msp.BAT}
 _MEASURED |= {Msp.DEBUG, Msp.MOTOR, Msp.WP}
-#: Answered with settings of this craft, which the model does not have.
+#: Replies with settings of this craft, which the model does not have.
 _SETTINGS = frozenset((Msp.RC_TUNING, Msp.PID, Msp.BOX, Msp.SERVO, Msp.MISC))
 _READS = tuple(command for command in Msp if command < Msp.WP)
 
@@ -47,7 +47,7 @@ def test_a_hundred_exchanges(image: Image, flash: bytes, figure: Figure) -> None
         frame = dice.choice(requests(dice, records))
         begun = [bench.now for bench in (real, model)]
         answers = [ask(bench, frame) for bench in (real, model)]
-        # The same time passes for both: a transfer is dropped after 5 s.
+        # The same time for both, because a transfer is dropped after 5 s.
         for bench, at in zip((real, model), begun, strict=True):
             bench.run(at + _EXCHANGE_S - bench.now)
         if comparable(frame, answers[0]) != comparable(frame, answers[1]):
@@ -57,7 +57,7 @@ def test_a_hundred_exchanges(image: Image, flash: bytes, figure: Figure) -> None
 
 
 def requests(dice: random.Random, records: list[WpRecord]) -> list[bytes]:
-    """Some of each kind, those of an upload more often than not in an order that works."""
+    """Requests of each kind; those of an upload are mostly in a valid order."""
     identity = identify(records)
     first = dice.choice((0, 0, 14, 15, 30))
     return [
@@ -75,7 +75,7 @@ def requests(dice: random.Random, records: list[WpRecord]) -> list[bytes]:
 
 
 def ask(bench: WireBench, frame: bytes) -> MspFrame | bytes | None:
-    """The reply; for a malformed one its bytes."""
+    """The reply, or its bytes if malformed."""
     before = len(bench.heard)
     answer = bench.ask(frame, 0.4)
     return answer or bytes(bench.heard[before:]) or None

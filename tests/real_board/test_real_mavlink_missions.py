@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's own MAVLink upload, on the image with the patch."""
+"""Harakiri's own MAVLink upload on the patched image."""
 
 from tests.support import mavlink_missions as page
 from tests.support.real_bench import Figure, RealBench
@@ -12,7 +12,7 @@ def test_an_upload_becomes_the_stored_list(bench: RealBench, figure: Figure) -> 
 
 def test_an_interrupted_upload_keeps_the_old_list(bench: RealBench, figure: Figure) -> None:
     page.an_interrupted_upload_keeps_the_old_list(bench)
-    figure("MAVLink upload that breaks off", "leaves the old list, and none on a fresh board")
+    figure("interrupted MAVLink upload", "keeps the old list, or none on a fresh board")
 
 
 def test_an_upload_while_armed_is_an_error(bench: RealBench, figure: Figure) -> None:

@@ -9,15 +9,15 @@ from tests.support.naze_bench import mission
 from tests.support.real_bench import Figure, RealBench
 
 _CUTS = int(os.environ.get("NAZE_CUTS", "200"))
-#: As many records as fit: BEGIN erases three pages.
+#: The maximum number of records, for which BEGIN erases three pages.
 _SIZE, _ERASES = 146, 3
-#: From power on until the firmware has the stored list in its RAM.
+#: From power-on until the firmware has loaded the stored list into RAM.
 _LOADED_S = 0.5
 _OLD, _NEW, _NEXT = (mission(_SIZE, seed) for seed in range(3))
 
 
 def test_a_power_cut_at_any_operation_leaves_a_whole_list(bench: RealBench, figure: Figure) -> None:
-    """Each cut hits a copy of one board, which has booted and has lists in both slots."""
+    """Each cut hits a copy of one booted board with lists in both slots."""
     bench.push(_NEXT)
     bench.push(_OLD)
     operations = in_a_copy(lambda: operations_of_a_push(bench))
@@ -26,7 +26,7 @@ def test_a_power_cut_at_any_operation_leaves_a_whole_list(bench: RealBench, figu
     for cut in range(_CUTS):
         operation = 1 + cut * (operations - 1) // max(_CUTS - 1, 1)
         if cut % 10 == 0:
-            # Few operations erase, and what a torn erase leaves differs most.
+            # Few operations erase, but the results of an interrupted erase differ most.
             operation = 1 + cut // 10 % _ERASES
         erases += operation <= _ERASES
         found[in_a_copy(lambda: list_after_a_cut(bench, cut, operation))] += 1  # noqa: B023
@@ -44,13 +44,13 @@ def operations_of_a_push(bench: RealBench) -> int:
 
 
 def list_after_a_cut(bench: RealBench, cut: int, operation: int) -> str:
-    """The list that the firmware has after a power cut: "old", "new", or neither.
+    """The firmware's list after a power cut: "old", "new", or neither.
 
-    It loads the list early in its boot, and most copies end there. Every ninth boots to the end: the list is read back
-    through the UART, and the next upload overwrites what the cut has left.
+    It is loaded early in the boot, where most copies end. Every ninth boots completely: the list is read through the
+    UART, and another upload overwrites the remains.
     """
     naze = bench.naze
-    # Two copies that begin at the same time tear the flash alike.
+    # Copies that start at the same time would get the same damage.
     bench.run(0.003 * (cut // 10))
     naze.faults.power_cut_at_flash_operation = operation
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the image does with its serial port: booting, arming, the CLI, Harakiri's own MAVLink upload."""
+"""The image's serial port: booting, arming, the CLI, Harakiri's own MAVLink upload."""
 
 import pytest
 
@@ -14,7 +14,7 @@ from tests.support.real_bench import IDENT, Figure, RealBench
 
 
 def has_frsky(heard: bytes) -> bool:
-    """True if values of the FrSky hub protocol follow each other."""
+    """True if there are consecutive values of the FrSky hub protocol."""
     watch, longest = FrskyParser(), 0
     for byte in heard:
         watch.feed(bytes((byte,)))
@@ -29,14 +29,14 @@ def test_it_boots_and_answers(bench: RealBench, figure: Figure) -> None:
     figure("IDENT answered after", f"{(bench.now - begun) * 1000:.1f} ms")
 
 
-def test_what_comes_during_the_boot_is_answered_in_one_burst(bench: RealBench, figure: Figure) -> None:
+def test_requests_during_boot_are_answered_in_one_burst(bench: RealBench, figure: Figure) -> None:
     bench.naze.power_off(bench.now)
     bench.naze.power_on(bench.now)
     for _ in range(12):
         bench.run(0.5)
         bench.send(IDENT)
     heard = bench.run(6.0).count(b"$M>")
-    figure("requests of the boot answered", f"{heard} of 12")
+    figure("requests during boot answered", f"{heard} of 12")
     assert heard >= 10
 
 
@@ -53,7 +53,7 @@ def test_arming_by_stick(image: Image, flash: bytes, figure: Figure, protocol: T
     heard = bytes(bench.heard[before:]) + bench.run(1.0)
     mavlink = [frame.msgid for frame in MavlinkSplitter().feed(heard)]
     figure(f"armed with tele_prot {protocol.value}", f"{bench.naze.baud} baud, {kind(answers, mavlink, heard)}")
-    # FrSky frames are sent beside whatever was spoken before.
+    # FrSky frames are sent in addition to the previous protocol.
     speaks_mavlink = protocol in (TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600)
     assert answers is not speaks_mavlink
     assert bool(mavlink) is speaks_mavlink
@@ -75,16 +75,16 @@ def test_the_cli(bench: RealBench, figure: Figure) -> None:
     assert b"#" in bench.enter_cli()
     assert "5 Datasets of 146 possible" in bench.type_line("status")
     assert bench.ask(IDENT) is None
-    bench.type_line("")  # what the request has typed
+    bench.type_line("")  # the characters of the request
     bench.type_line("wpflush")
     bench.type_line("save")
     bench.run(2.0)
     bench.wait_for_boot()
     assert bench.pull() == []
-    figure("CLI", "status, wpflush and save work; the only way out is a reset")
+    figure("CLI", "status, wpflush and save work; only a reset ends it")
 
 
-def test_the_boot_loader_is_reached_by_three_letters_only_while_nothing_is_spoken(bench: RealBench) -> None:
+def test_three_letters_r_start_the_boot_loader_only_in_autosense(bench: RealBench) -> None:
     bench.send(b"RRR")
     assert bench.naze.counters.bootloader_entered is False
     bench.run(6.0)
@@ -93,11 +93,11 @@ def test_the_boot_loader_is_reached_by_three_letters_only_while_nothing_is_spoke
     assert bench.naze.counters.bootloader_entered or bench.naze.counters.resets
 
 
-def test_a_cut_frame_is_forgotten(bench: RealBench, figure: Figure) -> None:
+def test_a_truncated_frame_is_dropped(bench: RealBench, figure: Figure) -> None:
     bench.send(b"$M<\xf3\xc0")
     bench.run(0.1)
     assert bench.ask(IDENT, 0.2) is not None
-    figure("a cut frame", "is forgotten within 100 ms")
+    figure("a truncated frame", "is dropped within 100 ms")
 
 
 def test_info_after_a_push(bench: RealBench) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture player: the recorded requests get the recorded replies."""
+"""The capture player gives the recorded replies to the recorded requests."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ def closed(at: float) -> UartEvent:
 
 
 class Listener:
-    """Sends requests to a player that began at an odd time, and records the replies with their times."""
+    """Sends requests to a player started at an arbitrary time, and records the replies with their times."""
 
     def __init__(self, events: Sequence[UartEvent], tempo: float = 1.0) -> None:
         self.player = CapturePlayer(events, tempo)
@@ -49,7 +49,7 @@ class Listener:
         self.player.receive(data, 1000.0 + at)
 
     def listen(self, until: float) -> list[tuple[float, bytes]]:
-        """Return the data received since the last call."""
+        """The data received since the last call."""
         self.heard = []
         while (wakeup := self.player.next_wakeup(1000.0 + self._now) - 1000.0) <= until:
             self._now = max(wakeup, self._now + 1e-6)
@@ -60,7 +60,7 @@ class Listener:
         return self.heard
 
 
-def test_an_answer_comes_when_it_is_asked_for_and_as_fast_and_in_the_same_pieces() -> None:
+def test_a_reply_comes_on_request_with_its_delay_and_in_the_same_pieces() -> None:
     answer = reply(Msp.STATUS, 1, 2, 3)
     listener = Listener([opened(0.0), wrote(1.0, STATUS), read(1.01, answer[:4]), read(1.02, answer[4:])])
     assert listener.listen(2.0) == []
@@ -68,13 +68,13 @@ def test_an_answer_comes_when_it_is_asked_for_and_as_fast_and_in_the_same_pieces
     assert listener.listen(9.0) == [(2.51, answer[:4]), (2.52, answer[4:])]
 
 
-def test_what_was_sent_unasked_comes_at_its_time() -> None:
+def test_unsolicited_data_comes_at_its_time() -> None:
     heartbeat = bytes.fromhex("fe0900010000") + bytes(11)
     events = [opened(0.0), read(0.5, heartbeat), wrote(1.0, STATUS), read(1.001, b"\x55" + reply(Msp.STATUS) + b"\xaa")]
     assert Listener(events).listen(5.0) == [(0.5, heartbeat), (1.001, b"\x55\xaa")]
 
 
-def test_who_asks_more_or_less_often_gets_the_state_of_that_time() -> None:
+def test_requests_at_another_rate_get_the_state_of_that_time() -> None:
     events = [opened(0.0)]
     for number in range(10):
         events += [wrote(number, STATUS), read(number + 0.01, reply(Msp.STATUS, number))]
@@ -94,8 +94,8 @@ def test_unanswered_requests_stay_unanswered() -> None:
     assert listener.listen(3.0) == [(2.11, reply(Msp.IDENT, 7))]
 
 
-def test_a_silent_flight_controller_is_silent_whatever_it_is_asked() -> None:
-    """STATUS was answered before it fell silent, and was not asked meanwhile: IDENT was."""
+def test_while_the_flight_controller_was_silent_nothing_is_answered() -> None:
+    """STATUS was answered before it fell silent; during the silence only IDENT was sent."""
     events = [opened(0.0), wrote(0.5, STATUS), read(0.51, reply(Msp.STATUS))]
     events += [wrote(at, IDENT) for at in (1.0, 2.0, 3.0, 4.0)]
     events += [wrote(5.0, IDENT), read(5.01, reply(Msp.IDENT, 7))]
@@ -106,15 +106,15 @@ def test_a_silent_flight_controller_is_silent_whatever_it_is_asked() -> None:
             assert bool(listener.listen(at + 0.2)) == is_answered, at
 
 
-def test_a_question_that_nobody_asked_gets_an_error_frame() -> None:
+def test_a_request_never_recorded_gets_an_error_frame() -> None:
     listener = Listener([opened(0.0), wrote(0.5, STATUS), read(0.51, reply(Msp.STATUS))])
     listener.ask(1.0, request(Msp.ANALOG))
     ((_, data),) = listener.listen(2.0)
     assert MspParser().feed(data) == [MspFrame(Direction.ERROR, Msp.ANALOG)]
 
 
-def test_a_conversation_may_be_held_earlier() -> None:
-    """BEGIN was refused once, then taken: so it is again, although it is asked long before."""
+def test_a_conversation_may_take_place_earlier() -> None:
+    """BEGIN was refused once, then accepted; the replay does the same although BEGIN is sent much earlier."""
     begin = request(190, b"begin")
     events = [opened(0.0), wrote(0.1, STATUS), read(0.11, reply(Msp.STATUS))]
     events += [wrote(300.0, begin), read(300.05, reply(190, 1)), wrote(301.0, begin), read(301.05, reply(190, 0))]
@@ -124,8 +124,8 @@ def test_a_conversation_may_be_held_earlier() -> None:
         assert listener.listen(at + 0.5) == [(at + 0.05, reply(190, result))]
 
 
-def test_answers_in_a_window_belong_to_their_requests() -> None:
-    """Chunks of the same command: told apart by what they hold, answered in their order, one of them lost."""
+def test_replies_in_a_window_belong_to_their_requests() -> None:
+    """Chunks of the same command are told apart by contents and answered in order; one of them was lost."""
     chunks = [request(191, bytes((number,))) for number in range(4)]
     events = [opened(0.0), wrote(1.0, chunks[0] + chunks[1]), wrote(1.1, chunks[2])]
     events += [read(1.2, reply(191, 0) + reply(191, 1)), wrote(1.3, chunks[3]), wrote(1.5, chunks[2])]
@@ -138,7 +138,7 @@ def test_answers_in_a_window_belong_to_their_requests() -> None:
     assert answers == {3: [reply(191, 3)], 0: [reply(191, 0)], 1: [reply(191, 1)]}
 
 
-def test_answers_never_overtake_each_other() -> None:
+def test_replies_never_overtake_each_other() -> None:
     slow, fast = request(190, b"slow"), request(190, b"fast")
     events = [opened(0.0), wrote(1.0, slow), read(1.5, reply(190, 1)), wrote(2.0, fast), read(2.01, reply(190, 2))]
     listener = Listener(events)
@@ -155,7 +155,7 @@ def test_the_speed_is_that_of_the_recorded_port() -> None:
     assert Listener([read(0.0, b"$M", None)]).player.baud == 115200
 
 
-def test_a_closed_port_says_nothing_and_its_times_are_reported() -> None:
+def test_a_closed_port_is_silent_and_its_times_are_reported() -> None:
     events = [opened(0.0), wrote(0.5, STATUS), read(0.51, reply(Msp.STATUS)), closed(2.0), opened(5.0), closed(9.0)]
     listener = Listener(events, tempo=2.0)
     assert listener.player.outages == [(1.0, 2.5)]
@@ -167,8 +167,8 @@ def test_a_closed_port_says_nothing_and_its_times_are_reported() -> None:
 
 
 @given(st.data())
-def test_whatever_was_read_is_played_byte_for_byte(data: st.DataObject) -> None:
-    """The same requests at the same times read the same bytes in the same order: noise, truncated frames, bursts."""
+def test_recorded_data_is_replayed_byte_for_byte(data: st.DataObject) -> None:
+    """With the same requests at the same times: noise, truncated frames, bursts."""
     frames = st.sampled_from([reply(Msp.STATUS, 1), reply(Msp.IDENT), reply(Msp.STATUS, 2), b"$M>", b"$", b"\xfe\x09"])
     deeds = st.one_of(
         st.sampled_from([STATUS, IDENT, STATUS + IDENT]).map(lambda asked: (UartDeed.WRITE, asked)),
@@ -191,8 +191,8 @@ def test_whatever_was_read_is_played_byte_for_byte(data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("rest", [[], [closed(2.002)], [closed(2.002), opened(2.5), wrote(2.6, IDENT)]])
-def test_what_was_asked_at_the_very_end_tells_nothing(rest: list[UartEvent]) -> None:
-    """The end of the recording, or the plug, cut the answers off: the flight controller had not fallen silent."""
+def test_unanswered_requests_at_the_end_do_not_mean_silence(rest: list[UartEvent]) -> None:
+    """The end of the recording or unplugging cut the replies off."""
     events = [opened(0.0), wrote(1.0, STATUS), read(1.01, reply(Msp.STATUS)), wrote(1.9, STATUS), wrote(2.0, IDENT)]
     listener = Listener([*events, *rest])
     listener.ask(1.95, STATUS)
@@ -201,7 +201,7 @@ def test_what_was_asked_at_the_very_end_tells_nothing(rest: list[UartEvent]) -> 
     assert listener.listen(9.5) == [(9.01, reply(Msp.STATUS))]
 
 
-def test_what_was_asked_in_vain_before_the_end_tells_that_it_was_silent() -> None:
+def test_unanswered_requests_before_the_end_mean_silence() -> None:
     events = [opened(0.0), wrote(1.0, STATUS), read(1.01, reply(Msp.STATUS)), wrote(2.0, STATUS), wrote(2.3, IDENT)]
     listener = Listener([*events, wrote(4.0, IDENT), closed(4.1)])
     listener.ask(3.0, STATUS)

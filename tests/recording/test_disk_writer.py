@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes on their way to a disk: in order, whole, and never more than there is room for."""
+"""Data on its way to a disk stays complete and ordered, and the queue is bounded."""
 
 import threading
 
@@ -15,7 +15,7 @@ def put(writer: DiskWriter, data: bytes) -> None:
         writer.put(data)
 
 
-def test_all_is_written_in_order_before_the_end() -> None:
+def test_everything_is_written_in_order_before_the_end() -> None:
     written: list[bytes] = []
     ended: list[bool] = []
     writer = DiskWriter("test", written.append, lambda: ended.append(True))
@@ -27,7 +27,7 @@ def test_all_is_written_in_order_before_the_end() -> None:
     assert ended == [True]
 
 
-def test_a_disk_that_hangs_holds_nobody_up_and_is_reported_once() -> None:
+def test_a_hung_disk_blocks_nothing_and_is_reported_once() -> None:
     hangs, goes_on = threading.Event(), threading.Event()
     written: list[bytes] = []
 

@@ -14,19 +14,19 @@ def settings_of(tmp_path: Path, text: str, record_uart: Path | None = None) -> S
     return load_settings(config, "sim:", (), tmp_path, record_uart)
 
 
-def test_telemetry_is_recorded_unless_it_is_switched_off(tmp_path: Path) -> None:
+def test_telemetry_is_recorded_by_default(tmp_path: Path) -> None:
     assert settings_of(tmp_path, "").tlog == TlogLimits(file_size=16 << 20, total_size=256 << 20, days=30)
     assert settings_of(tmp_path, "record_tlog = false\ntlog_days = 3").tlog is None
 
 
-def test_the_bounds_are_set(tmp_path: Path) -> None:
+def test_the_limits_are_settings(tmp_path: Path) -> None:
     limits = settings_of(tmp_path, "tlog_file_mb = 200\ntlog_days = 365").tlog
     assert limits == TlogLimits(file_size=200 << 20, total_size=400 << 20, days=365)
     limits = settings_of(tmp_path, "tlog_file_mb = 1\ntlog_total_mb = 2\ntlog_days = 1").tlog
     assert limits == TlogLimits(file_size=1 << 20, total_size=2 << 20, days=1)
 
 
-def test_the_flag_goes_before_the_file(tmp_path: Path) -> None:
+def test_the_flag_overrides_the_file(tmp_path: Path) -> None:
     text = 'record_uart = "/var/lib/naze-bridge/naze.uart"'
     assert settings_of(tmp_path, "").record_uart is None
     assert settings_of(tmp_path, text).record_uart == Path("/var/lib/naze-bridge/naze.uart")
@@ -45,6 +45,6 @@ def test_the_flag_goes_before_the_file(tmp_path: Path) -> None:
         ("record_uart = true", "record_uart is True, but must be text in quotes"),
     ],
 )
-def test_what_makes_no_sense_is_refused(tmp_path: Path, text: str, complaint: str) -> None:
+def test_invalid_values_are_refused(tmp_path: Path, text: str, complaint: str) -> None:
     with pytest.raises(SettingsError, match=complaint.replace(".", r"\.")):
         settings_of(tmp_path, text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The folder of telemetry logs: its bounds, and what a disk does to it."""
+"""The folder of telemetry logs: its limits, and disk faults."""
 
 import resource
 from datetime import UTC, datetime, timedelta
@@ -17,7 +17,7 @@ PLENTY = 1 << 40
 
 
 def record(at: datetime = NOON) -> bytes:
-    """As far as the folder looks at it."""
+    """A record with the fields that the folder uses."""
     return int(at.timestamp() * 1e6).to_bytes(8, "big").ljust(RECORD_SIZE, b"\xfd")
 
 
@@ -26,13 +26,13 @@ def names(folder: Path) -> list[str]:
 
 
 def fill(folder: TlogFolder, began: datetime, records: int) -> None:
-    """Write a file."""
+    """Write a file of `records` records."""
     for _ in range(records):
         folder.write(record(began), 0.0)
     folder.close()
 
 
-def test_files_are_named_for_their_first_record_in_utc(tmp_path: Path) -> None:
+def test_files_are_named_after_their_first_record_in_utc(tmp_path: Path) -> None:
     folder = TlogFolder(tmp_path / "state" / "logs", TlogLimits())
     fill(folder, NOON, 3)
     fill(folder, NOON + timedelta(hours=1, seconds=7), 1)
@@ -48,14 +48,14 @@ def test_a_clock_that_was_set_back_overwrites_nothing(tmp_path: Path) -> None:
     assert [(tmp_path / name).stat().st_size for name in names(tmp_path)] == [100, 200, 300]
 
 
-def test_what_was_written_is_in_the_file_at_once(tmp_path: Path) -> None:
-    """There is no buffer that dies with the process."""
+def test_records_are_in_the_file_at_once(tmp_path: Path) -> None:
+    """There is no buffer to be lost with the process."""
     folder = TlogFolder(tmp_path, TlogLimits())
     folder.write(record(), 0.0)
     assert (tmp_path / "2026-11-21 12-00-00.tlog").read_bytes() == record()
 
 
-def test_the_oldest_make_room_and_all_together_keep_their_bound(tmp_path: Path) -> None:
+def test_the_oldest_files_are_deleted_to_keep_the_total_size(tmp_path: Path) -> None:
     limits = TlogLimits(file_size=1000, total_size=5000)
     folder = TlogFolder(tmp_path, limits)
     for hour in range(12):
@@ -67,15 +67,15 @@ def test_the_oldest_make_room_and_all_together_keep_their_bound(tmp_path: Path) 
     assert names(tmp_path) == [f"2026-11-21 {hour}-00-00.tlog" for hour in range(19, 24)]
 
 
-def test_what_is_too_old_goes(tmp_path: Path) -> None:
+def test_files_that_are_too_old_are_deleted(tmp_path: Path) -> None:
     for days in (31, 30, 1):
         fill(TlogFolder(tmp_path, TlogLimits()), NOON - timedelta(days=days), 1)
     fill(TlogFolder(tmp_path, TlogLimits(days=30)), NOON + timedelta(seconds=1), 1)
     assert names(tmp_path) == ["2026-11-20 12-00-00.tlog", "2026-11-21 12-00-01.tlog"]
 
 
-def test_what_was_written_before_the_clock_was_set_is_not_old(tmp_path: Path) -> None:
-    """A Pi that lay in a box for a winter: this flight began in autumn, and goes last if there is no room."""
+def test_files_from_before_the_clock_was_set_are_not_old(tmp_path: Path) -> None:
+    """A Pi unused for a winter dates the flight to autumn; files are deleted in the order of writing."""
     fill(TlogFolder(tmp_path, TlogLimits()), NOON - timedelta(days=1), 10)
     limits = TlogLimits(file_size=1000, total_size=2000)
     folder = TlogFolder(tmp_path, limits)
@@ -95,7 +95,7 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
     assert names(tmp_path) == sorted([*others, "2026-11-21 12-00-00.tlog"])
 
 
-def test_a_folder_that_cannot_be_is_reported_once_and_tried_again(tmp_path: Path) -> None:
+def test_an_unusable_folder_is_reported_once_and_retried(tmp_path: Path) -> None:
     (tmp_path / "logs").write_text("in the way")
     folder = TlogFolder(tmp_path / "logs", TlogLimits())
     with capture_logs() as events:
@@ -114,7 +114,7 @@ def test_a_folder_that_cannot_be_is_reported_once_and_tried_again(tmp_path: Path
 
 
 @pytest.mark.parametrize("is_recording", [False, True])
-def test_a_disk_that_is_nearly_full_is_left_to_others(tmp_path: Path, is_recording: bool) -> None:
+def test_nothing_is_written_to_a_nearly_full_disk(tmp_path: Path, is_recording: bool) -> None:
     free = [PLENTY]
     folder = TlogFolder(tmp_path, TlogLimits(), lambda _: free[0])
     if is_recording:
@@ -130,8 +130,8 @@ def test_a_disk_that_is_nearly_full_is_left_to_others(tmp_path: Path, is_recordi
     assert names(tmp_path)[-1] == "2026-11-21 12-05-00.tlog"
 
 
-def test_a_full_disk_is_reported_once_and_what_fitted_can_be_read(tmp_path: Path) -> None:
-    """The kernel's own refusal in the middle of a record; a limit of this process stands in for the disk's."""
+def test_a_full_disk_is_reported_once_and_complete_records_can_be_read(tmp_path: Path) -> None:
+    """The kernel fails a write within a record; a file size limit stands in for the full disk."""
     folder = TlogFolder(tmp_path, TlogLimits(), lambda _: PLENTY)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (250, hard))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The recorder and its clock: a Pi learns the time when there is a network, in the middle of a recording."""
+"""The recorder and its clock: a Pi gets the time from the network, possibly during a recording."""
 
 import time
 from itertools import count
@@ -30,7 +30,7 @@ def test_a_step_of_the_clock_begins_a_new_file(tmp_path: Path, step_ns: int) -> 
         recorder.on_frames([frame(number)])
         files = set(tmp_path.iterdir())
         if files:
-            # The first file is there: now the time comes.
+            # The first file exists; now the clock is set.
             ahead_ns = step_ns
         if len(files) == 2:
             break
@@ -54,7 +54,7 @@ def heartbeat(kind: int, sysid: int, *, version: int = 2) -> bytes:
 
 @pytest.mark.parametrize("version", [1, 2])
 def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: int) -> None:
-    """Mission Planner shows the craft whose heartbeat comes first. Another file begins the same way."""
+    """Mission Planner shows the craft whose heartbeat comes first. The next file begins the same way."""
     station = heartbeat(messages.MAV_TYPE_GCS, 245, version=version)
     vehicle = heartbeat(messages.MAV_TYPE_QUADROTOR, 1, version=version)
     ahead_ns = 0
@@ -79,7 +79,7 @@ def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: 
     assert heartbeats == [vehicle, station]
 
 
-def test_a_clock_that_is_only_corrected_changes_nothing(tmp_path: Path) -> None:
+def test_a_small_correction_of_the_clock_changes_nothing(tmp_path: Path) -> None:
     corrections = count(step=10**8)
     recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + next(corrections))
     deadline = time.monotonic() + PATIENCE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Telemetry log records, held against pymavlink's reader, which also judges the CRCs."""
+"""Telemetry log records, read by pymavlink, which also checks the CRCs."""
 
 import hashlib
 from pathlib import Path
@@ -43,14 +43,14 @@ def read_by_pymavlink(path: Path) -> list[Any]:
     return found
 
 
-def test_pymavlink_reads_what_was_written(tmp_path: Path) -> None:
-    """Both versions of MAVLink, signed or not: the content comes back, the times too, and no signature."""
+def test_pymavlink_reads_the_written_records(tmp_path: Path) -> None:
+    """Both versions of MAVLink, signed or not: contents and times read back, without signatures."""
     written: list[tuple[float, Any]] = []
     log = b""
     for version, signing in ((2, False), (1, False), (2, True)):
         codec = sender(signing=signing)
         for message in some_messages():
-            # (4 microseconds are the resolution: the lowest bits are a link's number.)
+            # (The resolution is 4 microseconds: the lowest bits are the link's number.)
             at_us = NOON_US + len(written) * 40_000
             frame = bytes(message.pack(codec, force_mavlink1=version == 1))
             assert (frame[2] & 1 == 1 and version == 2) == signing

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Capture files read back as written; truncated, cut or extended ones as far as possible."""
+"""Capture files read back as written; damaged ones as far as possible."""
 
 import os
 from pathlib import Path
@@ -23,7 +23,7 @@ def event(at: float, deed: UartDeed = UartDeed.READ, data: bytes = b"$M", text: 
 
 @st.composite
 def recordings(draw: st.DrawFn) -> list[UartEvent]:
-    """One run of a daemon: from the opening of the port on, times to the microsecond, the first at 0."""
+    """Events of one run of a daemon: from the opening of the port, at 0, with times in microseconds."""
     at, speed = 0, draw(SPEEDS)
     found = [UartEvent(0.0, speed, UartDeed.OPEN)]
     for _ in range(draw(st.integers(0, 20))):
@@ -37,17 +37,17 @@ def written(events: list[UartEvent]) -> bytes:
 
 
 @given(recordings())
-def test_what_is_written_is_read(events: list[UartEvent]) -> None:
+def test_written_events_are_read(events: list[UartEvent]) -> None:
     assert read_capture(written(events)) == events
 
 
 @given(recordings(), st.data())
-def test_a_torn_capture_is_read_up_to_the_last_whole_line(events: list[UartEvent], data: st.DataObject) -> None:
+def test_a_truncated_capture_is_read_up_to_the_last_complete_line(events: list[UartEvent], data: st.DataObject) -> None:
     whole = written(events)
     torn = whole[: data.draw(st.integers(0, len(whole)))]
     lines = torn.count(b"\n") - 1
     found = read_capture(torn)
-    # A last line may be whole without its line feed.
+    # The last line may be complete without its line feed.
     assert found in (events[: max(lines, 0)], events[: lines + 1])
 
 
@@ -79,13 +79,13 @@ def test_any_bytes_are_read(lines: list[bytes]) -> None:
         "[" * 100_000,
     ],
 )
-def test_a_line_that_is_none_of_ours_is_skipped(line: str) -> None:
+def test_an_unknown_line_is_skipped(line: str) -> None:
     events = [event(0.0), event(1.0)]
     lines = [capture_line(events[0]), line.encode() + b"\n", capture_line(events[1])]
     assert read_capture(HEADER + b"".join(lines)) == events
 
 
-def test_a_part_that_was_cut_out_begins_at_0() -> None:
+def test_an_excerpt_begins_at_0() -> None:
     lines = written([event(float(second)) for second in range(100)]).splitlines(keepends=True)
     assert [found.at for found in read_capture(b"".join(lines[61:71]))] == [float(second) for second in range(10)]
 
@@ -104,7 +104,7 @@ def test_recordings_in_one_file_follow_each_other_after_a_pause() -> None:
 # -- the recorder ----------------------------------------------------------------------------------------------------
 
 
-def test_a_capture_is_appended_to_even_if_it_was_torn(tmp_path: Path) -> None:
+def test_a_truncated_capture_is_appended_to(tmp_path: Path) -> None:
     path = tmp_path / "naze.uart"
     for number in range(3):
         recorder = UartRecorder(path)
@@ -119,7 +119,7 @@ def test_a_capture_is_appended_to_even_if_it_was_torn(tmp_path: Path) -> None:
     ]
 
 
-def test_a_capture_is_bounded_over_all_recordings(tmp_path: Path) -> None:
+def test_a_captures_total_size_is_limited(tmp_path: Path) -> None:
     path = tmp_path / "naze.uart"
     ends = 0
     for _ in range(3):
@@ -134,7 +134,7 @@ def test_a_capture_is_bounded_over_all_recordings(tmp_path: Path) -> None:
     assert path.read_bytes().endswith(b"}\n")
 
 
-def test_nothing_else_is_written_into(tmp_path: Path) -> None:
+def test_other_files_are_not_appended_to(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("mine")
     with pytest.raises(UartFileError, match=r"notes\.txt is not a UART capture"):

@@ -48,7 +48,7 @@ from tests.support.rule_items import (
             "Mission rejected: 147 items, but only 146 fit",
         ),
         (Finding(1, "p1", math.inf, 0, "not used", RTL), "WP 1: param1 changed from inf to 0 (not used)"),
-        # As an older release stored it.
+        # As stored by an older release.
         (
             Finding(4, "command", 178, DROPPED, "command 178 is not supported"),
             "WP 4: item dropped, command 178 is not supported",
@@ -60,7 +60,7 @@ def test_text(finding: Finding, text: str) -> None:
 
 
 def test_every_warning_and_rejection_fits_a_statustext() -> None:
-    """With three-digit item numbers: Mission Planner's HUD shows the last piece of a longer one."""
+    """With three-digit item numbers; of a longer text Mission Planner's HUD shows only the last piece."""
     before = [item(WAYPOINT)] * 98
     texts = []
     for tail in (
@@ -82,8 +82,8 @@ def test_every_warning_and_rejection_fits_a_statustext() -> None:
     assert [text for text in texts if len(text) > 50] == []
 
 
-def test_a_value_never_becomes_itself() -> None:
-    """Neither a number with noise in its last digit nor a coordinate that was there."""
+def test_no_value_is_reported_as_changed_to_itself() -> None:
+    """Neither a number with noise in its last digit nor an unchanged coordinate."""
     verdict = check_list(mission(item(WAYPOINT, p2=3.0000002384185791, p3=0.5)), HarakiriRules())
     assert [each.text() for each in verdict.findings] == [
         "WP 1: Hit Rad changed from 3.00000024 to 3 m (whole numbers only)",
@@ -105,27 +105,27 @@ def test_equal_findings_are_one_line_and_warnings_come_first() -> None:
     ]
 
 
-def test_a_filled_in_default_is_no_news() -> None:
-    """Mission Planner sends no radius for home, and 0 where its field is empty."""
+def test_a_filled_in_default_is_not_reported() -> None:
+    """Mission Planner sends no radius for home, and 0 for an empty field."""
     verdict = check_list([replace(HOME, p2=0.0), item(WAYPOINT, p2=0.0), item(TIME, p2=math.nan)], HarakiriRules())
     assert {each.news for each in verdict.findings} == {News.NONE}
     assert summary(3, verdict) is None
     assert finding_lines(verdict.findings) == []
 
 
-def test_no_more_than_ten_lines() -> None:
+def test_at_most_ten_lines() -> None:
     verdict = check_list(mission(*(item(WAYPOINT, p1=number) for number in range(2, 40))), HarakiriRules())
     lines = finding_lines(verdict.findings)
     assert len(lines) == 11
     assert lines[-1][1] == "and 28 more: see the list on the status page or naze-bridge missions show"
 
 
-def test_a_list_of_which_nothing_is_left_is_a_warning() -> None:
+def test_a_list_with_every_item_dropped_is_a_warning() -> None:
     assert summary(2, check_list(mission(item(SPEED)), HarakiriRules())) == "Mission erased: no command left"
 
 
-def test_a_list_without_a_home_says_what_became_of_its_first_item() -> None:
-    """MAVSDK's `mission` plugin."""
+def test_a_list_without_home_reports_its_first_item_as_home() -> None:
+    """As sent by MAVSDK's `mission` plugin."""
     verdict = check_list([item(WAYPOINT, frame=6), item(WAYPOINT)], HarakiriRules())
     assert [each.text() for each in verdict.findings] == ["Home: first item became home, not flown to"]
     assert summary(2, verdict) == "2 of 2 stored: check home"

@@ -43,7 +43,7 @@ def verdict_on(*items: MissionItem, profile: HarakiriRules = PROFILE, **kwargs: 
 
 
 def placed(tested: MissionItem) -> tuple[list[MissionItem], int]:
-    """A valid list with the tested item where its command may stand, and the item's number."""
+    """A valid list with the tested item in an allowed position, and the item's number."""
     match tested.command:
         case 22:
             return mission(tested, item(WAYPOINT)), 1
@@ -54,7 +54,7 @@ def placed(tested: MissionItem) -> tuple[list[MissionItem], int]:
 
 
 def stored(tested: MissionItem, profile: HarakiriRules = PROFILE) -> tuple[MissionItem, dict[str, tuple[Any, Any]]]:
-    """What the item reads back as, and its findings: field to (was, becomes)."""
+    """The item as it reads back, and its findings: field to (was, becomes)."""
     items, seq = placed(tested)
     verdict = check_list(items, profile)
     assert verdict.result is Result.ACCEPTED
@@ -66,7 +66,7 @@ def stored(tested: MissionItem, profile: HarakiriRules = PROFILE) -> tuple[Missi
 
 
 @pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, RTL, LAND, TAKEOFF, ROI, ROI_LOCATION, SET_ROI])
-def test_a_faultless_item_is_stored_as_it_is_without_a_finding(command: int) -> None:
+def test_a_valid_item_is_stored_unchanged_without_a_finding(command: int) -> None:
     items, seq = placed(item(command))
     verdict = check_list(items, PROFILE)
     assert verdict.findings == ()
@@ -74,7 +74,7 @@ def test_a_faultless_item_is_stored_as_it_is_without_a_finding(command: int) -> 
 
 
 VALUES = [
-    # p1: fast corner or brake
+    # p1: fly through or brake
     *[(WAYPOINT, "p1", sent, becomes) for sent, becomes in [(0, 0), (1, 1), (1.9, 1), (0.9, 0), (7, 1), (-1, 0)]],
     *[(WAYPOINT, "p1", sent, becomes) for sent, becomes in [(1e30, 1), (NAN, 0), (INF, 0), (-INF, 0)]],
     *[(UNLIM, "p1", sent, 0) for sent in (0, 1, -3, NAN)],
@@ -83,7 +83,7 @@ VALUES = [
     *[(TURNS, "p1", sent, becomes) for sent, becomes in [(2.7, 2), (-2.7, -2), (1e30, 127), (-1e30, -127), (INF, 1)]],
     *[(TIME, "p1", sent, becomes) for sent, becomes in [(1, 1), (255, 255), (256, 255), (0, 1), (-5, 1), (30.9, 30)]],
     *[(TIME, "p1", sent, becomes) for sent, becomes in [(NAN, 1), (1e30, 255), (INF, 1), (0.99, 1)]],
-    # p2: hit radius of 2 m at least
+    # p2: hit radius of at least 2 m
     *[
         (command, "p2", sent, becomes)
         for command in (WAYPOINT, UNLIM, TURNS, TIME)
@@ -92,7 +92,7 @@ VALUES = [
     # p3 is never used; p4 only with a region of interest (below)
     *[(command, "p3", sent, 0) for command in (WAYPOINT, UNLIM, TURNS, TIME) for sent in (0, 5, -5, NAN, INF)],
     *[(command, "p4", sent, 0) for command in (WAYPOINT, UNLIM, TURNS, TIME) for sent in (0, 1, 90, NAN)],
-    # commands without parameters
+    # commands that use no parameters
     *[
         (command, field, sent, 0)
         for command in (RTL, LAND, TAKEOFF, ROI, ROI_LOCATION, SET_ROI)
@@ -119,9 +119,7 @@ VALUES = [
 
 
 @pytest.mark.parametrize(("command", "field", "sent", "becomes"), VALUES)
-def test_a_value_is_truncated_and_clamped_and_a_changed_one_is_a_finding(
-    command: int, field: str, sent: float | None, becomes: int
-) -> None:
+def test_a_truncated_or_clamped_value_is_a_finding(command: int, field: str, sent: float | None, becomes: int) -> None:
     held, findings = stored(item(command, **{field: sent}))
     assert getattr(held, field) == becomes
     as_sent = 0 if sent is None or math.isnan(sent) else sent
@@ -139,11 +137,11 @@ def test_gps_wp_radius_is_rounded_up_to_whole_metres(wp_radius_cm: int, least: i
         assert stored(item(WAYPOINT, p2=sent), profile)[0].p2 == least
 
 
-def test_the_highest_take_off_is_a_setting() -> None:
+def test_the_maximum_take_off_height_is_a_setting() -> None:
     assert stored(item(TAKEOFF, alt_m=80), HarakiriRules(takeoff_max_m=30))[0].alt_m == 30
 
 
-def test_records_hold_what_the_firmware_expects() -> None:
+def test_records_have_the_layout_of_the_firmware() -> None:
     verdict = verdict_on(
         item(TAKEOFF, alt_m=5),
         item(SET_ROI, lat_e7=1, lon_e7=-2),
@@ -222,7 +220,7 @@ def test_a_last_loiter_without_coordinates_is_dropped() -> None:
 
 
 @pytest.mark.parametrize("height", [NAN, INF, -INF])
-def test_a_return_without_a_finite_height_gets_the_least_one(height: float) -> None:
+def test_a_return_without_a_finite_height_gets_the_minimum(height: float) -> None:
     verdict = verdict_on(item(WAYPOINT), item(RTL, alt_m=height))
     assert (verdict.items[2].command, verdict.items[2].alt_m) == (RTL, 2)
     assert [(f.field, f.becomes, f.news) for f in verdict.findings] == [("alt_m", 2, News.WARNING)]
@@ -260,24 +258,24 @@ def test_the_frame_of_a_height_that_is_not_used_is_not_a_finding(command: int, f
 
 
 @pytest.mark.parametrize("command", [RTL, LAND, TAKEOFF])
-def test_the_mission_frame_is_fine_where_no_position_is_used(command: int) -> None:
+def test_the_mission_frame_is_accepted_without_a_position(command: int) -> None:
     assert stored(item(command, frame=2))[1] == {}
 
 
 @pytest.mark.parametrize("command", [ROI_NONE, SPEED])
-def test_the_mission_frame_is_fine_for_what_is_not_stored(command: int) -> None:
+def test_the_mission_frame_is_accepted_for_a_dropped_item(command: int) -> None:
     assert verdict_on(item(command, frame=2), item(WAYPOINT)).result is Result.ACCEPTED
 
 
 @pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI])
-def test_the_mission_frame_rejects_the_list_where_a_position_is_used(command: int) -> None:
+def test_the_mission_frame_with_a_position_rejects_the_list(command: int) -> None:
     items, seq = placed(item(command, frame=2))
     assert_rejected(check_list(items, PROFILE), MissionResult.UNSUPPORTED_FRAME, seq, "frame")
 
 
 @pytest.mark.parametrize("frame", [1, 4, 7, 8, 9, 12, 20, 255])
 @pytest.mark.parametrize("faulty", [item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0), item(TIME, alt_m=NAN)])
-def test_the_frame_of_an_item_that_is_dropped_rejects_nothing(faulty: MissionItem, frame: int) -> None:
+def test_the_frame_of_a_dropped_item_rejects_nothing(faulty: MissionItem, frame: int) -> None:
     verdict = verdict_on(replace(faulty, frame=frame), item(WAYPOINT))
     assert verdict.result is Result.ACCEPTED
     assert len(verdict.items) == 2
@@ -316,7 +314,7 @@ def test_coordinates_out_of_range_reject_the_list(command: int, field: str, beyo
 
 
 @pytest.mark.parametrize("command", [UNLIM, LAND])
-def test_a_last_command_elsewhere_rejects_the_list(command: int) -> None:
+def test_a_command_that_must_be_last_elsewhere_rejects_the_list(command: int) -> None:
     verdict = verdict_on(item(WAYPOINT), item(command), item(SPEED))
     assert_rejected(verdict, MissionResult.INVALID, 2, "command")
 
@@ -340,32 +338,32 @@ def test_a_roi_cannot_be_last_as_received(roi: int) -> None:
 
 
 @pytest.mark.parametrize("dropped", [item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0)])
-def test_a_roi_cannot_be_last_of_what_is_kept(dropped: MissionItem) -> None:
+def test_a_roi_cannot_be_the_last_kept_item(dropped: MissionItem) -> None:
     verdict = verdict_on(item(WAYPOINT), item(ROI), dropped)
     assert_rejected(verdict, MissionResult.INVALID, 2, "command")
 
 
 @pytest.mark.parametrize("command", [RTL, LAND, TAKEOFF])
-def test_some_commands_cannot_stand_alone(command: int) -> None:
+def test_some_commands_cannot_be_the_only_one(command: int) -> None:
     assert_rejected(verdict_on(item(command)), MissionResult.INVALID, 1, "command")
 
 
 @pytest.mark.parametrize("command", [RTL, LAND])
-def test_a_roi_or_a_dropped_item_is_no_company(command: int) -> None:
+def test_a_roi_or_a_dropped_item_does_not_count_as_another_command(command: int) -> None:
     assert_rejected(verdict_on(item(ROI), item(command)), MissionResult.INVALID, 2, "command")
     assert_rejected(verdict_on(item(SPEED), item(command)), MissionResult.INVALID, 2, "command")
 
 
-def test_rois_only_are_no_mission() -> None:
+def test_a_list_of_rois_is_not_a_mission() -> None:
     assert_rejected(verdict_on(item(ROI), item(ROI), item(SPEED)), MissionResult.INVALID, 2, "command")
 
 
 @pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME])
-def test_other_commands_can_stand_alone(command: int) -> None:
+def test_other_commands_can_be_the_only_one(command: int) -> None:
     assert verdict_on(item(command)).result is Result.ACCEPTED
 
 
-def test_two_commands_that_cannot_stand_alone_keep_each_other_company() -> None:
+def test_two_commands_that_cannot_be_the_only_one_are_accepted_together() -> None:
     assert verdict_on(item(TAKEOFF), item(LAND)).result is Result.ACCEPTED
 
 
@@ -378,7 +376,7 @@ def test_no_items_clear_the_list() -> None:
 
 
 @pytest.mark.parametrize("dropped", [item(SPEED), item(WAYPOINT, lon_e7=0), item(TIME, alt_m=NAN), item(ROI_NONE)])
-def test_a_list_of_which_only_home_is_kept_clears_the_list(dropped: MissionItem) -> None:
+def test_a_list_of_which_only_home_is_kept_clears(dropped: MissionItem) -> None:
     for items in (mission(dropped), mission(dropped, item(SPEED), item(SPEED))):
         verdict = check_list(items, PROFILE)
         assert (verdict.result, verdict.ack, verdict.records) == (Result.CLEARED, MissionResult.ACCEPTED, ())
@@ -394,7 +392,7 @@ def test_a_home_alone_is_invalid(home: MissionItem) -> None:
     assert_rejected(check_list([home], PROFILE), MissionResult.INVALID, None, "count")
 
 
-def test_an_item_of_zeros_alone_clears_as_mavsdk_wants_it() -> None:
+def test_a_single_item_of_zeros_clears_for_mavsdk() -> None:
     blank = MissionItem(0, WAYPOINT, 3, 0.0, 0.0, 0.0, NAN, 0, None, 0.0)
     assert check_list([blank], PROFILE).result is Result.CLEARED
 
@@ -411,7 +409,7 @@ def test_more_than_the_capacity_is_no_space(capacity: int) -> None:
     assert check_count(capacity, profile) is None
 
 
-def test_count_0_is_no_fault() -> None:
+def test_count_0_is_accepted() -> None:
     assert check_count(0, PROFILE) is None
 
 
@@ -427,7 +425,7 @@ def test_home_must_be_a_waypoint(command: int) -> None:
 @pytest.mark.parametrize(
     "home", [replace(HOME, lat_e7=0, lon_e7=0), replace(HOME, lat_e7=None), replace(HOME, lon_e7=0)]
 )
-def test_home_without_coordinates_is_where_the_flight_controller_is(home: MissionItem) -> None:
+def test_home_without_coordinates_gets_the_flight_controllers_position(home: MissionItem) -> None:
     items = [home, item(WAYPOINT)]
     verdict = check_list(items, PROFILE, fallback_home=(11, 22))
     assert (verdict.items[0].lat_e7, verdict.items[0].lon_e7) == (11, 22)
@@ -437,13 +435,13 @@ def test_home_without_coordinates_is_where_the_flight_controller_is(home: Missio
         assert (rejected.ack, rejected.findings[-1].seq) == (MissionResult.INVALID_PARAM5_X, 0)
 
 
-def test_homes_own_coordinates_come_first() -> None:
+def test_homes_own_coordinates_take_precedence() -> None:
     verdict = check_list([HOME, item(WAYPOINT)], PROFILE, fallback_home=(11, 22))
     assert (verdict.items[0].lat_e7, verdict.items[0].lon_e7) == (LAT, LON)
 
 
 @pytest.mark.parametrize("frame", [0, 5, 10, 11])
-def test_homes_height_is_the_number_that_was_sent_whatever_its_datum(frame: int) -> None:
+def test_homes_height_is_kept_whatever_its_frame(frame: int) -> None:
     verdict = check_list([replace(HOME, frame=frame, alt_m=584.0), item(WAYPOINT)], PROFILE)
     assert (verdict.items[0].frame, verdict.items[0].alt_m, verdict.findings) == (0, 584.0, ())
 
@@ -482,7 +480,7 @@ def test_home_without_a_finite_height_rejects_the_list(height: float) -> None:
         (5, item(SET_ROI)),
     ],
 )
-def test_a_rejection_comes_with_the_item_that_proves_it_and_stays(seq: int, faulty: MissionItem) -> None:
+def test_a_rejection_comes_with_its_item_and_is_final(seq: int, faulty: MissionItem) -> None:
     items = [HOME] + [item(WAYPOINT)] * 5
     items[seq] = faulty
     check = HarakiriCheck(PROFILE, len(items))
@@ -495,7 +493,7 @@ def test_a_rejection_comes_with_the_item_that_proves_it_and_stays(seq: int, faul
     assert (verdict.result, verdict.findings[-1]) == (Result.REJECTED, answers[seq].finding)  # type: ignore[union-attr]
 
 
-def test_half_a_list_has_no_verdict() -> None:
+def test_an_incomplete_list_has_no_verdict() -> None:
     check = HarakiriCheck(PROFILE, 3)
     check.take(HOME)
     check.take(item(WAYPOINT))
@@ -513,6 +511,6 @@ def test_positions_are_stored_to_the_bit() -> None:
     assert (held.lat_e7, held.lon_e7) == (0x1B0D0D0D, -0x050D0D0D)
 
 
-def test_items_are_numbered_by_their_place() -> None:
+def test_items_are_numbered_by_position() -> None:
     verdict = check_list([HOME, item(WAYPOINT, seq=77, p1=5, **HERE)], PROFILE)
     assert [f.seq for f in verdict.findings] == [1]

@@ -76,7 +76,7 @@ def speed(metres: float, kind: float = 1, throttle: float = 0) -> MissionItem:
         (item(C.CONDITION_YAW, at=False, p1=270), NavRecord(A.SET_HEAD, p1=270)),
     ],
 )
-def test_what_can_be_held_is_held_and_read_as_it_was_sent(sent: MissionItem, record: NavRecord) -> None:
+def test_supported_items_are_stored_and_read_back_unchanged(sent: MissionItem, record: NavRecord) -> None:
     verdict = verdict_on(WP, sent, WP)
     assert verdict.findings == ()
     assert verdict.records[1] == record
@@ -102,7 +102,7 @@ def test_what_can_be_held_is_held_and_read_as_it_was_sent(sent: MissionItem, rec
         (item(C.NAV_LAND, at=False), A.LAND, [("lat_e7", 0, LAT), ("lon_e7", 0, LON), ("alt_m", 0, 50)]),
     ],
 )  # fmt: skip
-def test_what_cannot_be_held_is_reported(sent: MissionItem, record: NavAction, findings: list[tuple[Any, ...]]) -> None:
+def test_unsupported_values_are_reported(sent: MissionItem, record: NavAction, findings: list[tuple[Any, ...]]) -> None:
     assert kept(WP, sent, WP)[1].action == record
     assert [told[1:] for told in said(WP, sent, WP)] == findings
 
@@ -122,18 +122,18 @@ def test_what_cannot_be_held_is_reported(sent: MissionItem, record: NavAction, f
         speed(math.nan),
     ],
 )
-def test_what_means_nothing_there_is_dropped(sent: MissionItem) -> None:
+def test_unsupported_commands_are_dropped(sent: MissionItem) -> None:
     assert kept(WP, sent, WP) == kept(WP, WP)
     assert [(told[0], told[3]) for told in said(WP, sent, WP)] == [(2, DROPPED)]
 
 
-def test_a_landing_without_a_place_after_the_way_home_is_part_of_it() -> None:
+def test_a_landing_without_a_position_after_rtl_is_merged_into_it() -> None:
     rtl, land = item(C.NAV_RETURN_TO_LAUNCH, at=False), item(C.NAV_LAND, at=False)
     assert kept(WP, rtl, land)[1:] == (NavRecord(A.RTH, p1=1, flag=LAST),)
     assert said(WP, rtl, land) == [(3, "command", 21, DROPPED)]
 
 
-def test_speeds_are_folded_into_the_legs_and_shown_again() -> None:
+def test_speeds_are_stored_in_the_legs_and_shown_as_items() -> None:
     sent = (WP, speed(7.5), WP, item(C.NAV_LOITER_TIME, p1=5), item(C.DO_SET_ROI), speed(3), item(C.NAV_LAND))
     records = kept(*sent)
     assert [(r.action, r.p1, r.p2) for r in records] == [(1, 0, 0), (1, 750, 0), (3, 5, 750), (5, 0, 0), (8, 300, 0)]
@@ -142,13 +142,13 @@ def test_speeds_are_folded_into_the_legs_and_shown_again() -> None:
     assert list(verdict.items[1:]) == [replace(it, seq=n) for n, it in enumerate(sent, 1)]
 
 
-def test_a_speed_goes_back_to_the_set_one() -> None:
+def test_a_speed_can_return_to_the_default() -> None:
     sent = (speed(7), WP, speed(-2), WP)
     assert [record.p1 for record in kept(*sent)] == [700, 0]
     assert [shown.p2 for shown in verdict_on(*sent).items if shown.command == C.DO_CHANGE_SPEED] == [7, -2]
 
 
-def test_of_a_speed_what_is_lost_is_reported() -> None:
+def test_lost_parts_of_a_speed_are_reported() -> None:
     assert said(speed(0.1, 0, 50), WP) == [
         (1, "p3", 50, 0),
         (1, "p1", 0, 1),
@@ -158,7 +158,7 @@ def test_of_a_speed_what_is_lost_is_reported() -> None:
     assert said(speed(1e30), WP) == [(1, "p2", 1e30, 327.67)]
 
 
-def test_a_jump_goes_where_the_pilot_said_as_the_flight_controller_counts() -> None:
+def test_a_jump_target_is_renumbered_for_the_flight_controller() -> None:
     sent = (WP, speed(5), WP, item(C.NAV_TAKEOFF, at=False, alt_m=5.0), WP, jump(3), WP)
     records = kept(*sent)
     assert records[3] == NavRecord(A.JUMP, p1=2, p2=2)
@@ -166,7 +166,7 @@ def test_a_jump_goes_where_the_pilot_said_as_the_flight_controller_counts() -> N
     assert [shown.p1 for shown in verdict.items if shown.command == C.DO_JUMP] == [3]
 
 
-def test_a_jump_to_what_is_folded_or_dropped_goes_to_what_follows() -> None:
+def test_a_jump_to_a_merged_or_dropped_item_goes_to_the_next() -> None:
     assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=LAST)
     takeoff = item(C.NAV_TAKEOFF, at=False, alt_m=5.0)
     assert kept(takeoff, WP, WP, jump(1))[2].p1 == 1
@@ -198,7 +198,7 @@ def test_a_jump_may_go_forward_on_inav_and_only_back_on_multiwii() -> None:
         (WP, WP, jump(4), item(206)),
     ],
 )
-def test_a_jump_with_which_inav_would_not_arm_or_would_crash_rejects_the_list(items: tuple[MissionItem, ...]) -> None:
+def test_a_jump_that_blocks_arming_or_crashes_inav_rejects_the_list(items: tuple[MissionItem, ...]) -> None:
     verdict = verdict_on(*items)
     assert (verdict.result, verdict.ack) == (Result.REJECTED, MissionResult.INVALID_PARAM1)
     assert verdict.findings[-1].becomes == REJECTED
@@ -211,12 +211,12 @@ def test_a_jump_that_crashes_cannot_even_be_encoded(target: int) -> None:
 
 
 @pytest.mark.parametrize("number", [0, 255, -1])
-def test_home_and_the_held_position_cannot_be_written(number: int) -> None:
+def test_home_and_the_hold_position_cannot_be_written(number: int) -> None:
     with pytest.raises(UnsafeRecord):
         encode_set_wp(number, NavRecord(A.WAYPOINT, 1, 2, 3))
 
 
-def test_a_set_wp_is_the_bytes_of_the_spec() -> None:
+def test_set_wp_has_the_bytes_of_the_specification() -> None:
     spec = bytes.fromhex("244d3c15d101018768111ff99254ff88130000000000000000007e")
     number, record = decode_wp(spec[5:-1]) or (0, NavRecord(0))
     assert encode_set_wp(number, record) == spec
@@ -235,19 +235,19 @@ def test_a_set_wp_is_the_bytes_of_the_spec() -> None:
         ((WP,) * 300, MissionResult.NO_SPACE),
     ],
 )
-def test_lists_that_are_rejected(items: tuple[MissionItem, ...], ack: MissionResult) -> None:
+def test_rejected_lists(items: tuple[MissionItem, ...], ack: MissionResult) -> None:
     verdict = verdict_on(*items)
     assert (verdict.result, verdict.ack, verdict.records) == (Result.REJECTED, ack, ())
 
 
-def test_as_many_records_fit_as_the_flight_controller_says() -> None:
+def test_the_capacity_comes_from_the_flight_controller() -> None:
     assert len(kept(*(WP,) * 120)) == 120
     assert len(kept(*(speed(5), WP, speed(6), WP) * 60)) == 120
     assert check_count(242, INAV) is not None
     assert check_count(180, MULTIWII) is not None
 
 
-def test_home_is_not_a_record_and_may_be_anywhere() -> None:
+def test_home_is_not_a_record() -> None:
     for lat in (0, None, LAT, 2**31 - 1):
         verdict = check_list([replace(HOME, lat_e7=lat), WP], INAV, (11, 22))
         assert (verdict.result, len(verdict.records), verdict.findings) == (Result.ACCEPTED, 1, ())
@@ -256,7 +256,7 @@ def test_home_is_not_a_record_and_may_be_anywhere() -> None:
     assert check_list([item(C.NAV_LAND), WP], INAV).ack is MissionResult.INVALID
 
 
-def test_multiwii_has_an_endless_hold_a_height_on_the_way_home_and_no_speeds() -> None:
+def test_multiwii_has_an_endless_hold_an_rtl_height_and_no_speeds() -> None:
     sent = (WP, item(C.NAV_LOITER_UNLIM), item(C.NAV_RETURN_TO_LAUNCH, at=False, alt_m=30.0))
     verdict = verdict_on(*sent, rules=MULTIWII)
     assert verdict.findings == ()
@@ -266,21 +266,21 @@ def test_multiwii_has_an_endless_hold_a_height_on_the_way_home_and_no_speeds() -
     assert said(replace(WP, frame=0), rules=MULTIWII) == [(1, "frame", 0, 3)]
 
 
-# -- flown otherwise than it reads ---------------------------------------------------------------------------
+# -- flown differently than it reads ---------------------------------------------------------------------------
 
 RTL, RTL_LANDS = (item(C.NAV_RETURN_TO_LAUNCH, at=False, p1=p1) for p1 in (0.0, 1.0))
 
 
 @pytest.mark.parametrize("rules", [INAV, MULTIWII])
-def test_what_comes_behind_the_way_home_is_left_out(rules: NavRules) -> None:
+def test_items_after_an_rtl_are_dropped(rules: NavRules) -> None:
     assert [r.action for r in kept(WP, WP, RTL_LANDS, WP, WP, rules=rules)] == [1, 1, 4]
     assert said(WP, RTL, WP, WP, rules=rules) == [(3, "command", 16, DROPPED), (4, "command", 16, DROPPED)]
-    # A jump leads behind it.
+    # Unless a jump leads there.
     over = (WP, WP, WP, jump(1), WP) if rules is MULTIWII else (WP, jump(4), RTL, WP, WP)
     assert said(*over, rules=rules) == []
 
 
-def test_an_rtl_that_the_last_item_would_make_land_or_hover_rejects_the_list_on_inav() -> None:
+def test_an_rtl_whose_ending_the_last_item_would_change_is_rejected_on_inav() -> None:
     over = (WP, jump(5), WP, RTL_LANDS, WP, WP)
     assert verdict_on(*over).ack is MissionResult.INVALID_PARAM1
     assert [r.p1 for r in kept(*(RTL if it is RTL_LANDS else it for it in over)) if r.action == A.RTH] == [0]
@@ -288,20 +288,20 @@ def test_an_rtl_that_the_last_item_would_make_land_or_hover_rejects_the_list_on_
 
 
 def test_a_jump_to_the_first_record_as_the_last_one_means_hover() -> None:
-    """INAV keeps its target as an index, 0."""
+    """INAV stores the target as an index, 0."""
     assert verdict_on(WP, jump(5), WP, RTL, WP, WP, jump(1)).result is Result.ACCEPTED
     assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, jump(1)).result is Result.REJECTED
     assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, WP, jump(5)).result is Result.ACCEPTED
 
 
-def test_an_rtl_alone_in_front_leaves_nothing_to_fly() -> None:
+def test_an_rtl_as_first_item_leaves_nothing_to_fly() -> None:
     assert verdict_on(RTL, WP, WP).ack is MissionResult.INVALID
 
 
 @pytest.mark.parametrize(
     "last", [item(C.NAV_ROI), item(C.DO_SET_ROI_NONE, at=False), item(C.CONDITION_YAW, at=False, p1=90)]
 )
-def test_multiwii_overlooks_the_end_on_a_turn_so_it_is_left_out_there(last: MissionItem) -> None:
+def test_trailing_turns_are_dropped_on_multiwii(last: MissionItem) -> None:
     assert kept(WP, WP, last, rules=MULTIWII) == kept(WP, WP, rules=MULTIWII)
     assert [(f.seq, f.becomes, f.news) for f in verdict_on(WP, WP, last, rules=MULTIWII).findings] == [
         (3, DROPPED, News.WARNING)
@@ -309,7 +309,7 @@ def test_multiwii_overlooks_the_end_on_a_turn_so_it_is_left_out_there(last: Miss
     assert len(kept(WP, WP, last)) == 3
 
 
-def test_a_jump_within_a_jump_is_rejected_on_multiwii_and_one_behind_it_is_not() -> None:
+def test_nested_jumps_are_rejected_on_multiwii_but_successive_ones_are_not() -> None:
     assert verdict_on(WP, WP, jump(1), WP, jump(1), rules=MULTIWII).ack is MissionResult.INVALID_PARAM1
     assert len(kept(WP, WP, jump(1), WP, WP, jump(4), rules=MULTIWII)) == 6
     assert len(kept(WP, WP, WP, jump(1), WP, WP, jump(1))) == 7
@@ -323,14 +323,14 @@ def test_multiwii_holds_at_most_65_s(seconds: float, held: int) -> None:
         assert [f.news for f in verdict.findings] == ([] if seconds == held else [News.WARNING])
 
 
-def test_a_height_that_is_not_used_may_be_anything() -> None:
+def test_an_unused_height_may_have_any_value() -> None:
     for unused in (item(C.NAV_ROI, alt_m=math.nan), replace(RTL, alt_m=math.nan)):
         assert len(kept(WP, unused, *((WP,) if unused.command == C.NAV_ROI else ()))) >= 2
         assert said(WP, WP, unused) == []
     assert kept(WP, replace(RTL, alt_m=math.nan), rules=MULTIWII)[1].alt_cm == 0
 
 
-def test_what_is_not_used_is_no_news_unless_something_is_lost() -> None:
+def test_unused_fields_are_reported_only_if_something_is_lost() -> None:
     def news(sent: MissionItem) -> list[News]:
         return [finding.news for finding in verdict_on(WP, sent, WP).findings]
 
@@ -343,7 +343,7 @@ def test_what_is_not_used_is_no_news_unless_something_is_lost() -> None:
     assert news(item(C.NAV_LOITER_TURNS, p1=3)) == [News.NOTICE, News.WARNING]
 
 
-def test_legs_after_a_jump_are_flown_at_their_own_speeds_which_is_reported_and_shown() -> None:
+def test_legs_after_a_jump_keep_their_own_speeds_which_is_reported() -> None:
     sent = (WP, WP, speed(5), WP, WP, jump(1))
     verdict = verdict_on(*sent)
     assert [(f.seq, f.was, f.becomes, f.news) for f in verdict.findings] == [(6, 1, 1, News.WARNING)]
@@ -355,7 +355,7 @@ def test_legs_after_a_jump_are_flown_at_their_own_speeds_which_is_reported_and_s
     assert said(speed(5), WP, WP, WP, jump(2)) == []
 
 
-def test_what_others_wrote_is_shown_whatever_it_is() -> None:
+def test_any_record_of_another_planner_is_shown() -> None:
     records = [
         NavRecord(99, 1, 2, 3),
         NavRecord(A.JUMP, p1=77),
@@ -418,7 +418,7 @@ def test_nothing_raises_and_nothing_dangerous_is_kept(sent: list[MissionItem], r
 
 @given(lists, profiles, st.booleans(), st.booleans())
 @settings(max_examples=MANY, deadline=None)
-def test_what_is_read_and_written_again_is_the_same_without_a_finding(
+def test_a_list_that_was_read_is_written_back_unchanged(
     sent: list[MissionItem], rules: NavRules, remembered: bool, as_float: bool
 ) -> None:
     verdict = check_list([HOME, *sent], rules)
@@ -428,11 +428,11 @@ def test_what_is_read_and_written_again_is_the_same_without_a_finding(
     if remembered:
         assert read == verdict.items
     if as_float:
-        # As the wire has it: heights and parameters in single precision, places in degrees * 1e7.
+        # As sent: heights and parameters in single precision, positions in degrees * 1e7.
         read = tuple(through_the_wire(shown) for shown in read)
     again = check_list(read, rules)
     assert again.result is Result.ACCEPTED
-    # A dangerous item is reported every time.
+    # Dangerous items are reported every time.
     assert [finding for finding in again.findings if finding.was != finding.becomes] == []
     assert again.records == verdict.records
     if remembered and not as_float:
@@ -451,8 +451,8 @@ def through_the_wire(shown: MissionItem) -> MissionItem:
 
 @given(st.lists(flyable, min_size=1, max_size=10))
 @settings(max_examples=MANY, deadline=None)
-def test_what_differs_was_told(sent: list[MissionItem]) -> None:
-    """Without findings every item is read as it was sent, but for NaN, equal frames, and speeds' places."""
+def test_every_difference_is_reported(sent: list[MissionItem]) -> None:
+    """Without findings every item reads back as sent, except NaN, equivalent frames, and where speed items are."""
     verdict = check_list([HOME, *sent], INAV)
     if verdict.result is not Result.ACCEPTED or verdict.findings:
         return
@@ -490,10 +490,8 @@ foreign_turns = st.one_of(
 
 @given(st.lists(st.one_of(foreign_legs, foreign_turns), max_size=8), foreign_legs)
 @settings(max_examples=MANY, deadline=None)
-def test_another_planners_list_that_is_read_and_written_again_is_the_same(
-    before: list[NavRecord], last: NavRecord
-) -> None:
-    """User actions, legs that fly home and the ground elevation at a landing are shown in no item, but kept."""
+def test_another_planners_list_is_written_back_unchanged(before: list[NavRecord], last: NavRecord) -> None:
+    """User actions, legs that fly home and a landing's ground elevation appear in no item but are kept."""
     held = (*before, replace(last, flag=LAST))
     again = check_list(items_from_records(held, home_item((LAT, LON))), NavRules(inav_profile(), held))
     assert (again.result, again.findings, again.records) == (Result.ACCEPTED, (), held)
@@ -509,7 +507,7 @@ def test_another_planners_list_that_is_read_and_written_again_is_the_same(
         (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=1), ""),
     ],
 )
-def test_what_a_changed_leg_loses_is_reported(record: NavRecord, lost: str) -> None:
+def test_losses_of_a_changed_leg_are_reported(record: NavRecord, lost: str) -> None:
     held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
     items = list(items_from_records(held, home_item((LAT, LON))))
     items[2] = replace(items[2], alt_m=40.0)
@@ -521,7 +519,7 @@ def test_what_a_changed_leg_loses_is_reported(record: NavRecord, lost: str) -> N
 
 
 @pytest.mark.parametrize(("p3", "copy"), [(0, "a copy"), (2, "a copy without its user actions (2)")])
-def test_what_the_copy_of_an_erased_mission_lacks_is_reported(p3: int, copy: str) -> None:
+def test_losses_in_the_copy_of_an_erased_mission_are_reported(p3: int, copy: str) -> None:
     leg = NavRecord(A.WAYPOINT, LAT, LON, 2000, p3=p3)
     other = (leg, replace(leg, flag=LAST))
     home, *legs = items_from_records([NavRecord(A.WAYPOINT, LAT, LON, 3000)] * 119, home_item((LAT, LON)))

@@ -63,7 +63,7 @@ tame_items = st.builds(
 
 @st.composite
 def plausible_lists(draw: st.DrawFn) -> list[MissionItem]:
-    """A home, something to begin with, tame items, something to end with: mostly accepted."""
+    """Lists of home, a first item, simple items and a last item, most of which are accepted."""
     home = replace(draw(tame_items), command=16, lat_e7=1, lon_e7=2, alt_m=draw(st.sampled_from([0.0, 131.0, 584.3])))
     middle = draw(st.lists(tame_items, max_size=8))
     ends = [replace(draw(tame_items), command=command) for command in draw(st.sampled_from(ENDS))]
@@ -82,7 +82,7 @@ homes = st.sampled_from([None, (123, -456)])
 
 @settings(max_examples=600)
 @given(items=lists, profile=profiles, home=homes)
-def test_the_verdict_is_the_documents(
+def test_the_verdict_matches_the_document(
     items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
 ) -> None:
     verdict = check_list(items, profile, home)
@@ -100,7 +100,7 @@ def test_the_verdict_is_the_documents(
 
 @settings(max_examples=300)
 @given(items=plausible_lists(), profile=profiles, home=homes)
-def test_what_reads_back_can_be_sent_again_and_stays_as_it_is(
+def test_a_list_that_reads_back_can_be_sent_again_unchanged(
     items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
 ) -> None:
     verdict = check_list(items, profile, home)
@@ -141,7 +141,7 @@ def given_value(item: MissionItem, field: str) -> float:
 
 @settings(max_examples=200)
 @given(items=lists.filter(lambda items: len(items) > 1))
-def test_item_by_item_says_the_same_as_the_whole_list(items: list[MissionItem]) -> None:
+def test_item_by_item_and_whole_list_verdicts_agree(items: list[MissionItem]) -> None:
     profile = HarakiriRules()
     check = HarakiriCheck(profile, len(items))
     answers = [check.take(item) for item in items]
@@ -164,7 +164,7 @@ def test_findings_are_one_line_each(items: list[MissionItem], profile: HarakiriR
     data=st.lists(st.binary(min_size=16, max_size=16), max_size=5),
     rois=st.dictionaries(st.integers(0, 5), st.just(201)),
 )
-def test_whatever_the_flight_controller_holds_can_be_read_back(data: list[bytes], rois: dict[int, int]) -> None:
+def test_any_stored_records_can_be_read_back(data: list[bytes], rois: dict[int, int]) -> None:
     records = unpack_records(b"".join(data))
     items = items_from_records(records, rois)
     assert [item.seq for item in items] == list(range(len(records)))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Debian package: its contents, and its life on a machine without a network, from installation to purge.
+"""The Debian package: its contents, and installation to purge on a machine without a network.
 
-It is built once, for this machine and two Pythons, because pip takes its time. `make deb` builds it for all.
+It is built once, for this machine and two Pythons, because pip is slow. `make deb` builds it for all.
 """
 
 import os
@@ -25,13 +25,13 @@ _ELF_MACHINES = {"amd64": 62, "arm64": 183, "armhf": 40}
 #: `dpkg --print-architecture` of this machine must be one of them.
 _HOST = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
 _ASK_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
-#: The bare root's own, and another.
+#: The bare root's version, and another.
 _OWN = subprocess.run(
     ["/usr/bin/python3", "-c", _ASK_VERSION], capture_output=True, text=True, check=True
 ).stdout.strip()
 _PYTHONS = (_OWN, next(python for python in PYTHONS if python != _OWN))
 _WHEEL_MACHINES = {"arm64": ("aarch64",), "armhf": ("armv7l", "aarch64")}
-#: Starts the daemon in the background as the unit does, with the folders that systemd would make.
+#: Starts the daemon in the background like the unit, with the folders that systemd would create.
 _START = """
 mkdir -p /var/lib/naze-bridge /run/naze-bridge
 export STATE_DIRECTORY=/var/lib/naze-bridge RUNTIME_DIRECTORY=/run/naze-bridge
@@ -45,7 +45,7 @@ _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    # dpkg-deb's own choice would take more time than all the rest.
+    # dpkg-deb's default would take longer than everything else.
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DPKG_DEB_COMPRESSOR_LEVEL", "0")
         return build(_HOST, _PYTHONS, tmp_path_factory.mktemp("package"))
@@ -67,7 +67,7 @@ def _archive(package: Path) -> tarfile.TarFile:
     return tarfile.open(fileobj=BytesIO(data))
 
 
-def test_what_is_in_it(package: Path) -> None:
+def test_its_contents(package: Path) -> None:
     files = files_of(package)
     for expected in (
         *(f"/usr/lib/naze-bridge/lib/python{python}/site-packages/{_SCHEMA}" for python in _PYTHONS),
@@ -88,9 +88,9 @@ def test_what_is_in_it(package: Path) -> None:
     assert f"Architecture: {_HOST}\n" in described
 
 
-def test_its_libraries_are_for_its_machine_and_for_both_pythons(package: Path) -> None:
+def test_its_libraries_are_for_its_architecture_and_both_pythons(package: Path) -> None:
     with _archive(package) as archive:
-        # A file that both Pythons share is a hard link, which has no content of its own.
+        # A file shared by both Pythons is a hard link without contents.
         libraries = [each for each in archive if each.name.endswith(".so") and each.isfile() and not each.islnk()]
         machines = set()
         for member in libraries:
@@ -110,7 +110,7 @@ def test_every_library_has_a_pinned_wheel(architecture: str, python: str, tmp_pa
     assert [wheel for wheel in (tmp_path / "wheels").iterdir() if not wheel.stem.endswith(machines)] == []
 
 
-def test_its_pages_link_only_to_what_is_there(package: Path) -> None:
+def test_its_pages_have_no_broken_links(package: Path) -> None:
     files = files_of(package)
     with _archive(package) as archive:
         for member in archive:
@@ -130,12 +130,12 @@ def test_no_trace_of_the_machine_that_built_it(package: Path) -> None:
             assert content is None or str(_REPOSITORY).encode() not in content.read(), member.name
 
 
-def test_in_a_bare_root_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
+def test_it_is_installed_used_upgraded_removed_and_purged(root: BareRoot) -> None:
     assert "sudo naze-bridge setup" in root.run("dpkg --install /root/naze-bridge.deb")
     assert root.run("id --name --user naze-bridge") == "naze-bridge\n"
-    # Enabled on request only.
+    # Not enabled by default.
     assert "naze-bridge" not in root.run("ls /etc/systemd/system/multi-user.target.wants")
-    # Its byte code is there: the service could not write it.
+    # The byte code is installed, because the service cannot write it.
     assert root.run("find /usr/lib/naze-bridge -name 'daemon.cpython-*.pyc'")
     root.run("sed -i 's/^#fc = .*/fc = \"sim:\"/' /etc/naze-bridge/config.toml")
     root.put(_MISSION, "/root/naze-field.waypoints")
@@ -148,7 +148,7 @@ def test_in_a_bare_root_it_is_installed_used_upgraded_removed_and_purged(root: B
     assert "VERIFIED" in root.run("naze-bridge missions list")
     root.run(_STOP)
 
-    # An upgrade asks nothing: what was changed in the configuration stays, and so do the missions.
+    # An upgrade asks no questions and keeps the changed configuration and the missions.
     root.run("dpkg --install /root/naze-bridge.deb")
     assert 'fc = "sim:"' in root.run("cat /etc/naze-bridge/config.toml")
     root.run("ln -s /usr/lib/systemd/system/naze-bridge.service /etc/systemd/system/multi-user.target.wants/")

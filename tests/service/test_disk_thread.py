@@ -6,7 +6,7 @@ import threading
 from service.machine.threads import DiskThread
 
 
-def test_work_is_done_in_order_and_waited_for() -> None:
+def test_work_is_done_in_order_before_the_end() -> None:
     done: list[int] = []
     thread = DiskThread("test")
     for number in range(100):
@@ -15,7 +15,7 @@ def test_work_is_done_in_order_and_waited_for() -> None:
     assert done == list(range(100))
 
 
-def test_a_disk_that_hangs_is_not_waited_for() -> None:
+def test_the_end_does_not_wait_for_a_hung_disk() -> None:
     hangs = threading.Event()
     thread = DiskThread("test")
     thread.submit(hangs.wait)

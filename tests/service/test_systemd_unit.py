@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The unit's exposure, and the reasons in it for each remaining permission."""
+"""The unit's exposure, and its comments on each remaining permission."""
 
 import shutil
 import subprocess
 from pathlib import Path
 
 _UNIT = Path(__file__).resolve().parents[2] / "systemd" / "naze-bridge.service"
-#: Exposure that `systemd-analyze security` may find, in tenths.
+#: Maximum exposure found by `systemd-analyze security`, in tenths.
 _BAR = 15
-#: What keeps it below. Where there is no systemd-analyze these words stand for it.
+#: The settings needed for it, which are also checked without systemd-analyze.
 _SHUT = """DynamicUser=yes
 CapabilityBoundingSet=
 AmbientCapabilities=
@@ -50,12 +50,12 @@ def test_its_exposure() -> None:
     assert [word for word in _SHUT.splitlines() if word not in settings()] == []
 
 
-def test_it_opens_serial_ports_and_no_other_device() -> None:
+def test_it_may_open_only_serial_ports() -> None:
     assert {line.removeprefix("DeviceAllow=") for line in settings() if line.startswith("DeviceAllow=")} == _SERIAL
 
 
 def test_each_permission_has_its_reason() -> None:
-    """What the comments call "not" is what systemd-analyze finds open."""
+    """The comments name every permission that systemd-analyze finds open."""
     comments = " ".join(line[1:] for line in _UNIT.read_text().splitlines() if line.startswith("#"))
     for door in (
         "PrivateDevices=",
@@ -69,5 +69,5 @@ def test_each_permission_has_its_reason() -> None:
         assert door in comments
 
 
-def test_systemd_knows_when_it_runs_and_that_it_lives() -> None:
+def test_readiness_and_watchdog_are_configured() -> None:
     assert {"Type=notify", "WatchdogSec=10", "Restart=always", "StartLimitIntervalSec=0"} <= set(settings())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The compact encoding: nothing is lost in it, numbers are never given twice, and a new field changes none."""
+"""The compact encoding is lossless, its numbers are unique, and a new field changes none."""
 
 import json
 from contextlib import suppress
@@ -31,12 +31,12 @@ def payloads(schema: dict[str, Any]) -> st.SearchStrategy[Any]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_payload_comes_back_as_it_was(name: str) -> None:
+def test_a_payload_is_decoded_unchanged(name: str) -> None:
     @given(payloads(compact.read_schema(name)))
-    def comes_back(payload: Any) -> None:
+    def round_trip(payload: Any) -> None:
         assert compact.loads(name, compact.dumps(name, payload)) == payload
 
-    comes_back()
+    round_trip()
 
 
 def objects(schema: Any) -> list[dict[str, Any]]:
@@ -49,7 +49,7 @@ def objects(schema: Any) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_field_has_a_number_of_its_own(name: str) -> None:
+def test_each_field_has_a_unique_number(name: str) -> None:
     for properties in objects(json.loads((SCHEMAS / f"{name}.json").read_text())):
         numbers = [each[CBOR_KEY] for each in properties.values()]
         assert len(set(numbers)) == len(numbers)
@@ -67,7 +67,7 @@ def test_a_new_field_changes_no_number() -> None:
     assert first in after
 
 
-def test_an_unknown_number_is_left_alone() -> None:
+def test_an_unknown_number_is_kept() -> None:
     assert compact.loads("battery", cbor2.dumps({99: "news", 3: 11.1})) == {"voltage_v": 11.1}
 
 
@@ -78,7 +78,7 @@ def test_garbage_is_a_value_error(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "nothing", "../keys", "/etc/passwd", "state/../state"])
-def test_a_schema_that_there_is_not(name: str) -> None:
+def test_a_missing_schema(name: str) -> None:
     with pytest.raises(ValueError, match="no schema"):
         compact.read_schema(name)
     assert Path(SCHEMAS).is_dir()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Telemetry logs as the past of `history?_time=[..]`."""
+"""`history?_time=[..]` from telemetry logs."""
 
 import os
 from datetime import UTC, datetime
@@ -31,7 +31,7 @@ def position(number: int) -> Message:
 
 
 def write(folder: Path, begun_s: float, *records: tuple[float, Message], compid: int = 1, flight: bool = False) -> Path:
-    """A log as the recorder writes it: named after its beginning, last changed at its end."""
+    """A log as written by the recorder: named after its beginning, modified at its end."""
     folder.mkdir(exist_ok=True)
     name = datetime.fromtimestamp(begun_s, UTC).strftime("%Y-%m-%d %H-%M-%S") + " flight" * flight + ".tlog"
     codec = messages.MAVLink(None, srcSystem=1, srcComponent=compid)
@@ -43,7 +43,7 @@ def write(folder: Path, begun_s: float, *records: tuple[float, Message], compid:
 
 
 def test_texts_and_arming_in_order(tmp_path: Path) -> None:
-    """The file that is full in flight continues in the next one: the craft is not armed twice."""
+    """The log continues in another file during the flight; arming is reported once."""
     write(tmp_path, NOON_S, (NOON_S, heartbeat(armed=True)), (NOON_S + 5, text("Mission: 12 items")), flight=True)
     write(tmp_path, NOON_S + 6, (NOON_S + 6, heartbeat(armed=True)), (NOON_S + 9, heartbeat(armed=False)))
     write(tmp_path, NOON_S + 600, (NOON_S + 600, heartbeat(armed=True)))
@@ -57,7 +57,7 @@ def test_texts_and_arming_in_order(tmp_path: Path) -> None:
     assert (past.from_s, past.positions) == (NOON_S, [])
 
 
-def test_only_the_range(tmp_path: Path) -> None:
+def test_only_the_requested_range(tmp_path: Path) -> None:
     for hour in range(4):
         at_s = NOON_S + 3600 * hour
         write(tmp_path, at_s, *((at_s + n, text(f"{hour}.{n}")) for n in range(3)))
@@ -67,7 +67,7 @@ def test_only_the_range(tmp_path: Path) -> None:
 
 
 def test_a_part_of_a_long_log(tmp_path: Path) -> None:
-    """It is not read from its beginning; whether the craft was armed before the range is known anyway."""
+    """It is not read from its beginning, but the armed state at the start of the range is known."""
     flight = [(NOON_S + second, heartbeat(armed=1000 <= second < 2000)) for second in range(3600)]
     path = write(tmp_path, NOON_S, *flight)
     with path.open("ab") as file:
@@ -83,8 +83,8 @@ def test_a_part_of_a_long_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("most", [1, 7, 100, 1000])
-def test_positions_are_thinned_out_evenly(tmp_path: Path, most: int) -> None:
-    """At most one a second, however often the flight controller reports it."""
+def test_positions_are_thinned_evenly(tmp_path: Path, most: int) -> None:
+    """To at most one a second."""
     flown = [(NOON_S + 0.2 * number, position(number)) for number in range(900)]
     write(tmp_path, NOON_S, *flown[:600])
     write(tmp_path, NOON_S + 120, *flown[600:])
@@ -101,7 +101,7 @@ def test_positions_are_thinned_out_evenly(tmp_path: Path, most: int) -> None:
     assert max(gaps, default=0) <= 2 * max(180 / most, 1) + 0.5
 
 
-def test_other_senders_files_and_damage(tmp_path: Path) -> None:
+def test_other_senders_other_files_and_damage(tmp_path: Path) -> None:
     assert read_logged_past(tmp_path / "none", EVER, 9).from_s is None
     write(tmp_path, NOON_S, (NOON_S, text("of a station")), (NOON_S, heartbeat(armed=True)), compid=190)
     path = write(tmp_path, NOON_S + 60, (NOON_S + 60, text("whole")), (NOON_S + 61, text("cut off")))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The overview of a vehicle fits 60 bytes, and has only what was heard lately."""
+"""The overview of a vehicle fits 60 bytes and has only recent values."""
 
 from bridge.model.flight_mode import FlightMode
 from bridge.model.vehicle_groups import Battery, Group, Link, MissionIdentity, Position, Status, VehicleReport
@@ -19,7 +19,7 @@ def state_of(age_s: float | None) -> VehicleReport:
     return VehicleReport(link=Link(state="MSP"), mission=MissionIdentity(146, "deadbeef"), **groups)
 
 
-def test_the_longest_one_of_a_day_fits() -> None:
+def test_the_longest_overview_of_a_day_fits() -> None:
     payloads = Payloads(PayloadEncoding.JSON, lambda: 1_777_636_800.123)
     overview = overview_of(plain(state_of(1.0)))
     for _ in range(86_400 // 10):
@@ -31,7 +31,7 @@ def test_the_longest_one_of_a_day_fits() -> None:
     assert (read["height_m"], read["mission_count"], read["mission_checksum"]) == (-1200, 146, 0xDEADBEEF)
 
 
-def test_what_was_not_heard_lately_is_left_out() -> None:
+def test_old_values_are_omitted() -> None:
     for age_s in (None, 11.0):
         overview = overview_of(plain(state_of(age_s)))
         assert (overview.armed, overview.mode, overview.battery_cv, overview.lat_e7) == (None, None, None, None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often samples go out: limits, changes that cannot wait, requests that end by themselves."""
+"""Publishing rates: limits, urgent changes, and requests that expire."""
 
 import pytest
 from hypothesis import given
@@ -14,7 +14,7 @@ GAPS_S = st.lists(st.floats(0.01, 3.0), min_size=2, max_size=300)
 
 
 def sent_at(rates: SampleRates, times: list[float]) -> list[float]:
-    """When a craft that rolls on and on is reported."""
+    """The times at which the attitude of a rolling craft is published."""
     return [now for now in times if rates.admits(Group.ATTITUDE, Attitude(now * 10), now, gathered=True)]
 
 
@@ -26,14 +26,14 @@ def times_of(gaps_s: list[float]) -> list[float]:
 
 
 @given(GAPS_S, st.sampled_from([0.2, 1.0, 4.0, 10.0]))
-def test_no_more_than_the_limit_goes_out(gaps_s: list[float], limit_hz: float) -> None:
+def test_the_limit_is_not_exceeded(gaps_s: list[float], limit_hz: float) -> None:
     times = times_of(gaps_s)
     sent = sent_at(SampleRates(ZenohProfile.FULL, {"attitude": limit_hz}), times)
     assert sent[0] == times[0]
     assert len(sent) <= 2 + (times[-1] - times[0]) * limit_hz
 
 
-def test_a_limit_is_reached_from_a_rate_that_it_does_not_divide() -> None:
+def test_a_limit_is_reached_from_a_rate_that_is_no_multiple_of_it() -> None:
     sent = sent_at(SampleRates(ZenohProfile.FULL, {"attitude": 4.0}), [number / 10 for number in range(1000)])
     assert 395 <= len(sent) <= 401
 
@@ -60,7 +60,7 @@ def test_arming_does_not_wait_on_a_metered_link() -> None:
     assert rates.admits_state(("disarmed", None), 2.2)
 
 
-def test_rare_groups_go_out_together() -> None:
+def test_infrequent_groups_are_sent_together() -> None:
     rates = SampleRates(ZenohProfile.METERED, {})
     flying = {Group.ATTITUDE: Attitude(1.0), Group.POSITION: Position(height_m=1.0)}
     later = {Group.ATTITUDE: Attitude(9.0), Group.POSITION: Position(height_m=9.0)}
@@ -82,9 +82,7 @@ def test_rare_groups_go_out_together() -> None:
         (Group.BATTERY, Battery(11.1), Battery(11.2), Battery(10.8)),
     ],
 )
-def test_a_metered_link_carries_changes(
-    group: Group, first: object, nearly_the_same: object, different: object
-) -> None:
+def test_a_metered_link_sends_changes(group: Group, first: object, nearly_the_same: object, different: object) -> None:
     rates = SampleRates(ZenohProfile.METERED, {})
     assert rates.admits(group, first, 30.0)
     same = [now for now in range(31, 80) if rates.admits(group, nearly_the_same, now, gathered=True)]
@@ -92,8 +90,8 @@ def test_a_metered_link_carries_changes(
     assert [now for now in range(80, 90) if rates.admits(group, different, now, gathered=True)] == [80]
 
 
-def test_every_field_that_counts_exists() -> None:
-    """A renamed field would no longer count."""
+def test_every_field_of_an_urgent_change_exists() -> None:
+    """A renamed field would silently lose its effect."""
     for group in Group:
         sample = getattr(vehicle_groups, group.value.capitalize())(**({"state": "MSP"} if group is Group.LINK else {}))
         rates = SampleRates(ZenohProfile.METERED, {})
@@ -117,6 +115,6 @@ def test_a_request_raises_a_rate_for_a_while() -> None:
 
 
 @pytest.mark.parametrize("rates", [{"altitude": 1}, {"rc": -1}, {"rc": True}, {"rc": "fast"}, {"rc": 1e9}])
-def test_rates_that_cannot_be_used(rates: dict[str, object]) -> None:
+def test_invalid_rates(rates: dict[str, object]) -> None:
     with pytest.raises(ZenohSettingsError, match=r"zenoh\.rates"):
         check_rates(rates)

@@ -26,6 +26,6 @@ def test_ranges(text: str, start_s: float, end_s: float) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "now()", "[now()]", "[yesterday..]", "[now(-1y)..]", "[..];[..]", "[" * 1000])
-def test_what_is_not_a_range_is_refused(text: str) -> None:
+def test_invalid_ranges_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"write one like \[now"):
         parse_time_range(text, NOW_S)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The time of samples: by the flight controller's GPS, by NTP, or as the Pi has it."""
+"""The time of samples: from the flight controller's GPS, from NTP, or from the Pi's clock."""
 
 import time
 from pathlib import Path
@@ -16,7 +16,7 @@ NOW = 1000.0
 
 
 def heard(fix: Fix, wrong_by_s: float, age_s: float = 1.0) -> Vehicle:
-    """A vehicle whose GPS time, `age_s` ago, differed from the Pi's by so much."""
+    """A vehicle whose GPS time differed from the Pi's by `wrong_by_s`, received `age_s` ago."""
     vehicle = Vehicle()
     vehicle.hear(GpsFix(NOW - age_s, Source.MAVLINK, fix, 9))
     vehicle.hear(GpsTime(NOW - age_s, Source.MAVLINK, time.time() - age_s + wrong_by_s))
@@ -29,7 +29,7 @@ def test_a_3d_fix_corrects_a_wrong_clock(tmp_path: Path, wrong_by_s: float) -> N
     assert clock.source(heard(Fix.THREE_D, wrong_by_s)) == "gps"
     corrected_by_s = clock.unix_s() - time.time()
     if abs(wrong_by_s) < 0.5:
-        assert corrected_by_s <= 0.001  # the Pi's own time
+        assert corrected_by_s <= 0.001  # the Pi's clock
     else:
         assert corrected_by_s == pytest.approx(wrong_by_s, abs=5.0)
     assert clock.source(Vehicle()) == "pi"
@@ -39,15 +39,15 @@ def test_a_3d_fix_corrects_a_wrong_clock(tmp_path: Path, wrong_by_s: float) -> N
 
 
 @pytest.mark.parametrize(("fix", "age_s"), [(Fix.TWO_D, 1.0), (Fix.NO_FIX, 1.0), (Fix.THREE_D, 9.0)])
-def test_no_fix_and_an_old_one_tell_no_time(tmp_path: Path, fix: Fix, age_s: float) -> None:
+def test_without_a_recent_fix_there_is_no_gps_time(tmp_path: Path, fix: Fix, age_s: float) -> None:
     clock = SampleClock(lambda: NOW, tmp_path / "synchronized")
     assert clock.source(heard(fix, 7200.0, age_s)) == "pi"
     assert clock.unix_s() <= time.time() + 0.001
 
 
 @pytest.mark.parametrize(("unix_s", "known"), [(1_777_636_800.25, 1_777_636_800.25), (0.0, None), (412.0, None)])
-def test_an_autopilot_sends_its_time(unix_s: float, known: float | None) -> None:
-    """ArduPilot counts from its start until it has the time."""
+def test_the_time_of_a_mavlink_autopilot(unix_s: float, known: float | None) -> None:
+    """Until it has the time, ArduPilot counts from its start."""
     vehicle, codec = Vehicle(), m.MAVLink(None, srcSystem=1, srcComponent=1)
     telemetry = MavlinkTelemetry(vehicle, is_harakiri=False)
     said = m.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), m.MAVLink_system_time_message(round(unix_s * 1e6), 9)

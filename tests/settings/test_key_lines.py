@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The line of each key, found in one pass for any file."""
+"""The line of each key is found in one pass over any file."""
 
 import tomllib
 
@@ -48,7 +48,7 @@ def test_other_ways_to_write_a_table() -> None:
     }
 
 
-def test_a_list_that_ends_and_ends_costs_only_the_lines_after_it() -> None:
+def test_an_unbalanced_list_affects_only_the_lines_after_it() -> None:
     text = "sysid = 1\ngcs = [" + "[],\n" * 20_000 + "]\nfc = 'sim:'\n"
     assert tomllib.loads(text)
     assert key_lines(text) == {("sysid",): 1}

@@ -73,7 +73,7 @@ def test_flags_override_the_environment_which_overrides_files(folder: Path, monk
         ("NAZE_BRIDGE_SYSIDD", "1", "NAZE_BRIDGE_SYSIDD: this is not a setting; did you mean 'NAZE_BRIDGE_SYSID'?"),
     ],
 )
-def test_a_wrong_variable_is_named(
+def test_an_invalid_variable_is_named(
     folder: Path, monkeypatch: pytest.MonkeyPatch, variable: str, text: str, words: str
 ) -> None:
     monkeypatch.setenv(variable, text)
@@ -81,7 +81,7 @@ def test_a_wrong_variable_is_named(
     assert words in found
 
 
-def test_all_that_is_wrong_is_reported_at_once_with_its_line(folder: Path) -> None:
+def test_all_errors_are_reported_at_once_with_their_lines(folder: Path) -> None:
     text = """
 # a comment
 sysid = 300
@@ -106,7 +106,7 @@ encodings = "json"
     assert [line[: len(words)] for line, words in zip(told, wanted, strict=True)] == wanted
 
 
-def test_a_table_that_is_none(folder: Path) -> None:
+def test_a_value_in_place_of_a_table(folder: Path) -> None:
     assert problems(folder, "zenoh = true") == ["naze.toml:1: zenoh must be a table: begin it with [zenoh]"]
 
 
@@ -120,7 +120,7 @@ def test_a_table_that_is_none(folder: Path) -> None:
         ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is listed 2 times: remove the others"),
     ],
 )
-def test_two_users_of_one_port(folder: Path, text: str, words: str) -> None:
+def test_one_port_used_twice(folder: Path, text: str, words: str) -> None:
     (found,) = problems(folder, text)
     assert found.startswith("naze.toml:1: ")
     assert words in found
@@ -135,7 +135,7 @@ def test_two_users_of_one_port(folder: Path, text: str, words: str) -> None:
         'gcs = ["udpout:127.0.0.1:14550", "udpin:0.0.0.0:14550"]',
     ],
 )
-def test_ports_that_are_different_ones(folder: Path, text: str) -> None:
+def test_ports_that_do_not_conflict(folder: Path, text: str) -> None:
     assert len(load(folder, text).gcs) == 2
 
 
@@ -148,7 +148,7 @@ def test_ports_that_are_different_ones(folder: Path, text: str) -> None:
         ("/dev/ttyUSB0,57600", 'record_uart = "/dev/ttyUSB0"', "is the flight controller's port: name a file"),
     ],
 )
-def test_a_flight_controller_that_is_something_else(folder: Path, fc: str, more: str, words: str) -> None:
+def test_a_flight_controller_port_that_is_used_otherwise(folder: Path, fc: str, more: str, words: str) -> None:
     config = folder / "naze.toml"
     config.write_text(f'fc = "{fc}"\n{more}')
     with pytest.raises(SettingsError) as caught:
@@ -157,7 +157,7 @@ def test_a_flight_controller_that_is_something_else(folder: Path, fc: str, more:
     assert words in str(problem)
 
 
-def test_another_flight_controller_on_a_port_of_that_number(folder: Path) -> None:
+def test_the_same_port_number_on_another_host(folder: Path) -> None:
     config = folder / "naze.toml"
     config.write_text('fc = "tcp:192.168.4.9:5760"\ngcs = ["tcpin:0.0.0.0:5760"]')
     assert str(load_settings(config, None, (), folder).fc) == "tcp:192.168.4.9:5760"
@@ -172,7 +172,7 @@ def test_another_flight_controller_on_a_port_of_that_number(folder: Path) -> Non
         ("x" * 100_000 + " = 1", "xxx' is not a setting"),
     ],
 )
-def test_odd_values_make_one_short_sentence(folder: Path, text: str, words: str) -> None:
+def test_odd_values_give_one_short_sentence(folder: Path, text: str, words: str) -> None:
     (found,) = problems(folder, text)
     assert words in found
     assert len(found) < 520
@@ -193,7 +193,7 @@ def test_a_file_that_is_not_a_configuration(folder: Path, content: bytes, words:
     assert found.startswith(f"conf.d/x.toml: {words}")
 
 
-def test_what_is_not_a_file(folder: Path) -> None:
+def test_pipes_folders_and_broken_links_in_place_of_files(folder: Path) -> None:
     os.mkfifo(folder / "conf.d" / "a.toml")
     (folder / "conf.d" / "b.toml").mkdir()
     (folder / "conf.d" / "c.toml").symlink_to("/dev/null")
@@ -205,7 +205,7 @@ def test_what_is_not_a_file(folder: Path) -> None:
     ]
 
 
-def test_drop_ins_that_cannot_be_listed_are_not_left_out(folder: Path) -> None:
+def test_unlistable_drop_ins_are_an_error(folder: Path) -> None:
     (folder / "conf.d").rmdir()
     assert load(folder, "sysid = 2").sysid == 2
     (folder / "conf.d").write_text("")
@@ -219,7 +219,7 @@ def test_the_file_of_another_program(folder: Path) -> None:
     assert told[20] == "naze.toml: 4980 more are not settings: is this naze-bridge's file?"
 
 
-def test_check_config_says_that_it_is_well_or_what_is_not(folder: Path) -> None:
+def test_check_config_reports_success_or_errors(folder: Path) -> None:
     config = folder / "naze.toml"
     config.write_text('fc = "/dev/serial0"')
     ended = run_naze_bridge("run", "--check-config", "--config", config)
@@ -232,13 +232,13 @@ def test_check_config_says_that_it_is_well_or_what_is_not(folder: Path) -> None:
     assert not (folder / "missions.db").exists()
 
 
-def test_the_sample_is_up_to_date_and_means_the_defaults(folder: Path) -> None:
+def test_the_sample_is_up_to_date_and_has_the_defaults(folder: Path) -> None:
     checked_in = (REPOSITORY / "systemd" / "config.toml").read_text()
     assert checked_in == sample(), "run make config-sample"
     assert load(folder, checked_in) == load(folder, "")
 
 
-def test_every_line_of_the_sample_can_be_used(folder: Path) -> None:
+def test_every_line_of_the_sample_is_valid(folder: Path) -> None:
     lines = [line.removeprefix("#") for line in sample().splitlines() if line and not line.startswith("# ")]
     text = "\n".join(line for line in lines if not line.startswith("config_file"))
     assert load(folder, text).zenoh is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Setup on each Raspberry Pi model, under a root of files: what it changes, and that a second run changes nothing."""
+"""Setup on each Raspberry Pi model, under a root of files: its changes, and no changes in a second run."""
 
 import re
 import tomllib
@@ -12,7 +12,7 @@ from service.cli.setup.steps import SETTINGS_FILE, SetupChoices, missing_steps
 from tests.support.faulty_machine import FaultyMachine
 from tests.support.programs import run_naze_bridge
 
-#: Model, what /dev/serial0 is, the console's word as Raspberry Pi OS writes it, and the line that config.txt needs.
+#: Model, target of /dev/serial0, the console's name in Raspberry Pi OS, and the line needed in config.txt.
 MODELS = {
     "3": ("Raspberry Pi 3 Model B Plus Rev 1.3", "ttyS0", "enable_uart=1"),
     "4": ("Raspberry Pi 4 Model B Rev 1.4", "ttyS0", "enable_uart=1"),
@@ -24,7 +24,7 @@ HOTSPOT = "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnecti
 
 
 class FreshPi(FaultyMachine):
-    """Raspberry Pi OS as it was flashed, and the package installed."""
+    """Freshly flashed Raspberry Pi OS with the package installed."""
 
     def __init__(self, root: Path, model: str) -> None:
         super().__init__(root)
@@ -43,7 +43,7 @@ class FreshPi(FaultyMachine):
         self.ran: list[str] = []
 
     def carry_out(self, steps: list[Step]) -> None:
-        """Write the files; do to other files what the programs would do."""
+        """Write the files, and make the changes of the programs called."""
         for change in (change for step in steps for change in step.changes):
             if isinstance(change, WriteFile):
                 Machine(self).carry_out(change)
@@ -77,7 +77,7 @@ def test_a_fresh_card(tmp_path: Path, model: str) -> None:
     _, _, line = MODELS[model]
     assert pi.read(CONFIG).splitlines()[-1] == line
     assert "dtparam=audio=on\n[cm4]" in pi.read(CONFIG)
-    # serial0 is the Pi 5's debug socket: its console is in no one's way.
+    # serial0 is the Pi 5's debug socket, so its console does no harm.
     has_console = "console=serial0,115200" in pi.read(CMDLINE)
     assert has_console is (model == "5")
     assert "console=tty1 root=PARTUUID=1-02 rootwait" in pi.read(CMDLINE)
@@ -94,12 +94,12 @@ def test_a_fresh_card(tmp_path: Path, model: str) -> None:
     assert announcement.stat().st_mode & 0o777 == 0o644
     assert "systemctl try-restart avahi-daemon" in pi.ran
     assert [step.purpose for step in steps if step.needs_reboot]
-    # The step that may end the connection over which this is typed.
+    # This step may end the SSH connection.
     assert pi.ran[-1] == "nmcli connection up naze-bridge-hotspot"
     assert missing_steps(pi, answers) == []
 
 
-def test_a_hotspot_that_did_not_come_up_is_tried_again(tmp_path: Path) -> None:
+def test_a_failed_hotspot_is_retried(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     answers = SetupChoices(hotspot=("naze field", "long-enough"))
     pi.carry_out(missing_steps(pi, answers))
@@ -120,7 +120,7 @@ def test_a_second_run_keeps_the_key_and_the_hotspot(tmp_path: Path, model: str) 
     assert "systemctl restart naze-bridge.service" in pi.ran
 
 
-def test_a_getty_that_is_enabled_is_disabled(tmp_path: Path) -> None:
+def test_an_enabled_getty_is_disabled(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.write(CMDLINE, "console=tty1 rootwait\n")
     wants = pi.path("/etc/systemd/system/getty.target.wants")
@@ -141,14 +141,14 @@ def test_a_getty_that_is_enabled_is_disabled(tmp_path: Path) -> None:
         ("enable_uart=10\n", False),
     ],
 )
-def test_the_last_word_of_config_txt_counts(tmp_path: Path, given: str, is_on: bool) -> None:
+def test_the_last_entry_in_config_txt_counts(tmp_path: Path, given: str, is_on: bool) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.write(CONFIG, given)
     purposes = [step.purpose for step in missing_steps(pi, SetupChoices())]
     assert ("enable the UART on the header" not in purposes) is is_on
 
 
-def test_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
+def test_setup_of_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.path("/proc/device-tree/model").unlink()
     pi.path("/run/systemd/system/.keep").unlink()
@@ -161,7 +161,7 @@ def test_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
     assert uart.text.endswith("[all]\n# naze-bridge: the UART on GPIO 14 and 15\nenable_uart=1\ndtparam=uart0=on\n")
 
 
-def test_what_was_heard_on_usb_is_not_called_naze(tmp_path: Path) -> None:
+def test_a_radio_found_on_usb_is_not_named_naze(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.write("/var/lib/naze-bridge/ports.json", '{"others": {"usb 1-1.3 10c4:ea60 0001": "a SiK telemetry radio"}}')
     pi.carry_out(missing_steps(pi, SetupChoices()))
@@ -170,7 +170,7 @@ def test_what_was_heard_on_usb_is_not_called_naze(tmp_path: Path) -> None:
     assert missing_steps(pi, SetupChoices()) == []
 
 
-def test_the_command_shows_what_it_would_do(tmp_path: Path, model: str) -> None:
+def test_the_command_shows_the_planned_changes(tmp_path: Path, model: str) -> None:
     pi = FreshPi(tmp_path, model)
     ended = run_naze_bridge("setup", "--dry-run", "--root", tmp_path)
     assert ended.returncode == 0, ended
@@ -188,7 +188,7 @@ def test_the_command_shows_what_it_would_do(tmp_path: Path, model: str) -> None:
         (["--fc", "naze"], "is not a flight controller connection"),
     ],
 )
-def test_answers_that_cannot_be_used(tmp_path: Path, options: list[str], words: str) -> None:
+def test_invalid_answers(tmp_path: Path, options: list[str], words: str) -> None:
     file = tmp_path / "password"
     file.write_text("long-enough\n")
     ended = run_naze_bridge("setup", "--yes", "--root", tmp_path, *(option.format(file) for option in options))

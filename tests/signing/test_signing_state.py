@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Timestamps that survive a restart on a machine without a battery-backed clock."""
+"""Signing timestamps survive a restart on a machine without a battery-backed clock."""
 
 import asyncio
 import json
@@ -23,12 +23,12 @@ NOON = 1_795_262_400.0
 UDP, TCP = GcsAddress("udpin", "127.0.0.1", 14550), GcsAddress("tcpin", "127.0.0.1", 5760)
 
 
-#: How far the file is ahead of the truth.
+#: Lead of the stored timestamp over the one in use.
 AHEAD = 10 * TICKS_PER_S
 
 
 class Pi:
-    """A machine: its clock, and the state directory of its daemon."""
+    """A machine: its clock and its daemon's state directory."""
 
     def __init__(self, folder: Path, key: bytes | None = KEY) -> None:
         self.unix_s = NOON
@@ -64,7 +64,7 @@ def our_timestamp(state: SigningState) -> int:
 
 
 async def until_written(pi: Pi, least: int) -> None:
-    await until_async(lambda: pi.path.exists() and pi.stored()["timestamp"] >= least, "what is to be written")
+    await until_async(lambda: pi.path.exists() and pi.stored()["timestamp"] >= least, "the timestamp in the file")
 
 
 async def test_a_stop_and_a_start_without_a_clock(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ async def test_a_power_cut(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     pi.boot()
     await until_written(pi, ticks(NOON) + AHEAD)
-    # It is ahead of the truth, so whatever was used before the power went is behind it.
+    # The stored timestamp leads, so every one used before the power cut is below it.
     pi.unix_s = 0.0
     state = pi.boot()
     assert our_timestamp(state) > ticks(NOON) + AHEAD
@@ -95,24 +95,24 @@ async def test_a_power_cut(tmp_path: Path) -> None:
     state.close()
 
 
-async def test_nothing_that_was_heard_before_a_power_cut_is_valid_after_it(tmp_path: Path) -> None:
+async def test_frames_from_before_a_power_cut_are_replays_after_it(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     state = pi.boot()
     await until_written(pi, ticks(NOON) + AHEAD)
-    # Heard after the last write, and so not remembered.
+    # Received after the last write, and so not stored.
     recorded = frame(ticks(NOON) + 9 * TICKS_PER_S)
     assert signing(state).check(recorded) is Check.VALID
     state = pi.boot()
     assert signing(state).check(recorded) is Check.UNSURE
     assert signing(state).check(frame(ticks(NOON) + AHEAD + 2 * TICKS_PER_S)) is Check.VALID
     state.close()
-    # After a stop nothing is unsure.
+    # After a regular stop the state is exact.
     state = pi.boot()
     assert signing(state).check(frame(ticks(NOON) + AHEAD + 2 * TICKS_PER_S + 1)) is Check.VALID
     state.close()
 
 
-async def test_a_ground_station_that_is_far_ahead_is_followed_and_not_forgotten(tmp_path: Path) -> None:
+async def test_a_ground_station_far_ahead_is_followed_and_remembered(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     pi.unix_s = 0.0
     state = pi.boot()
@@ -124,7 +124,7 @@ async def test_a_ground_station_that_is_far_ahead_is_followed_and_not_forgotten(
     state.close()
 
 
-async def test_it_is_written_every_10_s_and_not_at_all_while_nothing_is_signed(
+async def test_it_is_written_every_10_s_but_not_while_nothing_is_signed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("service.links.signing_state._LOOK_S", 0.001)
@@ -145,7 +145,7 @@ async def test_it_is_written_every_10_s_and_not_at_all_while_nothing_is_signed(
     state.close()
 
 
-async def test_one_key_on_two_links_is_one_key(tmp_path: Path) -> None:
+async def test_two_links_with_one_key_share_its_state(tmp_path: Path) -> None:
     state = Pi(tmp_path).boot()
     recorded = frame(ticks(NOON))
     assert signing(state, UDP).check(recorded) is Check.VALID
@@ -187,7 +187,7 @@ async def test_a_damaged_file_is_reported_and_replaced(tmp_path: Path, content: 
     assert [entry["event"] for entry in told] == ["signing.state_lost"]
 
 
-async def test_a_disk_that_cannot_be_written_stops_nobody(tmp_path: Path) -> None:
+async def test_an_unwritable_disk_does_not_stop_signing(tmp_path: Path) -> None:
     pi = Pi(tmp_path / "missing")
     with capture_logs() as told:
         state = pi.boot()
@@ -196,7 +196,7 @@ async def test_a_disk_that_cannot_be_written_stops_nobody(tmp_path: Path) -> Non
     assert "signing.state_not_stored" in [entry["event"] for entry in told]
 
 
-async def test_the_file_is_nobody_elses_and_holds_no_key(tmp_path: Path) -> None:
+async def test_the_file_is_private_and_holds_no_key(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     state = pi.boot()
     signing(state).check(frame(ticks(NOON)))

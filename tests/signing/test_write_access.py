@@ -39,7 +39,7 @@ def complaint(tmp_path: Path, gcs: str) -> str:
     return text
 
 
-def test_a_string_and_a_table_alongside_each_other(tmp_path: Path, key_file: Path) -> None:
+def test_a_string_and_a_table_in_one_list(tmp_path: Path, key_file: Path) -> None:
     config = tmp_path / "naze-bridge.toml"
     table = f'{{address = "{LINK}", key_file = "{key_file}", writers = ["192.168.4.0/24", "::1"]}}'
     config.write_text(f'fc = "sim:"\ngcs = ["tcpin:127.0.0.1:5760", {table}]\n')
@@ -52,17 +52,17 @@ def test_a_string_and_a_table_alongside_each_other(tmp_path: Path, key_file: Pat
     assert str(found[1].key) not in repr(settings)
 
 
-def test_a_key_file_is_looked_for_alongside_the_file_that_names_it(tmp_path: Path, key_file: Path) -> None:
+def test_a_key_file_path_is_relative_to_the_configuration(tmp_path: Path, key_file: Path) -> None:
     found = access(tmp_path, f'{{address = "{LINK}", key_file = "{key_file.name}"}}')
     assert found[LINK].key == key_from_passphrase(WORDS)
 
 
-def test_a_flag_does_not_open_a_link_that_the_file_guards(tmp_path: Path, key_file: Path) -> None:
+def test_a_flag_does_not_open_a_link_protected_in_the_file(tmp_path: Path, key_file: Path) -> None:
     table = f'{{address = "{LINK}", key_file = "{key_file}"}}'
     assert access(tmp_path, table, LINK, "tcpin:0.0.0.0:5760")[LINK].key is not None
 
 
-def test_a_table_with_an_address_only_is_open(tmp_path: Path) -> None:
+def test_a_table_with_only_an_address_is_open(tmp_path: Path) -> None:
     assert access(tmp_path, f'{{address = "{LINK}"}}') == {}
 
 
@@ -105,12 +105,12 @@ def test_no_writers_at_all(tmp_path: Path) -> None:
         (f'{{address = "{LINK}", writers = ["laptop"]}}', "write 192.168.4.0/24"),
     ],
 )
-def test_what_is_said_of_a_table_that_cannot_be_used(tmp_path: Path, entry: str, said: str) -> None:
+def test_invalid_tables(tmp_path: Path, entry: str, said: str) -> None:
     assert said in complaint(tmp_path, entry)
 
 
 @pytest.mark.parametrize("mode", [0o604, 0o602, 0o644, 0o777])
-def test_a_key_file_that_others_may_open_is_refused(key_file: Path, mode: int) -> None:
+def test_a_key_file_readable_by_others_is_refused(key_file: Path, mode: int) -> None:
     key_file.chmod(mode)
     with pytest.raises(AddressError, match="is readable for other users: run chmod 600"):
         read_key(key_file)
@@ -120,26 +120,26 @@ def test_a_key_file_that_others_may_open_is_refused(key_file: Path, mode: int) -
     ("content", "passphrase"),
     [(b"plain", "plain"), (b"with spaces \n", "with spaces "), (b"dos\r\n", "dos"), ("Grüße\n".encode(), "Grüße")],
 )
-def test_the_passphrase_is_all_but_the_end_of_the_line(key_file: Path, content: bytes, passphrase: str) -> None:
+def test_the_passphrase_is_the_line_without_its_end(key_file: Path, content: bytes, passphrase: str) -> None:
     key_file.write_bytes(content)
     assert read_key(key_file) == key_from_passphrase(passphrase)
 
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"x" * 5000])
-def test_what_is_not_a_passphrase(key_file: Path, content: bytes) -> None:
+def test_invalid_passphrases(key_file: Path, content: bytes) -> None:
     key_file.write_bytes(content)
     with pytest.raises(AddressError, match="must hold the passphrase on one line"):
         read_key(key_file)
 
 
-def test_what_is_not_a_text(key_file: Path) -> None:
+def test_binary_key_files(key_file: Path) -> None:
     key_file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(AddressError, match="holds no text") as caught:
         read_key(key_file)
     assert caught.value.__cause__ is None
 
 
-def test_a_fifo_does_not_hang_it(tmp_path: Path) -> None:
+def test_a_fifo_does_not_block(tmp_path: Path) -> None:
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo, 0o600)
     with pytest.raises(AddressError, match="is not a file"):

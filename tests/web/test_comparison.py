@@ -32,13 +32,13 @@ items = st.builds(
 )
 HOME = MissionItem(0, 16, 0, 0.0, 2.0, 0.0, 0.0, 453838000, 84733000, 131.0)
 lists = st.lists(items, min_size=1, max_size=20).map(lambda each: [HOME, *each])
-#: A frame other than relative is named as a change only where the height counts.
+#: Without the frame, which is a change only where the height is used.
 COMPARED = ("p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
 
 
 @settings(deadline=None)
 @given(lists)
-def test_what_differs_has_a_reason(sent: list[MissionItem]) -> None:
+def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:
     verdict = check_list(sent, RULES)
     rows = sent_and_stored(sent, verdict.items, verdict.findings)
     assert [row["left"]["command"] for row in rows] == [item.command for item in sent]
@@ -58,7 +58,7 @@ def test_what_differs_has_a_reason(sent: list[MissionItem]) -> None:
 
 @settings(deadline=None)
 @given(lists, lists)
-def test_a_difference_holds_both_lists_in_their_order(first: list[MissionItem], second: list[MissionItem]) -> None:
+def test_a_difference_has_both_lists_in_order(first: list[MissionItem], second: list[MissionItem]) -> None:
     rows = difference(first, second)
     for side, whole in (("left", first), ("right", second)):
         assert [row[side]["command"] for row in rows if row[side]] == [item.command for item in whole]
@@ -78,7 +78,7 @@ def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
     assert len(shown["findings"]) == 1
 
 
-def test_an_item_more_is_one_row_more() -> None:
+def test_an_extra_item_is_one_extra_row() -> None:
     route = [replace(HOME, seq=seq, lat_e7=453838000 + seq) for seq in range(9)]
     kinds = [row["kind"] for row in difference(route, route[:4] + route[5:])]
     assert kinds == ["same"] * 4 + ["removed"] + ["same"] * 4
@@ -86,8 +86,8 @@ def test_an_item_more_is_one_row_more() -> None:
     assert difference(route, changed)[8]["changes"] == {"p2": ""}
 
 
-def test_a_list_of_thousands_is_cut_and_that_is_said() -> None:
-    """`push` takes a megabyte of items; they are refused and kept."""
+def test_a_list_of_thousands_is_truncated_with_a_note() -> None:
+    """`push` accepts a megabyte of items; the refused list is stored."""
     long = [asdict(replace(HOME, seq=seq)) for seq in range(5000)]
     received = {
         "received_at": 0.0, "source": "", "verdict": "REJECTED", "ack": "", "checksum": "",

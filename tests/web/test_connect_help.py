@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where to connect: in Mission Planner's words, and only addresses that other devices reach."""
+"""Where to connect: in Mission Planner's terms, and only addresses reachable from other devices."""
 
 from service.settings.addresses import GcsAddress
 from service.settings.web import ListenAddress
@@ -9,17 +9,17 @@ ANY = "0.0.0.0"  # noqa: S104
 OWN = ["10.42.0.1", "192.168.1.7"]
 
 
-def test_an_open_page_is_at_each_address() -> None:
+def test_a_page_on_any_address_is_listed_at_each() -> None:
     assert page_urls(ListenAddress(ANY, 8080), OWN) == ["http://10.42.0.1:8080/", "http://192.168.1.7:8080/"]
     assert page_urls(ListenAddress("10.42.0.1", 80), OWN) == ["http://10.42.0.1:80/"]
 
 
-def test_a_page_of_this_machine_alone_is_nowhere_else() -> None:
+def test_a_page_on_loopback_is_not_listed() -> None:
     for host in ("127.0.0.1", "::1", "localhost"):
         assert page_urls(ListenAddress(host, 8080), OWN) == []
 
 
-def test_links_are_named_as_mission_planner_names_them() -> None:
+def test_links_have_mission_planners_names() -> None:
     links = [
         GcsAddress("udpin", ANY, 14550),
         GcsAddress("tcpin", "10.42.0.1", 5760),
@@ -33,7 +33,7 @@ def test_links_are_named_as_mission_planner_names_them() -> None:
     assert help_["called"] == ["udpout:10.42.0.9:14550"]
 
 
-def test_the_code_is_an_image_without_scripts() -> None:
+def test_the_qr_code_is_an_image_without_scripts() -> None:
     image = qr_code("http://10.42.0.1:8080/")
     assert b"<svg" in image
     assert b"<path" in image

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Large responses are made one at a time and only once, unless they may still change."""
+"""Large responses are computed one at a time, and only once unless they may still change."""
 
 import asyncio
 
@@ -7,7 +7,7 @@ from service.web.kept_answers import KeptAnswers
 
 
 class _Maker:
-    """Makes answers, and counts how many were in the making at once."""
+    """Computes responses and counts simultaneous ones."""
 
     def __init__(self, *, is_final: bool) -> None:
         self.made = 0
@@ -24,16 +24,16 @@ class _Maker:
         return f"answer {self.made}", self._is_final
 
 
-async def test_what_is_final_is_made_once() -> None:
+async def test_a_final_response_is_computed_once() -> None:
     kept, maker = KeptAnswers(), _Maker(is_final=True)
     answers = await asyncio.gather(*(kept.get("1", maker.make) for _ in range(5)))
     assert answers == ["answer 1"] * 5
     for other in range(2, 12):
         await kept.get(str(other), maker.make)
-    assert await kept.get("1", maker.make) == "answer 12"  # but not kept forever
+    assert await kept.get("1", maker.make) == "answer 12"  # but not cached forever
 
 
-async def test_what_may_change_is_made_each_time_but_never_two_at_once() -> None:
+async def test_a_changing_response_is_computed_each_time_one_at_a_time() -> None:
     kept, maker = KeptAnswers(), _Maker(is_final=False)
     answers = await asyncio.gather(*(kept.get(str(number % 2), maker.make) for number in range(4)))
     assert sorted(answers) == [f"answer {number}" for number in range(1, 5)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""axe-core's verdict on the page in each of its states, on a laptop and on a phone, light and dark."""
+"""axe-core's accessibility checks of the page in each state, on a laptop and a phone, light and dark."""
 
 import importlib.util
 from pathlib import Path
@@ -32,7 +32,7 @@ def violations(page: Browser) -> list[str]:
 
 
 @pytest.mark.parametrize(("size", "dark"), [(LAPTOP, False), (PHONE, True)])
-def test_axe_finds_nothing_in_any_state(
+def test_axe_finds_no_violation_in_any_state(
     browsers: Browsers, web: WebBench, size: tuple[int, int], *, dark: bool
 ) -> None:
     assert web.board is not None

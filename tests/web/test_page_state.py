@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page's state bar, and what an update leaves alone."""
+"""The page's state bar, and parts that an update must not change."""
 
 import socket
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from tests.support.web_bench import WebBench
 pytest_plugins = ("tests.support.web_fixtures",)
 
 
-def test_the_state_stays_in_sight(browsers: Browsers, web: WebBench) -> None:
+def test_the_state_bar_stays_visible(browsers: Browsers, web: WebBench) -> None:
     assert web.board is not None
     with browsers.tab(web.port, PHONE) as page:
         page.open()
@@ -56,10 +56,10 @@ def page(laptop: Browser) -> Browser:
     return laptop
 
 
-def test_old_values_are_called_stale(lasting_web: WebBench, page: Browser) -> None:
+def test_old_values_are_marked_stale(lasting_web: WebBench, page: Browser) -> None:
     assert lasting_web.board is not None
     lasting_web.board.set("hang 1")
-    until(lambda: {"STALE", "LOST"} & set(page.text("#badges").split()), "a word on the silence")
+    until(lambda: {"STALE", "LOST"} & set(page.text("#badges").split()), "the warning")
     lasting_web.board.set("hang 0")
     until(lambda: page.text("#badges") == "DISARMED", "the craft again")
 
@@ -68,7 +68,7 @@ LIVE = """
     return [...document.querySelectorAll('[role=status], [role=alert], [aria-live]')].map((e) => e.textContent);"""
 
 
-def test_only_changes_are_spoken(lasting_web: WebBench, page: Browser) -> None:
+def test_only_changes_are_announced_to_screen_readers(lasting_web: WebBench, page: Browser) -> None:
     assert lasting_web.board is not None
     before = page.run(LIVE)
     assert not any(before)
@@ -96,12 +96,12 @@ def test_an_upload_in_progress_has_a_bar(lasting_web: WebBench, page: Browser) -
     with PlainStation(udp_to(lasting_web.daemon.address)) as station:
         station.say_hello()
         station.send(messages.MAVLink_mission_count_message(1, 1, 20, 0))
-        station.wait_for("MISSION_REQUEST")  # and now it is silent
+        station.wait_for("MISSION_REQUEST")  # and then falls silent
         page.wait_text("#transfer-text", "Receiving items: 0 of 20")
         assert page.run("const bar = document.getElementById('transfer-bar'); return [bar.value, bar.max]") == [0, 20]
         until(
             lambda: page.run("return document.getElementById('transfer').hidden"),
-            "the end of the upload that is given up",
+            "the end of the abandoned upload",
         )
 
 

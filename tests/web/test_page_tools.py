@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The map's zoom and pan, and a telemetry log's way into the browser's downloads."""
+"""The map's zoom and pan, and the download of a telemetry log."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ pytest_plugins = ("tests.support.web_fixtures",)
 
 
 def place(page: Browser) -> list[float]:
-    """The middle of waypoint 2, pixels."""
+    """The centre of waypoint 2, pixels."""
     script = "const c = document.querySelectorAll('#map .point')[1]; return [c.cx.baseVal.value, c.cy.baseVal.value]"
     found: list[float] = page.run(script)
     return found

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing a mission from the page: only the result of the pressed button appears next to it."""
+"""Writing a mission from the page: next to a button appears only its own result."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def bench(web: WebBench) -> WebBench:
     return web
 
 
-def is_in_sight(page: Browser, selector: str) -> bool:
+def is_visible(page: Browser, selector: str) -> bool:
     script = """
         const box = document.querySelector(arguments[0]).getBoundingClientRect();
         const bar = document.querySelector('header').getBoundingClientRect();
@@ -41,11 +41,11 @@ def test_a_stored_mission_is_written_with_the_token(browsers: Browsers, bench: W
         page.find("tr.detail input").send_keys("not the token")
         page.press("tr.detail button.write")
         page.wait_text(DETAIL, "Wrong token. It is in ")
-        assert is_in_sight(page, DETAIL)
-        assert page.run("return window.innerWidth") == PHONE[0]  # a long path makes nothing wider
+        assert is_visible(page, DETAIL)
+        assert page.run("return window.innerWidth") == PHONE[0]  # the long path does not widen the page
         assert bench.board.records() != first
 
-        bench.restore(1)  # another client's success is not the answer to the wrong token
+        bench.restore(1)  # another client's success must not replace the error
         page.wait_text("#upload", "restore of mission 1")
         page.wait_for_looks(2)
         assert page.text(DETAIL).startswith("Wrong token.")
@@ -55,7 +55,7 @@ def test_a_stored_mission_is_written_with_the_token(browsers: Browsers, bench: W
         page.find("tr.detail input").send_keys(bench.token)
         page.press("tr.detail button.write")
         page.wait_text(DETAIL, "Mission verified: 9 records")
-        assert is_in_sight(page, DETAIL)
+        assert is_visible(page, DETAIL)
         assert bench.board.records() == first
         page.wait_text("#held-text", "9 records")
         page.wait_text("tr.detail h3", "Mission 1")  # still open, although the list has grown

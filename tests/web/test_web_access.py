@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Access to the status page: reading, changing with the token, and bad requests."""
+"""Access to the status page: reading, writing with the token, and bad requests."""
 
 import socket
 from pathlib import Path
@@ -21,7 +21,7 @@ def test_reading_needs_no_token(lasting_web: WebBench) -> None:
     assert lasting_web.ask("/api/missions").data["missions"][0]["source"] == "push of naze-field.waypoints"
 
 
-def test_every_answer_tells_the_browser_what_it_must_not_do(lasting_web: WebBench) -> None:
+def test_every_response_has_security_headers(lasting_web: WebBench) -> None:
     for path in ("/", "/page.js", "/api/state", "/api/missions/99", "/nothing"):
         headers = lasting_web.ask(path).headers
         policy = headers["Content-Security-Policy"]
@@ -34,7 +34,7 @@ def test_every_answer_tells_the_browser_what_it_must_not_do(lasting_web: WebBenc
         assert "Server" not in headers
 
 
-def test_a_file_that_the_browser_has_is_not_sent_again(lasting_web: WebBench) -> None:
+def test_a_cached_file_is_not_sent_again(lasting_web: WebBench) -> None:
     first = lasting_web.ask("/style.css")
     again = lasting_web.ask("/style.css", **{"If-None-Match": first.headers["ETag"]})
     assert (again.status, again.body) == (304, b"")
@@ -54,7 +54,7 @@ STRANGERS = {
 
 
 @pytest.mark.parametrize("name", STRANGERS)
-def test_a_stranger_restores_nothing(lasting_web: WebBench, name: str) -> None:
+def test_restoring_needs_the_token(lasting_web: WebBench, name: str) -> None:
     before = lasting_web.daemon.missions()
     token = lasting_web.token
     headers = {key: value.format(token=token, half=token[:8]) for key, value in STRANGERS[name].items()}
@@ -66,7 +66,7 @@ def test_a_stranger_restores_nothing(lasting_web: WebBench, name: str) -> None:
     assert token not in lasting_web.daemon.printed
 
 
-def test_a_link_alone_restores_nothing(lasting_web: WebBench) -> None:
+def test_opening_a_url_restores_nothing(lasting_web: WebBench) -> None:
     answer = lasting_web.ask(RESTORE, Authorization=f"Bearer {lasting_web.token}")
     assert (answer.status, answer.headers["Allow"]) == (405, "POST")
     assert lasting_web.ask(RESTORE, "OPTIONS", Origin="http://evil.example").status == 405
@@ -76,8 +76,8 @@ def test_a_link_alone_restores_nothing(lasting_web: WebBench) -> None:
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "[::1].evil.example", "local.evil.example."]
 )
-def test_a_name_that_could_be_bought_is_not_ours(lasting_web: WebBench, host: str) -> None:
-    """DNS rebinding: another site's name is turned to our address, and its page reads ours as its own."""
+def test_a_public_host_name_is_refused(lasting_web: WebBench, host: str) -> None:
+    """DNS rebinding: a foreign site's name points to our address, and its page reads ours as its own."""
     answer = lasting_web.ask("/api/state", Host=host)
     assert answer.status == 421
     assert "by the Pi's address" in answer.data["error"]
@@ -86,11 +86,11 @@ def test_a_name_that_could_be_bought_is_not_ours(lasting_web: WebBench, host: st
 @pytest.mark.parametrize(
     "host", ["10.42.0.1:8080", "[fe80::1]:8080", "localhost", "naze", "naze.local:8080", "Naze.LOCAL", "naze.lan"]
 )
-def test_a_local_name_is_ours(lasting_web: WebBench, host: str) -> None:
+def test_a_local_host_name_is_accepted(lasting_web: WebBench, host: str) -> None:
     assert lasting_web.ask("/api/state", Host=host).status == 200
 
 
-def test_a_name_of_ones_own_is_a_setting(start: Starter) -> None:
+def test_a_host_name_from_the_settings_is_accepted(start: Starter) -> None:
     page = web_daemon(start, web='hosts = ["Naze-1.example.ts.net"]')
     for path in ("/", "/api/state", "/metrics"):
         assert page.ask(path, Host="naze-1.Example.ts.net:8080").status == 200
@@ -111,19 +111,19 @@ def test_a_name_of_ones_own_is_a_setting(start: Starter) -> None:
         "/api/missions/1.5",
         "/api/missions/%00",
         "/api/missions/" + "9" * 300,
-        "/api/missions/%D9%A2",  # a digit, but not of ours
+        "/api/missions/%D9%A2",  # a digit, but not ASCII
         "/api/missions/1/difference/99",
         "/api/missions/1/difference/x",
     ],
 )
-def test_what_is_not_there(lasting_web: WebBench, path: str) -> None:
+def test_missing_pages(lasting_web: WebBench, path: str) -> None:
     answer = lasting_web.ask(path)
     assert answer.status == 404
     assert 0 < len(answer.data["error"]) < 200
 
 
 def raw(bench: WebBench, *parts: bytes) -> bytes:
-    """Send bytes as they are; return all that is answered until the end."""
+    """Send raw bytes; return the whole response."""
     with bench.connect() as connection:
         answer = b""
         try:
@@ -133,7 +133,7 @@ def raw(bench: WebBench, *parts: bytes) -> bytes:
             while data := connection.recv(65536):
                 answer += data
         except OSError:
-            pass  # disconnected on, in the middle of what no one reads
+            pass  # disconnected before everything was sent
         return answer
 
 
@@ -146,7 +146,7 @@ BAD_REQUESTS = {
     "two lengths": [
         b"POST /api/missions/1/restore HTTP/1.1\r\nHost: a\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nxx"
     ],
-    "a length that is none": [b"POST /api/missions/1/restore HTTP/1.1\r\nHost: a\r\nContent-Length: -1\r\n\r\n"],
+    "an invalid length": [b"POST /api/missions/1/restore HTTP/1.1\r\nHost: a\r\nContent-Length: -1\r\n\r\n"],
     "no host": [b"GET / HTTP/1.0\r\n\r\n"],
     "half a request": [b"GET /api/state HTTP/1.1\r\nHost: loc"],
     "many at once": [b"GET /api/missions/1 HTTP/1.1\r\nHost: localhost\r\n\r\n" * 1000],
@@ -155,7 +155,7 @@ BAD_REQUESTS = {
 
 
 @pytest.mark.parametrize("name", BAD_REQUESTS)
-def test_bad_bytes_end_their_connection_and_nothing_else(lasting_web: WebBench, name: str) -> None:
+def test_bad_bytes_end_only_their_connection(lasting_web: WebBench, name: str) -> None:
     answer = raw(lasting_web, *BAD_REQUESTS[name])
     assert answer.count(b"HTTP/1.") <= 1  # a connection carries one request
     assert lasting_web.ask("/api/state").status == 200
@@ -178,7 +178,7 @@ def resident_kb(pid: int) -> int:
 
 
 def test_one_address_does_not_lock_out_another(web: WebBench) -> None:
-    """Dozens of connections that say nothing; then the pilot comes, from elsewhere."""
+    """Dozens of silent connections, then a pilot from another address."""
     silent = [socket.create_connection(("127.0.0.1", web.port), PATIENCE) for _ in range(60)]
     try:
         with socket.create_connection(("127.0.0.1", web.port), PATIENCE, ("127.0.0.2", 0)) as pilot:
@@ -196,8 +196,8 @@ def test_without_the_setting_there_is_no_page(start: Starter) -> None:
     assert daemon.has_logged("web.listening") is None
 
 
-def test_a_page_that_cannot_be_served_holds_up_nothing(start: Starter) -> None:
-    """A late access point address or an occupied port does not affect the bridge."""
+def test_a_page_that_cannot_be_served_does_not_affect_the_bridge(start: Starter) -> None:
+    """As with an access point address that is not up yet, or an occupied port."""
     with socket.socket() as owner:
         owner.bind(("127.0.0.1", 0))
         owner.listen()
@@ -206,18 +206,18 @@ def test_a_page_that_cannot_be_served_holds_up_nothing(start: Starter) -> None:
         config.write_text(f'web = {{listen = "127.0.0.1:{port}"}}\n')
         daemon = start.daemon("sim:", options=("--config", str(config)))
         daemon.wait()
-        event = until(lambda: daemon.has_logged("web.unavailable"), "a word about the page")
+        event = until(lambda: daemon.has_logged("web.unavailable"), "a log entry about the page")
         assert event["address"] == f"127.0.0.1:{port}"
     until(lambda: daemon.has_logged("web.listening"), "the page")
     assert daemon.end() == 0
 
 
-def test_without_a_token_the_page_can_be_read_and_nothing_more(start: Starter) -> None:
+def test_without_a_token_the_page_is_read_only(start: Starter) -> None:
     token_file = start.directory / "token"
     token_file.write_text("short")
     token_file.chmod(0o600)
     web = web_daemon(start, web='token_file = "token"')
-    event = until(lambda: web.daemon.has_logged("web.no_token"), "a word about the token")
+    event = until(lambda: web.daemon.has_logged("web.no_token"), "a log entry about the token")
     assert event["why"].startswith(f"the token in {token_file} is shorter than 12 letters")
     answer = web.ask(RESTORE, "POST", Authorization="Bearer short")
     assert (answer.status, answer.data["error"]) == (403, f"This page is read-only: {event['why']}.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The status page's connections: limited in number, in rate and in time."""
+"""The status page's connections are limited in number, rate and duration."""
 
 import asyncio
 from collections import Counter
@@ -25,7 +25,7 @@ visits = st.lists(
 
 @settings(deadline=None)
 @given(visits)
-def test_never_more_than_the_bounds(visits: list[tuple[str, float, bool]]) -> None:
+def test_the_limits_are_never_exceeded(visits: list[tuple[str, float, bool]]) -> None:
     door, now = Door(), 100.0
     inside: Counter[str] = Counter()
     served: list[tuple[float, str]] = []
@@ -51,7 +51,7 @@ def test_never_more_than_the_bounds(visits: list[tuple[str, float, bool]]) -> No
 
 
 class _Greeter(asyncio.Protocol):
-    """Sends one byte for the first data received, and closes."""
+    """Answers the first data with one byte and closes."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -66,7 +66,7 @@ async def test_connections_over_the_rate_wait_and_are_served() -> None:
     door = Door()
     server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, _Greeter), "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
-    room = asyncio.Semaphore(6)  # as many as a browser opens at once
+    room = asyncio.Semaphore(6)  # as many as a browser opens
 
     async def ask() -> bytes:
         async with room:
@@ -86,7 +86,7 @@ _VISITORS = 3
 
 
 class _Giver(asyncio.Protocol):
-    """Answers with more than the sockets between them hold, and disconnects when all is read."""
+    """Sends more than the socket buffers hold and closes when all of it has been read."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -110,7 +110,7 @@ class _NoticedDoor(Door):
 
 
 async def _is_cut_off(serve: type[asyncio.Protocol]) -> None:
-    """Connect and do nothing; return when no connection is counted."""
+    """Connect and stay idle; return once no connection is counted."""
     door = _NoticedDoor()
     server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, serve), "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]

@@ -55,7 +55,7 @@ def test_a_file_is_written_only_with_the_token(web: WebBench) -> None:
         (b"[" * 100_000, BINARY, 422),
         (b"QGC WPL 110\n" + b"0\t1\t0\t16\t0\t0\t0\t0\t45.1\t8.1\t1\t1\n" * 501, BINARY, 422),
         (bytes(MAX_FILE + 1), BINARY, 413),
-        (EXAMPLE.read_bytes(), "text/plain", 415),  # what another site's page could send
+        (EXAMPLE.read_bytes(), "text/plain", 415),  # as another site's page could send it
     ],
 )
 def test_a_bad_file_gets_one_sentence(lasting_web: WebBench, body: bytes, kind: str, status: int) -> None:
@@ -89,7 +89,7 @@ def test_without_a_state_directory_there_are_no_logs() -> None:
     assert TelemetryLogs(None).list() == {"logs": []}
 
 
-def test_the_serial_line_has_a_history(lasting_web: WebBench) -> None:
+def test_the_history_of_the_serial_line(lasting_web: WebBench) -> None:
     history = lasting_web.ask("/api/link").data
     assert history["interval_s"] == 2
     assert set(history["samples"][0]) == {"round_trip_ms", "lost", "damaged"}

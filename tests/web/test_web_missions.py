@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The status page and missions: looked at, compared, restored by the rules of every other way."""
+"""Missions on the status page: listed, compared, and restored under the same rules as elsewhere."""
 
 from service.settings.zenoh import host_name
 from tests.support.benches import Starter
@@ -27,7 +27,7 @@ def test_the_state(lasting_web: WebBench) -> None:
 
 
 def test_metrics(lasting_web: WebBench) -> None:
-    """For Prometheus; what they say is tested where they are made."""
+    """Their contents are tested in tests/e2e/test_metrics.py."""
     answer = lasting_web.ask("/metrics")
     assert answer.status == 200
     assert answer.headers["Content-Type"].startswith("text/plain; version=0.0.4")
@@ -80,7 +80,7 @@ def test_nothing_is_restored_while_armed(web: WebBench) -> None:
 
 
 def test_a_craft_that_is_armed_and_speaks_mavlink(start: Starter) -> None:
-    """One vehicle, whatever its flight controller speaks now."""
+    """It stays the same vehicle."""
     board = start.board("--tele-prot", "2")
     web = web_daemon(start, str(board.link))
     web.daemon.push(plain_plan(9))
@@ -107,10 +107,10 @@ def test_one_restore_at_a_time(web: WebBench) -> None:
         "Another mission is being written: wait until it has finished.",
     )
     web.board.set("hang 0")
-    until(lambda: web.state()["write"]["done"], "the end of the first")
+    until(lambda: web.state()["write"]["done"], "the end of the first restore")
 
 
-def test_a_restore_of_nothing(lasting_web: WebBench) -> None:
+def test_restoring_a_missing_mission(lasting_web: WebBench) -> None:
     ended = lasting_web.restore(77)
     assert not ended["ok"]
     assert ended["text"].startswith("there is no mission 77")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The status page in Chromium: what a pilot sees and does, on a laptop and on a phone."""
+"""The status page in Chromium, on a laptop and on a phone."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,7 +34,7 @@ def laptop(browsers: Browsers, bench: WebBench) -> Iterator[Browser]:
 
 @pytest.fixture
 def page(laptop: Browser) -> Iterator[Browser]:
-    """The page, just opened; whatever a test does there, the browser finds nothing to complain of."""
+    """The page, just opened; afterwards the browser must have logged no error."""
     laptop.complaints()
     laptop.traffic()
     laptop.open()
@@ -42,15 +42,15 @@ def page(laptop: Browser) -> Iterator[Browser]:
     assert laptop.complaints() == []
 
 
-def test_the_first_paint_is_small_and_asks_nobody_else(page: Browser) -> None:
+def test_the_first_paint_is_small_and_loads_nothing_from_elsewhere(page: Browser) -> None:
     addresses, size = page.traffic()
     assert addresses
     assert {address for address in addresses if not address.startswith(page.url)} == set()
     assert 5_000 < size <= FIRST_PAINT_BYTES
 
 
-def test_a_page_that_is_reloaded_at_once_loses_no_file(page: Browser) -> None:
-    """Each load takes about thirty connections, and an address gets fifty a second."""
+def test_an_immediate_reload_loads_every_file(page: Browser) -> None:
+    """Each load takes about thirty connections; the limit is fifty a second per address."""
     for _ in range(6):
         page.driver.get(page.url)
     page.open()
@@ -70,7 +70,7 @@ def test_the_overview(page: Browser) -> None:
 
 def test_the_map(page: Browser) -> None:
     assert len(page.all("#map .track")) == 2  # out, and home
-    # In one script each: the map is drawn again and again, and an element that was found before is gone then.
+    # Each in a single script, because the map is redrawn and elements found earlier disappear.
     numbers = page.run("return [...document.querySelectorAll('#map .number')].map((mark) => mark.textContent)")
     assert numbers == ["2", "3", "4", "5", "6", "7", "8", "9", "10"]
     assert len(page.all("#map .roi")) == 1
@@ -88,7 +88,7 @@ def test_the_map(page: Browser) -> None:
 
 
 def test_the_scale_is_true(page: Browser) -> None:
-    """Home and waypoint 2 are 37.1 m apart; the bar says how long that is on the screen."""
+    """Home and waypoint 2 are 37.1 m apart on the map."""
     bar = page.run("return document.querySelector('#map .scale').getBBox().width")
     metres = float(page.text("#map .scale + text").removesuffix(" m"))
     track = page.run("return document.querySelector('#map .track').getAttribute('points')")
@@ -132,7 +132,7 @@ def own_bench(tmp_path: Path) -> Iterator[WebBench]:
 
 
 def test_foreign_text_is_not_markup(browsers: Browsers, own_bench: WebBench) -> None:
-    """A file's name and a ground station's words come from outside."""
+    """File names and texts of ground stations come from outside."""
     evil = "<img src=x onerror=alert(1)><script>alert(2)</script>"
     item = {"command": 16, "frame": 3, "p1": 0, "p2": 3, "p3": 0, "p4": 0, "lat_e7": 453838000, "lon_e7": 84733000}
     items = [item | {"seq": seq, "alt_m": 10} for seq in range(3)]
@@ -145,7 +145,7 @@ def test_foreign_text_is_not_markup(browsers: Browsers, own_bench: WebBench) -> 
         assert page.complaints() == []
 
 
-def test_it_fits_on_a_phone(browsers: Browsers, bench: WebBench) -> None:
+def test_the_page_fits_a_phone(browsers: Browsers, bench: WebBench) -> None:
     with browsers.tab(bench.port, PHONE) as phone:
         phone.open()
         phone.press("button[aria-label='Show mission 2']")
@@ -179,7 +179,7 @@ def test_without_a_mission_and_without_a_position(browsers: Browsers, tmp_path: 
 
 
 def test_the_pictures_in_the_docs(tmp_path: Path) -> None:
-    """The docs show pictures taken by this test."""
+    """The pictures in the docs are taken here."""
     take_pictures(tmp_path)
     taken = sorted(path.name for path in tmp_path.iterdir())
     assert taken == sorted(path.name for path in PICTURES.glob("*.png"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The `[web]` table and the token's file: accepted values, and messages about others."""
+"""The `[web]` table and the token file: accepted values, and messages about others."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def test_the_table(tmp_path: Path) -> None:
     assert str(given.listen) == "[::]:80"
 
 
-def test_one_word_in_the_environment_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_variable_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NAZE_BRIDGE_WEB_LISTEN", "0.0.0.0:8080")
     assert load(tmp_path, "") == WebSettings(ListenAddress("0.0.0.0", 8080))  # noqa: S104 - only read
 
@@ -55,7 +55,7 @@ def test_an_invalid_table_is_one_sentence(tmp_path: Path, text: str, said: list[
         assert part in problem
 
 
-def test_a_token_is_made_once(tmp_path: Path) -> None:
+def test_a_token_is_created_once(tmp_path: Path) -> None:
     path = tmp_path / "token"
     token = Token(path)
     text = path.read_text().strip()
@@ -68,14 +68,14 @@ def test_a_token_is_made_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "shown", [None, "", "Bearer", "Bearer ", "Bearer x", "Basic {}", "{}", "Bearer {}x", "Bearer \udcff"]
 )
-def test_what_is_not_the_token(tmp_path: Path, shown: str | None) -> None:
+def test_wrong_tokens(tmp_path: Path, shown: str | None) -> None:
     token = Token(tmp_path / "token")
     text = token.path.read_text().strip()
     assert not token.is_shown_by(None if shown is None else shown.format(text))
 
 
-def test_files_that_hold_no_token(tmp_path: Path) -> None:
-    (tmp_path / "open").write_text("a token that all can read")
+def test_invalid_token_files(tmp_path: Path) -> None:
+    (tmp_path / "open").write_text("a token readable by all")
     (tmp_path / "open").chmod(0o644)
     (tmp_path / "empty").touch(0o600)
     (tmp_path / "long").touch(0o600)
