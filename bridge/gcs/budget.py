@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rate limits for each ground station and for all of them together. Sans-IO: the time is passed in."""
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable
 from typing import TypeVar
-from zlib import crc32
 
 from bridge.gcs.cost import LIMITS, Cost, Rate
+from bridge.gcs.shares import Shares
 from bridge.gcs.station import Peer
 
 K = TypeVar("K", bound=Hashable)
 
-#: Hosts whose addresses have the same checksum share a budget.
+#: Hosts with the same hash share a budget, so that made-up ones need no more memory than this. The hash of a text is
+#: another in each process: nobody can choose an address that shares the pilot's.
 _HOST_GROUPS = 1024
 
 
@@ -28,36 +29,42 @@ class TokenBucket:
         self._counted_at = now
         return self._tokens >= 1.0
 
-    def spend(self) -> None:
-        """Count one."""
-        self._tokens -= 1.0
+    def spend(self, amount: float = 1.0) -> None:
+        """Count one; a negative amount takes it back."""
+        self._tokens -= amount
 
 
 class Budgets:
     """Counts the work that each peer causes.
 
     `has_standing`: True for a peer that has authenticated, or has precedence on its link (bridge.gcs.stations). It has
-    budgets of its own. The others share theirs by host, and in all: a stranger gains nothing from many ports, and can
-    use up only the share of other newcomers.
+    budgets of its own. The others share theirs by host: a stranger gains nothing from many ports. All of them share a
+    total, of which a host may use as much as it leaves to others: of n greedy hosts each uses 1 / (n + 1), and as much
+    is left for a newcomer.
     """
 
     def __init__(self, has_standing: Callable[[Peer], bool]) -> None:
         self._has_standing = has_standing
         self._peers: dict[tuple[Cost, Peer], TokenBucket] = {}
         self._hosts: dict[tuple[Cost, int], TokenBucket] = {}
-        self._totals = {cost: TokenBucket(limit.total) for cost, limit in LIMITS.items()}
+        self._totals = {cost: Shares(limit.total) for cost, limit in LIMITS.items()}
         #: How often each limit was exceeded.
         self.exceeded = dict.fromkeys(Cost, 0)
 
     def allows(self, cost: Cost, peer: Peer, now: float) -> bool:
         """Count one for a peer; False if that exceeds a limit."""
-        buckets = self._buckets(cost, peer)
-        for bucket in buckets:
-            if not bucket.has(now):
-                self.exceeded[cost] += 1
-                return False
-        for bucket in buckets:
-            bucket.spend()
+        if self._has_standing(peer):
+            bucket, group = _bucket(self._peers, (cost, peer), cost), None
+        else:
+            group = hash(str(peer.host)) % _HOST_GROUPS
+            bucket = _bucket(self._hosts, (cost, group), cost)
+        total = self._totals[cost]
+        if not (bucket.has(now) and (group is None or total.left(now) > total.used(group))):
+            self.exceeded[cost] += 1
+            return False
+        bucket.spend()
+        if group is not None:
+            total.spend(group)
         return True
 
     def keep(self, peers: Iterable[Peer]) -> None:
@@ -65,13 +72,6 @@ class Budgets:
         present = set(peers)
         for key in [key for key in self._peers if key[1] not in present]:
             del self._peers[key]
-
-    def _buckets(self, cost: Cost, peer: Peer) -> Sequence[TokenBucket]:
-        if self._has_standing(peer):
-            return (_bucket(self._peers, (cost, peer), cost),)
-        # Made-up hosts need no more memory than this.
-        group = crc32(str(peer.host).encode()) % _HOST_GROUPS
-        return _bucket(self._hosts, (cost, group), cost), self._totals[cost]
 
 
 def _bucket(buckets: dict[K, TokenBucket], key: K, cost: Cost) -> TokenBucket:

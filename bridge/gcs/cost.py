@@ -24,9 +24,9 @@ class Cost(IntEnum):  # its hash is an int's, in C: it is made for each datagram
     ANSWER: a message sent on request. Mission Planner requests about twenty when it connects.
     TRANSFER: a message of a mission transfer; over a fast link there may be a thousand items a second.
     TEXT: a STATUSTEXT that a station causes; a mission of 146 items may need one for each.
+    UPLOAD: a list that is announced, which costs log entries.
     BOARD: a request to the flight controller, which has a few hundred bytes a second to spare.
     PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.
-    FLASH: a write to the board's flash, which endures 10,000 per page.
     STORED: a list in the store that did not reach the flight controller.
     RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
@@ -36,18 +36,18 @@ class Cost(IntEnum):  # its hash is an int's, in C: it is made for each datagram
     ANSWER = auto()
     TRANSFER = auto()
     TEXT = auto()
+    UPLOAD = auto()
     BOARD = auto()
     PASSED = auto()
-    FLASH = auto()
     STORED = auto()
     RECORDED = auto()
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """`each`: for every peer with standing, and every host of the others. `total`: for all the others together.
+    """`each`: for every peer with standing, and every host of the others. `total`: shared by all the others.
 
-    bridge.gcs.budget describes standing.
+    bridge.gcs.budget describes standing, bridge.gcs.shares the sharing.
     """
 
     each: Rate
@@ -60,12 +60,9 @@ LIMITS = {
     Cost.ANSWER: Limit(Rate(50, 200), Rate(500, 1000)),
     Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 2000)),
     Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),
+    Cost.UPLOAD: Limit(Rate(4, 20), Rate(10, 400)),
     Cost.BOARD: Limit(Rate(4, 20), Rate(10, 40)),
     Cost.PASSED: Limit(Rate(200, 600), Rate(200, 600)),
-    Cost.FLASH: Limit(Rate(1 / 20, 30), Rate(1 / 20, 60)),
     Cost.STORED: Limit(Rate(1 / 10, 20), Rate(1 / 5, 40)),
     Cost.RECORDED: Limit(Rate(50, 400), Rate(100, 800)),
 }
-
-#: The text for a ground station that exceeds Cost.FLASH.
-TOO_MANY_WRITES = "Too many writes to the board: wait a minute"

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from bridge.gcs.budget import Budgets
 from bridge.gcs.cost import Cost
+from bridge.gcs.flash_budget import FlashBudget
 from bridge.gcs.guard import Signer, Standing
 from bridge.gcs.recent_texts import RecentTexts
 from bridge.gcs.station import RECORDER, Peer, Severity, Station
@@ -50,7 +51,8 @@ class Ground:
         self._standing = standing
         self._signers = signers
         self._stations = Stations()
-        self.budgets = Budgets(self._has_standing)
+        self.budgets = Budgets(self.has_standing)
+        self.flash = FlashBudget(standing, self._stations)
         self._default_peers: dict[Peer, bool] = {}
         self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._writers: dict[Peer, FrameWriter] = {}
@@ -115,6 +117,10 @@ class Ground:
     def moved_to(self, station: Station, now: float) -> list[Station]:
         """The new addresses of a station that fell silent at its old one: usually none."""
         return self._stations.moved_to(station, now)
+
+    def has_moved(self, station: Station, to: Station, now: float) -> bool:
+        """True if `to` is such an address."""
+        return self._stations.has_moved(station, to, now)
 
     def gone(self, peer: Peer) -> None:
         """A ground station's connection is closed."""
@@ -190,7 +196,8 @@ class Ground:
         others = {peer: at for peer, at in peers.items() if self._standing(peer) is not Standing.PROVEN}
         return displaced(others or peers, self._stations.steady)
 
-    def _has_standing(self, peer: Peer) -> bool:
+    def has_standing(self, peer: Peer) -> bool:
+        """True for a peer that has authenticated, or has precedence on its link: strangers cannot use its shares."""
         standing = self._standing(peer)
         return standing is Standing.PROVEN or (standing is Standing.OPEN and self._stations.has_standing(peer))
 

@@ -2,14 +2,14 @@
 """Message rates of each ground station: as requested, else the defaults. Sans-IO."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from functools import cache
 from math import inf
 
 from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
 from bridge.gcs.station import Peer
 
-#: Messages a second to all ground stations together; each has an equal share. The defaults are 55 a second.
+#: Messages a second to all ground stations together. The defaults are 55 a second. Those with standing share half of
+#: it, at least 75 a second for each of the 16 on a link, and the others the rest.
 _MOST_PER_S = 2400
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
@@ -25,6 +25,7 @@ class MessageRates:
         self._requested: dict[Peer, dict[int, float]] = {}
         self._due: dict[tuple[Peer, int], float] = {}
         self._shares: dict[Peer, TokenBucket] = {}
+        self._newcomers_share = Rate(_MOST_PER_S, _MOST_PER_S)
         #: Peers at whose end there may be no station. They get no message more than ten times a second.
         self.unwatched: Collection[Peer] = ()
 
@@ -58,11 +59,9 @@ class MessageRates:
             due = self._due.get((peer, msgid), -inf)
             if interval_s == inf or now < due - interval_s * _EARLY:
                 continue
-            share = _share(len(peers))
             bucket = self._shares.get(peer)
             if bucket is None:
-                bucket = self._shares[peer] = TokenBucket(share)
-            bucket.rate = share
+                bucket = self._shares[peer] = TokenBucket(self._newcomers_share)
             if not bucket.has(now):
                 continue
             bucket.spend()
@@ -71,8 +70,8 @@ class MessageRates:
             taken.append(peer)
         return taken
 
-    def keep(self, peers: Iterable[Peer]) -> None:
-        """Forget all other peers."""
+    def keep(self, peers: Iterable[Peer], with_standing: Collection[Peer]) -> None:
+        """Forget all other peers. `with_standing`: those whose share does not depend on the number of the others."""
         present = set(peers)
         for peer in [peer for peer in self._requested if peer not in present]:
             del self._requested[peer]
@@ -80,9 +79,11 @@ class MessageRates:
             del self._shares[peer]
         for key in [key for key in self._due if key[0] not in present]:
             del self._due[key]
+        share, self._newcomers_share = _share(len(with_standing)), _share(len(present) - len(with_standing))
+        for peer, bucket in self._shares.items():
+            bucket.rate = share if peer in with_standing else self._newcomers_share
 
 
-@cache
 def _share(peers: int) -> Rate:
-    """The share of each of so many peers."""
-    return Rate(_MOST_PER_S / peers, _MOST_PER_S / peers)
+    """The share of each of so many peers in a half."""
+    return Rate(_MOST_PER_S / 2 / max(peers, 1), _MOST_PER_S / 2 / max(peers, 1))

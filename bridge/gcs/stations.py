@@ -14,8 +14,10 @@ from bridge.gcs.station import Peer, Station
 EXPIRY_S = 60.0
 #: The same for a peer all of whose ids are now heard from elsewhere: its Wi-Fi gave it another address.
 MOVED_S = 5.0
-#: Peers on one link; every heartbeat costs a datagram for each.
-MAX_PEERS = 32
+#: Peers on one link: as many as a network has hosts whose addresses differ in the last byte.
+MAX_PEERS = 256
+#: Those of them that have precedence.
+PRECEDENCE = 16
 #: The same for peers that may only read, so that they take no slot from those with the key.
 MAX_LISTENERS = 8
 #: A peer is steady once it has been heard this often, with pauses of at least `_BEAT_S`: as heartbeats at 1 Hz are.
@@ -44,12 +46,12 @@ class _Known:
 def displaced(peers: Mapping[Peer, float], steady: Collection[Peer] = ()) -> Peer:
     """The peer of a full link that makes room for another. `peers`: when each was last heard, in order of arrival.
 
-    The first half by precedence keeps its slots: a pilot is not displaced by a later crowd, not even after a radio
-    fade. Of the others, the longest-silent peer of the host with most peers goes: a crowd is often one host, which
-    changes its addresses faster than a pilot's ground station falls silent.
+    The first by precedence keep their slots: a pilot is not displaced by a later crowd, not even after a radio fade.
+    Of the others, the longest-silent peer of the host with most peers goes: a crowd is often one host, which changes
+    its addresses faster than a pilot's ground station falls silent.
     """
     hosts = Counter(peer.host for peer in peers)
-    later = _by_precedence(peers, steady)[len(peers) // 2 :]
+    later = _by_precedence(peers, steady)[min(PRECEDENCE, len(peers) // 2) :]
     return min(later, key=lambda peer: (-hosts[peer.host], peers[peer]))
 
 
@@ -125,9 +127,14 @@ class Stations:
         """The peers that have been heard for a while."""
         return {peer for peer, known in self._known.items() if known.beats >= _STEADY_BEATS}
 
+    def hosts_with_precedence(self) -> dict[Hashable, None]:
+        """The hosts of all links' first peers by precedence, in that order."""
+        links = dict.fromkeys(peer.link for peer in self._known)
+        return {peer.host: None for link in links for peer in self._order(link, is_listener=False)[:PRECEDENCE]}
+
     def has_standing(self, peer: Peer) -> bool:
-        """True for the half of a link's places that keeps its slots."""
-        return peer in self._order(peer.link, is_listener=False)[: MAX_PEERS // 2]
+        """True for the first peers of a link by precedence."""
+        return peer in self._order(peer.link, is_listener=False)[:PRECEDENCE]
 
     def _order(self, link: str, *, is_listener: bool) -> list[Peer]:
         """A link's peers by precedence."""
@@ -158,11 +165,12 @@ class Stations:
         silent = [peer for peer in self._displaced if peer not in self._known]
         self._displaced.clear()
         if now >= self._expiry_due:
-            silent += [peer for peer, known in self._known.items() if now >= self._expires_at(peer, known)]
+            due = self._expiry_times()
+            silent += [peer for peer in due if now >= due[peer]]
             for peer in silent:
                 self._known.pop(peer, None)
             self._orders = None
-            self._expiry_due = min((self._expires_at(peer, known) for peer, known in self._known.items()), default=inf)
+            self._expiry_due = min(self._expiry_times().values(), default=inf)
         return silent
 
     def next_deadline(self) -> float:
@@ -179,23 +187,30 @@ class Stations:
         return known is not None and known.is_listener
 
     def moved_to(self, station: Station, now: float) -> list[Station]:
-        """The new addresses of a station that fell silent at its old one: usually none.
-
-        This excludes a second station with the same ids, heard earlier or alongside the first.
-        """
+        """The new addresses of a station that fell silent at its old one: usually none."""
         old = self._known.get(station.peer)
         if old is None or now < old.heard_at + _STILL_S:
             return []
+        elsewhere = (Station(peer, station.sysid, station.compid) for peer in self._known)
+        return [where for where in elsewhere if self.has_moved(station, where, now)]
+
+    def has_moved(self, station: Station, to: Station, now: float) -> bool:
+        """True if `to` is the new address of a station that fell silent at its old one.
+
+        This excludes a second station with the same ids, heard earlier or alongside the first.
+        """
         speaker = station.sysid, station.compid
-        return [
-            Station(peer, *speaker)
-            for peer, known in self._known.items()
-            if peer != station.peer
-            and peer.link == station.peer.link
-            and known.is_listener == old.is_listener
-            and speaker in known.speakers
-            and known.came_at >= old.heard_at
-        ]
+        old, new = self._known.get(station.peer), self._known.get(to.peer)
+        if old is None or new is None or speaker != (to.sysid, to.compid):
+            return False
+        return (
+            now >= old.heard_at + _STILL_S
+            and to.peer != station.peer
+            and to.peer.link == station.peer.link
+            and new.is_listener == old.is_listener
+            and speaker in new.speakers
+            and new.came_at >= old.heard_at
+        )
 
     def _note_speaker(self, station: Station, known: _Known, now: float) -> None:
         speaker = station.sysid, station.compid
@@ -206,14 +221,15 @@ class Stations:
             self._expiry_due = min(now + MOVED_S, self._expiry_due)
         known.speakers[speaker] = now
 
-    def _expires_at(self, peer: Peer, known: _Known) -> float:
-        others = [
-            other
-            for where, other in self._known.items()
-            if where != peer and where.link == peer.link and other.is_listener == known.is_listener
-        ]
-        moved = all(
-            any(other.speakers.get(speaker, -inf) > heard_at for other in others)
-            for speaker, heard_at in known.speakers.items()
-        )
-        return known.heard_at + (MOVED_S if moved else EXPIRY_S)
+    def _expiry_times(self) -> dict[Peer, float]:
+        latest: dict[tuple[str, bool, tuple[int, int]], float] = {}
+        for peer, known in self._known.items():
+            for speaker, heard_at in known.speakers.items():
+                key = peer.link, known.is_listener, speaker
+                latest[key] = max(heard_at, latest.get(key, -inf))
+        times = {}
+        for peer, known in self._known.items():
+            # Heard later than here means that it was elsewhere.
+            moved = all(latest[peer.link, known.is_listener, who] > at for who, at in known.speakers.items())
+            times[peer] = known.heard_at + (MOVED_S if moved else EXPIRY_S)
+        return times

@@ -16,7 +16,7 @@ from bridge.fc.actions import (
     FcActions,
 )
 from bridge.fc.session import FcSession
-from bridge.gcs.cost import TOO_MANY_WRITES, Cost
+from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.ground import Ground
 from bridge.gcs.station import Severity, Station
 from bridge.vehicle.own_vehicle import OwnVehicle
@@ -93,7 +93,7 @@ class CommandService:
         elif self._actions.present == action:
             # Repeated by the user or duplicated by the network.
             self._acknowledge(station, command, CommandResult.IN_PROGRESS)
-        elif not self._ground.allows(station, Cost.FLASH):
+        elif not self._ground.flash.allows(station.peer, now):
             self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._acknowledge(station, command, CommandResult.TEMPORARILY_REJECTED)
         else:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
-from bridge.gcs.cost import TOO_MANY_WRITES, Cost
+from bridge.gcs.cost import Cost
+from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.missions.fc_mission_store import StoreReport
@@ -80,9 +81,9 @@ class MissionUploads:
         self._missions = context.missions
         self._runner = context.runner
         self._ground = context.ground
-        self._moved_to = context.ground.moved_to
+        self._flash = context.ground.flash
         self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
-        self._answers = RecentAnswers(self._moved_to)
+        self._answers = RecentAnswers(context.ground.has_moved)
         self._reminders: list[tuple[float, Station, str]] = []
         self._is_asking = False
         self._may_ask_at = 0.0
@@ -245,7 +246,7 @@ class MissionUploads:
         upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(Announced(), now))
         self._uploads.append(upload)
         refusal = self._missions.armed_refusal()
-        if refusal is None and not self._ground.allows(station, Cost.BOARD):
+        if refusal is None and not self._ground.allows(station, Cost.UPLOAD):
             refusal = _TOO_MANY_UPLOADS
         if refusal is not None:
             self._handle(upload, Ended(refusal), now)
@@ -255,8 +256,8 @@ class MissionUploads:
         self._begin_next(now)
 
     def _begin_next(self, now: float) -> None:
-        """Continue the uploads whose turn has come."""
-        for upload in self._in(Waiting, Complete):
+        """Continue the uploads whose turn has come: first that of the host that has written least."""
+        for upload in sorted(self._in(Waiting, Complete), key=lambda upload: self._flash.used(upload.station.peer)):
             if upload not in self._in(Waiting, Complete):
                 # The end of an earlier one has already continued it.
                 continue
@@ -270,7 +271,7 @@ class MissionUploads:
         if isinstance(state, Complete):
             refusal = self._missions.acquire(upload)
             is_write = state.verdict.result is not Result.REJECTED
-            if refusal is None and is_write and not self._ground.allows(upload.station, Cost.FLASH):
+            if refusal is None and is_write and not self._flash.allows(upload.station.peer, now):
                 refusal = Refusal(MissionResult.DENIED, TOO_MANY_WRITES)
         else:
             refusal = OCCUPIED if self._must_wait(now) else self._missions.occupied()
@@ -392,6 +393,8 @@ class MissionUploads:
     ) -> None:
         if isinstance(delivery, LinkLost):
             delivery = DeliveryResult(NO_LINK.ack, NO_LINK.text, None)
+        if verdict.result is not Result.REJECTED and delivery.ack is MissionResult.ACCEPTED and not delivery.change:
+            self._flash.not_written(upload.station.peer)
         self._tell(upload.station, verdict, delivery)
         if upload in self._uploads:
             # A station that has announced another list would take this ack for that one's.
@@ -453,7 +456,7 @@ class MissionUploads:
         if self._of(station) is not None or self._answers.was_said_to(station, now):
             return
         for upload in self._uploads:
-            if station in self._moved_to(upload.station, now):
+            if self._ground.has_moved(upload.station, station, now):
                 self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
                 upload.station = station
 
@@ -476,7 +479,7 @@ class MissionUploads:
         announced = {other.station for other in self._uploads if other is not upload}
         return [
             where
-            for where in self._moved_to(upload.station, now)
+            for where in self._ground.moved_to(upload.station, now)
             if where not in announced and not self._answers.was_said_to(where, now)
         ]
 

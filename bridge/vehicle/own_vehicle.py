@@ -29,6 +29,8 @@ from protocols.msp.commands import Msp
 
 #: The interval of HEARTBEAT, and the clock for messages without a reading.
 _TICK_S = 1.0
+#: The polls follow requests at this interval: that costs a step for each message and ground station.
+_POLLS_INTERVAL_S = 0.25
 #: Mission Planner needs two heartbeats to connect.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: Home, and what prevents arming, are repeated for newcomers no more often.
@@ -94,6 +96,7 @@ class OwnVehicle:
         #: New ground stations, and the end of their faster heartbeats.
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
+        self._polls_set_at, self._polls_due = -inf, inf
         self._announced: _ShownState | None = None
 
     def newcomer(self, peer: Peer) -> None:
@@ -103,10 +106,7 @@ class OwnVehicle:
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
         self._ground.greet(peer, self._make_heartbeat())
-        everyone = self._ground.everyone()
-        if len(everyone) == 1:
-            # If there are others, its rates count from the next tick: addresses may be made up by the thousand.
-            self._set_polls(everyone)
+        self._follow_requests()
 
     def tick(self, now: float) -> None:
         """Send the messages that are due."""
@@ -115,12 +115,14 @@ class OwnVehicle:
             self._greet(now)
         if now >= self._second_ends:
             self._end_second(now)
-        self.due = min(self._second_ends, self._newcomers_due)
+        if now >= self._polls_due:
+            self._set_polls(self._ground.everyone())
+        self.due = min(self._second_ends, self._newcomers_due, self._polls_due)
 
     def _end_second(self, now: float) -> None:
         self._second_ends = max(self._second_ends + _TICK_S, now)
         everyone = self._ground.everyone()
-        self._rates.keep(everyone)
+        self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)))
         self._rates.unwatched = () if self._session.vehicle.armed else self._ground.unheard()
         self._set_polls(everyone)
         self._ground.introduce(self._heartbeat())
@@ -196,7 +198,7 @@ class OwnVehicle:
         if not self._rates.knows(msgid):
             return False
         self._rates.request(peer, msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
-        self._set_polls(self._ground.everyone())
+        self._follow_requests()
         return True
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
@@ -216,8 +218,17 @@ class OwnVehicle:
         pace_s = _TICK_S if poll is None else self._session.polls.interval_s(poll)
         return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
 
+    def _follow_requests(self) -> None:
+        """Set the polls now, or soon if that was just done."""
+        if self._now >= self._polls_set_at + _POLLS_INTERVAL_S:
+            self._set_polls(self._ground.everyone())
+        else:
+            self._polls_due = self._polls_set_at + _POLLS_INTERVAL_S
+            self.due = min(self.due, self._polls_due)
+
     def _set_polls(self, everyone: Sequence[Peer]) -> None:
         """Set each poll to the highest rate requested."""
+        self._polls_set_at, self._polls_due = self._now, inf
         wanted: dict[Msp, float] = {}
         for reading, interval_s in self._also_wanted.items():
             _want(wanted, reading, interval_s)

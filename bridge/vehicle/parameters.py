@@ -3,7 +3,7 @@
 
 import math
 
-from bridge.gcs.cost import TOO_MANY_WRITES, Cost
+from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import LinkLost
 from bridge.missions.fc_mission_store import PushFailure
@@ -64,7 +64,7 @@ class Parameters:
             self._ground.say(Severity.ERROR, _stays(fc_store.wp_radius_cm, PushFailure.ARMED), station)
             self._send(station, name)
             return
-        if not self._ground.allows(station, Cost.FLASH):
+        if not self._ground.flash.allows(station.peer, now):
             self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
             self._send(station, name)
             return

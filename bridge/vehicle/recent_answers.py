@@ -28,11 +28,11 @@ class Answer:
 
 
 class RecentAnswers:
-    """Remembers answers for 10 s. `moved_to`: the other addresses of a ground station (Ground.moved_to)."""
+    """Remembers answers for 10 s. `has_moved`: True if the second is the first's new address (Ground.has_moved)."""
 
-    def __init__(self, moved_to: Callable[[Station, float], list[Station]]) -> None:
-        self._moved_to = moved_to
-        self._answers: dict[Station, Answer] = {}
+    def __init__(self, has_moved: Callable[[Station, Station, float], bool]) -> None:
+        self._has_moved = has_moved
+        self._answers: dict[Station, Answer] = {}  # oldest first
 
     def note(self, station: Station, ack: MissionResult, count: int, now: float) -> None:
         """A final answer was sent."""
@@ -56,7 +56,7 @@ class RecentAnswers:
         self._forget_old(now)
         if station in self._answers:
             return self._answers[station]
-        return next((answer for who, answer in self._answers.items() if station in self._moved_to(who, now)), None)
+        return next((answer for who, answer in self._answers.items() if self._has_moved(who, station, now)), None)
 
     def is_known(self, station: Station, now: float) -> bool:
         """True if a station with these ids was answered, here or at an address that it may have left."""
@@ -64,4 +64,5 @@ class RecentAnswers:
         return any((who.sysid, who.compid) == (station.sysid, station.compid) for who in self._answers)
 
     def _forget_old(self, now: float) -> None:
-        self._answers = {who: answer for who, answer in self._answers.items() if now <= answer.until}
+        while self._answers and now > self._answers[oldest := next(iter(self._answers))].until:
+            del self._answers[oldest]

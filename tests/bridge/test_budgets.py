@@ -33,23 +33,32 @@ def test_flash_writes_are_limited() -> None:
     for number in range(200):
         world.after(number / 2, lambda: station.send(save))
     world.run(100)
-    assert 30 < sum(data.count(_SAVE) for _, _, data in world.written) <= 30 + 100 / 20 + 1
+    assert 30 < sum(data.count(_SAVE) for _, _, data in world.written) <= 33
 
 
 def test_new_peers_share_a_limit_per_host_and_a_total() -> None:
     pilot = Peer("udp", ("10.0.0.1", 14550))
     budgets = Budgets(lambda peer: peer == pilot)
-    for cost in (Cost.ARRIVAL, Cost.BOARD, Cost.FLASH, Cost.STORED, Cost.TEXT):
+    for cost in (Cost.ARRIVAL, Cost.BOARD, Cost.STORED, Cost.TEXT):
         limit = LIMITS[cost]
         spent = 0
-        for host in range(2, 12):
+        for host in range(2, 22):
             ports = (Peer("udp", (f"10.0.0.{host}", port)) for port in range(int(limit.each.burst) + 5))
             of_host = sum(budgets.allows(cost, peer, 0.0) for peer in ports)
             assert of_host <= limit.each.burst
             spent += of_host
         assert spent == int(limit.total.burst)
-    writes = [budgets.allows(Cost.FLASH, pilot, 0.0) for _ in range(100)]
-    assert sum(writes) == LIMITS[Cost.FLASH].each.burst
+        assert sum(budgets.allows(cost, pilot, 0.0) for _ in range(1000)) == limit.each.burst
+
+
+def test_a_newcomer_finds_as_much_left_as_each_greedy_host_has_used() -> None:
+    budgets = Budgets(lambda _peer: False)
+    hosts = [Peer("udp", (f"10.0.0.{host}", 14550)) for host in range(2, 12)]
+    for peer in hosts * 1000:
+        budgets.allows(Cost.TRANSFER, peer, 0.0)
+    newcomer = Peer("udp", ("10.0.0.1", 14550))
+    used = sum(budgets.allows(Cost.TRANSFER, newcomer, 0.0) for _ in range(1000))
+    assert used >= LIMITS[Cost.TRANSFER].total.burst / 11 / 2
 
 
 def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:

@@ -39,6 +39,11 @@ def same_again(draw: random.Random) -> Callable[[], Address]:
     return lambda: (f"10.0.0.{draw.randrange(3)}", draw.randrange(30))
 
 
+def many_hosts(draw: random.Random) -> Callable[[], Address]:
+    """Most addresses of a network, each of which comes again and again."""
+    return lambda: (f"10.0.0.{draw.randrange(200)}", 14550)
+
+
 def attack(world: World, spoken: list[Message], address: Callable[[], Address], per_s: int, seconds: float) -> None:
     stranger = GroundStation(world, "stranger", sysid=99)
     frames = itertools.cycle([stranger.pack(message) for message in spoken])
@@ -84,7 +89,7 @@ def test_refused_addresses_are_not_remembered() -> None:
     assert len(world.bridge.guard._told) <= MAX_PEERS
 
 
-@pytest.mark.parametrize("addresses", [new_hosts, new_ports, same_again])
+@pytest.mark.parametrize("addresses", [new_hosts, new_ports, same_again, many_hosts])
 def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random], Callable[[], Address]]) -> None:
     """The flood announces 500 lists a second, sixty times the limit for all newcomers together."""
     world = World(speeds=(115200,))

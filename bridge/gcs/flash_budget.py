@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Limits the writes to the flight controller's flash, a page of which endures 10,000. Sans-IO.
+
+A Harakiri with the mission extension allows 64 writes after a restart, and then one in 5 minutes (docs/msp-mission.md).
+All ground stations on open links together get no more than that, so that strangers cannot wear it out: 352 in 24 h.
+"""
+
+from collections.abc import Callable, Hashable
+
+from bridge.gcs.budget import TokenBucket
+from bridge.gcs.cost import Rate
+from bridge.gcs.guard import Standing
+from bridge.gcs.shares import Shares
+from bridge.gcs.station import Peer
+from bridge.gcs.stations import PRECEDENCE, Stations
+
+_WRITES = Rate(1 / 300, 64)
+
+#: The text for a ground station whose share is used up.
+TOO_MANY_WRITES = "Flash wear limit: try again in 5 minutes"
+
+
+class FlashBudget:
+    """Shares the writes between the hosts with precedence on an open link; all others have one account.
+
+    The last writes are kept for hosts that have not written lately, one for each. Above that, a host may write while
+    more than half as many writes are left as it has used: a single one gets 32 at once and 6 an hour. A host that gains
+    precedence takes over the account of one that has lost it: changing addresses gains nothing.
+
+    A peer with the key or a listed address has a budget of its own, but its writes count for the others, too.
+    """
+
+    def __init__(self, standing: Callable[[Peer], Standing], stations: Stations) -> None:
+        self._standing = standing
+        self._stations = stations
+        self._shares = Shares(_WRITES)
+        #: The hosts with precedence, and those that had it, each with an account of its own.
+        self._accounts: set[Hashable] = set()
+        self._proven: dict[Hashable, TokenBucket] = {}
+
+    def allows(self, peer: Peer, now: float) -> bool:
+        """Count a write; False if it must wait."""
+        self._open_accounts()
+        account = self._account(peer)
+        left, used = self._shares.left(now), self._shares.used(account)
+        if self._standing(peer) is Standing.PROVEN:
+            bucket = self._proven.setdefault(account, TokenBucket(_WRITES))
+            if not bucket.has(now):
+                return False
+            bucket.spend()
+        elif left <= min((PRECEDENCE + 1) * used, PRECEDENCE + used / 2):
+            return False
+        self._shares.spend(account)
+        return True
+
+    def not_written(self, peer: Peer) -> None:
+        """Take back a write: the flash held the same already."""
+        account = self._account(peer)
+        self._shares.spend(account, -1.0)
+        if (bucket := self._proven.get(account)) is not None:
+            bucket.spend(-1.0)
+
+    def used(self, peer: Peer) -> float:
+        """The recent writes of a peer's account."""
+        return self._shares.used(self._account(peer))
+
+    def _account(self, peer: Peer) -> Hashable:
+        is_proven = self._standing(peer) is Standing.PROVEN
+        return peer.host if is_proven or self._stations.has_standing(peer) else None
+
+    def _open_accounts(self) -> None:
+        present = self._stations.hosts_with_precedence()
+        left = sorted(self._accounts - present.keys(), key=self._shares.used)
+        for host in present:
+            if host not in self._accounts:
+                self._accounts.add(host)
+                if left:
+                    self._accounts.remove(left[0])
+                    self._shares.hand_over(left.pop(0), host)

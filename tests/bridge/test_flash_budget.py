@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strangers on an open link write as often as they can for a day; the pilot still writes, and the flash endures."""
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from bridge.gcs.flash_budget import FlashBudget
+from bridge.gcs.guard import Standing
+from bridge.gcs.station import Peer, Station
+from bridge.gcs.stations import Stations
+from protocols.mavlink.dialect import messages as m
+from protocols.mission_item import MissionResult
+from tests.support.conversations import Upload, records_of, waypoints
+from tests.support.world import Air, GroundStation, World
+
+HOUR_S = 3600.0
+PILOT = Peer("udp", ("10.0.0.1", 14550))
+#: A page lasts 10,000: four weeks of uninterrupted attack.
+MOST_IN_A_DAY = 64 + 24 * 12 + 1
+
+
+def host(number: int) -> Peer:
+    return Peer("udp", (f"10.1.{number // 256}.{number % 256}", 14550))
+
+
+class Field:
+    """A link whose stations send heartbeats, and the writes that they were allowed."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.stations = Stations()
+        self.budget = FlashBudget(lambda _peer: Standing.OPEN, self.stations)
+        self.writes = 0
+
+    def comes(self, *peers: Peer) -> None:
+        for beat in range(3):
+            for peer in peers:
+                self.stations.heard(Station(peer, 255, 190), 2, self.now + beat)
+        self.now += 3
+
+    def writes_now(self, peer: Peer) -> bool:
+        allowed = self.budget.allows(peer, self.now)
+        self.writes += allowed
+        return allowed
+
+
+def steady(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
+    """The same hosts all day."""
+    strangers = [host(number) for number in range(hosts)]
+    field.comes(*strangers)
+
+    def attack() -> None:
+        for stranger in strangers:
+            field.writes_now(stranger)
+
+    while True:
+        yield attack
+
+
+def rotating(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
+    """As many at a time, each replaced by a new one after its first write."""
+    names = itertools.count()
+    present: list[Peer] = []
+
+    def attack() -> None:
+        for stranger in present[:]:
+            if field.writes_now(stranger):
+                field.stations.gone(stranger)
+                present.remove(stranger)
+        new = [host(next(names)) for _ in range(hosts - len(present))]
+        field.comes(*new)
+        present.extend(new)
+
+    while True:
+        yield attack
+
+
+@pytest.mark.parametrize("attack", [steady, rotating])
+@pytest.mark.parametrize("hosts", [1, 15, 240])
+def test_a_day_of_attacks(attack: Callable[[Field, int], Iterator[Callable[[], None]]], hosts: int) -> None:
+    field = Field()
+    field.comes(PILOT)
+    for strike in itertools.islice(attack(field, hosts), 24 * 6):
+        strike()
+        field.now += 600
+    assert field.writes <= MOST_IN_A_DAY
+    # The pilot, who was there first, writes at once, and then every two hours.
+    assert field.writes_now(PILOT)
+    for _ in range(2):
+        for _ in range(24):
+            strike()
+            field.now += 300
+        assert field.writes_now(PILOT)
+
+
+def test_a_pilot_who_comes_after_a_day_of_attacks_writes_at_once() -> None:
+    """All 16 places with precedence are taken."""
+    field = Field()
+    strikes = steady(field, 16)
+    for strike in itertools.islice(strikes, 24 * 6):
+        strike()
+        field.now += 600
+    field.comes(PILOT)
+    assert not field.stations.has_standing(PILOT)
+    assert field.writes_now(PILOT)
+
+
+def test_a_pilot_alone_writes_half_of_all() -> None:
+    field = Field()
+    field.comes(PILOT)
+    assert [field.writes_now(PILOT) for _ in range(33)] == [True] * 32 + [False]
+    for _ in range(60):
+        field.now += 660
+        assert field.writes_now(PILOT)
+
+
+def test_a_list_that_was_there_already_is_no_write() -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    pilot = GroundStation(world)
+    for _ in range(40):
+        assert Upload(pilot, waypoints(3)).run(2) is MissionResult.ACCEPTED
+    assert world.bridge.ground.flash.used(pilot.peer) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("hosts", "lists"), [(3, 4), (16, 1)])
+def test_the_pilots_list_goes_before_those_of_stations_that_write_on_and_on(hosts: int, lists: int) -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
+    strangers = [GroundStation(world, f"stranger {number}", sysid=number) for number in range(1, hosts + 1)]
+    for station in strangers:
+        station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    numbers = itertools.count()
+
+    def write(station: GroundStation) -> None:
+        Upload(station, waypoints(3, seed=next(numbers)))
+        world.after(0.3, lambda: write(station))
+
+    for station in strangers:
+        write(station)
+    world.run(20)
+    written = world.bridge.ground.flash.used(strangers[0].peer)
+    assert written > 1
+    for seed in range(-lists, 0):
+        began = world.now
+        assert Upload(pilot, waypoints(20, seed), repeat_s=0.7).run(5) is MissionResult.ACCEPTED
+        assert world.now - began <= 2.0
+        assert world.stored == records_of(waypoints(20, seed))
+        world.run(1)
