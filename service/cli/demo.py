@@ -15,7 +15,6 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from bridge.model.finding import Finding
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult
 from service.cli.mission_client import ClientError, connect
@@ -24,7 +23,7 @@ from service.cli.mission_table import mission_table
 from service.cli.printing import print_table
 from service.cli.sentences import fail
 from service.control.client import ControlError, ask_daemon
-from service.control.mission_data import Json, mission_items
+from service.control.mission_data import Json, mission_findings, mission_items
 from service.machine.host import Host
 
 #: A link to examples/ in the repository, a file in the installed package.
@@ -66,7 +65,7 @@ def _show(items: list[MissionItem], file: Path, port: int, state_dir: Path, cons
         console.print(f"The vehicle answers MAV_MISSION_{result.name}.\n", markup=False)
         received = _latest_mission(state_dir)
         held = client.read()
-    findings = [Finding(**finding) for finding in received["findings"]]
+    findings = mission_findings(received["findings"])
     print_table(mission_table(items, held, findings))
     if result is not MissionResult.ACCEPTED:
         raise ClientError(f"the mission was not accepted: {'; '.join(client.texts)}")

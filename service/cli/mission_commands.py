@@ -7,14 +7,13 @@ from pathlib import Path
 
 import click
 
-from bridge.model.finding import Finding
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
 from service.cli.daemon_client import ask, ask_with_progress, bridge_options
 from service.cli.mission_source import load_mission, save_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import complain, fail, say
-from service.control.mission_data import Json, mission_items
+from service.control.mission_data import Json, mission_findings, mission_items
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _NO_SPACE = "MAV_MISSION_NO_SPACE"
@@ -112,7 +111,7 @@ def show_delivery(delivery: Json, *, as_json: bool) -> None:
     else:
         if delivery.get("sent") and delivery["ack"] != _NO_SPACE:
             sent, stored = (mission_items(delivery[key]) for key in ("sent", "stored"))
-            findings = [Finding(**finding) for finding in delivery["findings"]]
+            findings = mission_findings(delivery["findings"])
             print_table(mission_table(sent, stored, findings))
         say(f"{delivery['ack'].removeprefix('MAV_MISSION_')}: {delivery['text']}")
     if _would_erase(delivery):

@@ -18,6 +18,8 @@ _DROPPED = "red"
 _ADDED = "green"
 #: Names of stored commands are never shortened.
 _LONGEST_STORED = len("RETURN_TO_LAUNCH")
+#: Longer ones (coordinates, commands) take two lines, so that the table fits 80 columns.
+_LONGEST_PAIR = 8
 
 
 def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]) -> Table:
@@ -77,7 +79,8 @@ def _values(item: MissionItem) -> list[str]:
 def _cell(was: str, becomes: str) -> Text:
     if was == becomes or (was, becomes) == ("-", "0"):
         return Text(was)
-    return Text(f"{was}->{becomes}", style=_CHANGED)
+    line_end = "\n" if len(was + becomes) > _LONGEST_PAIR else ""
+    return Text(f"{was}{line_end}->{becomes}", style=_CHANGED)
 
 
 def _number(value: float) -> str:

@@ -9,14 +9,13 @@ import click
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import Finding
 from service.cli.command_group import CommandGroup
 from service.cli.daemon_client import ask_store, ask_with_progress, bridge_options, daemon_options
 from service.cli.mission_commands import show_delivery
 from service.cli.mission_table import difference_table, mission_table
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import say
-from service.control.mission_data import MOST, Json, mission_items
+from service.control.mission_data import MOST, Json, mission_findings, mission_items
 from service.web.comparison import difference
 
 
@@ -48,12 +47,12 @@ def list_missions(limit: int, state_dir: Path | None, as_json: bool) -> None:
     if not found:
         click.echo("No mission has been received yet.")
         return
-    table = Table("No.", "Received", "From", "Items", "Changes", "Outcome", "Detail", box=None, pad_edge=False)
+    table = Table("No.", "Received", "Items", "Changes", "Outcome", "From, and details", box=None, pad_edge=False)
     for mission in found:
         counts = (str(mission["item_count"]), str(mission["finding_count"]))
         when = _local_time(mission["received_at"])
-        source, detail = Text(mission["source"]), Text(mission["detail"])
-        table.add_row(str(mission["number"]), when, source, *counts, mission["outcome"], detail)
+        details = Text("\n".join(filter(None, (mission["source"], mission["detail"]))))
+        table.add_row(str(mission["number"]), when, *counts, mission["outcome"], details)
     print_table(table)
 
 
@@ -67,7 +66,7 @@ def show(number: int, state_dir: Path | None, as_json: bool) -> None:
         print_json(mission)
         return
     received = mission["received"]
-    findings = [Finding(**finding) for finding in received["findings"]]
+    findings = mission_findings(received["findings"])
     print_table(mission_table(mission_items(received["items"]), mission_items(received["stored_items"]), findings))
     click.echo(f"{_local_time(received['received_at'])} from {received['source']}")
     say(f"{received['verdict']} ({received['ack']}), {mission['outcome']}: {mission['detail']}")
@@ -109,4 +108,4 @@ def _fetch(state_dir: Path | None, number: int) -> Json:
 
 
 def _local_time(unix_s: float) -> str:
-    return datetime.fromtimestamp(unix_s).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    return datetime.fromtimestamp(unix_s).astimezone().strftime("%Y-%m-%d %H:%M")

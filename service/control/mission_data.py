@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict
 from typing import Any, TypeGuard
 
+from bridge.model.finding import Finding, News
 from bridge.model.verdict import Verdict
 from protocols.mission_item import MissionItem
 from protocols.mission_record import identify
@@ -40,6 +41,11 @@ def mission_items(data: object) -> list[MissionItem]:
     if not isinstance(data, list):
         raise ValueError("items must be a list")
     return [_item(entry) for entry in data]
+
+
+def mission_findings(data: list[Json]) -> list[Finding]:
+    """The findings in a verdict or a stored mission; older missions lack `news`."""
+    return [Finding(**finding | {"news": News(finding.get("news", News.NOTICE))}) for finding in data]
 
 
 def verdict_data(verdict: Verdict[Any]) -> Json:

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from bridge.model.finding import DROPPED, REJECTED, Finding, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
-from service.control.mission_data import Json, mission_items
+from service.control.mission_data import Json, mission_findings, mission_items
 
 #: No flight controller holds more: a longer list was rejected.
 MAX_ROWS = 500
@@ -19,7 +19,7 @@ _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_
 def stored_mission(mission: Json) -> Json:
     """A mission of the store (MissionJobs.show_mission) with rows that compare items as sent and as stored."""
     received = mission["received"]
-    findings = [Finding(**finding) for finding in received["findings"]]
+    findings = mission_findings(received["findings"])
     sent, stored = mission_items(received["items"]), mission_items(received["stored_items"])
     return {
         "number": mission["number"],
@@ -39,7 +39,7 @@ def stored_mission(mission: Json) -> Json:
 
 def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
     """The verdict on a list, with rows like those of `stored_mission`. verdict: of MissionJobs.check."""
-    findings = [Finding(**finding) for finding in verdict["findings"]]
+    findings = mission_findings(verdict["findings"])
     stored = mission_items(verdict["items"])
     return {
         "verdict": verdict["result"],

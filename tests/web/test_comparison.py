@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Comparison of lists: no row is missing, and every difference has a reason."""
 
+import json
 import math
 from dataclasses import asdict, replace
 
@@ -76,6 +77,15 @@ def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
     assert [row["kind"] for row in shown["rows"]] == ["same", "same", "changed"]
     assert [list(row["changes"]) for row in shown["rows"]] == [["p2"], ["p2"], ["p1"]]
     assert len(shown["findings"]) == 1
+
+
+def test_a_finding_reads_as_in_the_messages_tab() -> None:
+    """Also after it was stored as JSON."""
+    sent = [HOME, replace(HOME, seq=1, frame=3, alt_m=0.0), replace(HOME, seq=2, frame=3)]
+    verdict = check_list(sent, RULES)
+    stored = json.loads(to_json(verdict_data(verdict)))
+    assert checked_mission(sent, stored)["findings"] == [finding.text() for finding in verdict.findings]
+    assert checked_mission(sent, stored)["findings"] == ["WP 1: Alt raised from 0 to 2 m (0 not allowed)"]
 
 
 def test_an_extra_item_is_one_extra_row() -> None:
