@@ -268,16 +268,19 @@ class MspLink:
 
     def _settle(self, reply: MspFrame, now: float) -> None:
         """Match a reply with its request. Earlier requests will not be answered any more."""
-        alike = [sent for sent in self._sent if sent.command == reply.command]
-        if not alike:
+        command = reply.command
+        earlier = next((number for number, sent in enumerate(self._sent) if sent.command == command), None)
+        if earlier is None:
             return
-        if reply.command == self._risky:
+        oldest = self._sent[earlier]
+        if command == self._risky:
             self._follow_up_at = inf
-        oldest = alike[0]
-        earlier = self._sent.index(oldest)
-        self.requests_lost += sum([sent.awaited for sent in self._sent[:earlier]])
+        if earlier:
+            self.requests_lost += sum([sent.awaited for sent in self._sent[:earlier]])
         del self._sent[: earlier + 1]
-        answered = next((sent for sent in alike if sent.awaited), None)
+        answered: _Request | None = oldest
+        if not oldest.awaited:
+            answered = next((sent for sent in self._sent if sent.awaited and sent.command == command), None)
         if answered is None:
             return
         self._losses_in_a_row = 0

@@ -172,11 +172,11 @@ class PollSchedule:
         """Send the requests that are due, as far as the link has room."""
         self._look_at(link, beside_missions)
         limit = now
-        while now >= self._free_at:
+        soon = now + _GATHER_S
+        near = [slot for slot in self._slots.values() if slot.due <= soon]
+        while near and now >= self._free_at:
             room = link.room
-            ready = [
-                slot for slot in self._slots.values() if slot.due <= limit and slot.may_be_asked_at(link, room) <= limit
-            ]
+            ready = [slot for slot in near if slot.may_be_asked_at(link, room) <= limit]
             if not ready:
                 return
             slot = max(ready, key=lambda slot: (now - slot.asked_at) / slot.interval_s)
@@ -186,7 +186,8 @@ class PollSchedule:
             slot.asked(now)
             self._free_at = max(self._free_at, now - _BURST_S) + slot.cost / self._budget
             link.send(Send(slot.poll.frame, slot.poll.command, slot.size), now)
-            limit = now + _GATHER_S
+            limit = soon
+            near = [slot for slot in near if slot.due <= soon]
 
     def answered(self, frame: MspFrame) -> bool:
         """Take a reply; False if its command is not polled."""

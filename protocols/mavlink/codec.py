@@ -14,6 +14,8 @@ from protocols.mavlink.message_table import MESSAGE_FORMATS
 _SIGNED = 0x01
 _CRC_SIZE = 2
 _LAST_V1_ID = 255
+#: Payload size, both kinds of flags, sequence number, sender's ids, and the message id's lower 16 and upper 8 bits.
+_HEADER_V2 = struct.Struct("<BBBBBBHB")
 
 
 class MavlinkDecoder:
@@ -87,9 +89,8 @@ class FrameWriter:
         else:
             magic, payload = MAGIC_V2, packed.payload_v2
             flags = 0 if self._sign is None else _SIGNED
-            body = (
-                bytes((len(payload), flags, 0, seq, self._sysid, self._compid)) + msgid.to_bytes(3, "little") + payload
-            )
+            body = _HEADER_V2.pack(len(payload), flags, 0, seq, self._sysid, self._compid, msgid & 0xFFFF, msgid >> 16)
+            body += payload
         crc = mcrf4xx(body + bytes((CRC_EXTRA[msgid],)))
         frame = bytes((magic,)) + body + crc.to_bytes(_CRC_SIZE, "little")
         return frame if self._sign is None or magic == MAGIC_V1 else frame + self._sign(frame)

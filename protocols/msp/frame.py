@@ -35,6 +35,8 @@ class Direction(Enum):
 
 
 _DIRECTIONS = {direction.value: direction for direction in Direction}
+_HEADS = tuple(bytes((*_START, version, direction)) for version in (_V1, _V2) for direction in _DIRECTIONS)
+_HEAD_SIZE = 3
 
 
 @dataclass(slots=True)  # not frozen, as in protocols.mavlink.frame
@@ -124,10 +126,9 @@ class MspParser:
 def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | None:
     """The end of the frame at `start`; None if its header is incomplete, `start` if it is not a frame."""
     size = len(buffer) - start
-    if size >= 2 and buffer[start + 1] not in (_V1, _V2):
-        return start
-    if size >= 3 and buffer[start + 2] not in _DIRECTIONS:
-        return start
+    if not buffer.startswith(_HEADS, start):
+        cut = bytes(buffer[start : start + _HEAD_SIZE])
+        return None if any(head.startswith(cut) for head in _HEADS) else start
     if size < _V1_OVERHEAD - 1:
         return None
     is_request = buffer[start + 2] == Direction.REQUEST.value

@@ -44,6 +44,8 @@ _FINISH_S = 1.0
 _ABORT_S = 0.6
 _STORE_TIMEOUT_S = 0.2
 _REST_INTERVAL_S = 0.02
+#: A timer that would fire sooner than this before the deadline is worth a new one: it would wake the process in vain.
+_TOO_EARLY_S = 0.01
 #: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
 _FLIGHT = {"vehicle.armed": True, "vehicle.disarmed": False}
@@ -241,8 +243,9 @@ class Daemon:
         self._tell_followers()
         self._deadline = bridge.next_deadline()
         if self._timer is not None:
-            if self._timer.when() <= self._deadline:
-                # Every reply postpones the deadline. A timer that fires too early costs less than a new one each time.
+            if 0 <= self._deadline - self._timer.when() < _TOO_EARLY_S:
+                # Every reply postpones the deadline a little, mostly to that of a request sent later. A timer that
+                # fires too early costs less than a new one each time.
                 return
             self._timer.cancel()
         self._timer = self._loop.call_at(self._deadline, self._tick)
