@@ -24,8 +24,8 @@ _LONG = (
     "tests/simulator/test_sim_links",
     "tests/web/test_page_accessibility",
 )
-#: Folders of tests that mostly wait for programs.
-_WAITING = tuple(f"tests/{name}/" for name in ("attack", "cli", "doctor", "e2e", "fleet", "links", "settings", "web"))
+#: Folders of tests that mostly wait for programs, those with the longest files first.
+_WAITING = tuple(f"tests/{name}/" for name in ("web", "fleet", "e2e", "attack", "cli", "links", "doctor", "settings"))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -33,7 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     This uses the cores better than one kind after the other. The order within a file is kept."""
     files = list(dict.fromkeys(_file(item) for item in items))
-    waiting = [file for file in files if file.startswith(_WAITING)]
+    waiting = [file for folder in _WAITING for file in files if file.startswith(folder)]
     computing = [file for file in files if not file.startswith(_WAITING)]
     place = {file: at / len(kind) for kind in (waiting, computing) for at, file in enumerate(kind)}
     place |= {file: at - len(_LONG) for file in files for at, long in enumerate(_LONG) if file.startswith(long)}

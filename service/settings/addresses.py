@@ -149,7 +149,7 @@ def _meant_gcs(word: str, rest: str) -> str:
     near = get_close_matches(word.lower(), _GCS_KINDS, n=1)
     if near and rest:
         return f"did you mean {near[0]}:{rest}? Else "
-    if rest.isdecimal():
+    if rest.isdecimal() and "/" not in word:
         return f"did you mean udpout:{word}:{rest}? Else "
     return f"did you mean udpin:{word}? Else " if word.isdecimal() else ""
 
