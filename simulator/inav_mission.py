@@ -53,7 +53,7 @@ class InavMission:
 
     @property
     def lands_after_rth(self) -> bool:
-        """True if a mission's RTH ends with a landing. The last waypoint's p1 decides, whatever its action is."""
+        """True if a mission's RTH ends with a landing. The last waypoint's p1 decides, regardless of its action."""
         return self[self.count - 1].p1 > 0
 
     def read(self, number: int, armed: bool) -> NavWaypoint:

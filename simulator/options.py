@@ -60,7 +60,7 @@ class BoardFaults:
 
     The rates are probabilities per bit and per byte, in both directions. `hang`: the CPU stops. `armed` is the
     pilot's request, which the firmware may refuse. The power fails during the given flash operation from now on (page
-    erases and 16-byte programs, or half-words on the emulated Naze, from 1; 0: never), or so many of them fail.
+    erases and 16-byte programs, or half-words on the emulated Naze, from 1; 0: never), or a number of operations fail.
     """
 
     bit_error_rate: float = 0.0

@@ -139,7 +139,7 @@ def _status(vehicle: Vehicle, payload: bytes, controller: FlightController, now:
     active = names_of_active(status.box_flags, controller.boxes)
     armed = ARM_BOX in active if ARM_BOX in controller.boxes else None
     mode = flight_mode(active) if controller.boxes else None
-    # Disarmed, the box only says that there is no RC link.
+    # While disarmed, the box only means that there is no RC link.
     vehicle.hear(FlightState(now, Source.MSP, armed, mode, bool(armed) and FAILSAFE_BOX in active))
 
 

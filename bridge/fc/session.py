@@ -20,7 +20,7 @@ from bridge.model.autopilot import Autopilot
 from bridge.model.events import EventLog, Incidents, Level
 from protocols.mavlink.frame import MavlinkFrame
 
-#: State -> event, or what was found -> next state. Any other event in a state is a bug.
+#: State -> event or search result -> next state. Any other event in a state is a bug.
 TRANSITIONS: Mapping[type[State], Mapping[type[Event] | Spoken, type[State]]] = {
     Closed: {PortOpened: Searching},
     Searching: {

@@ -10,8 +10,8 @@ from bridge.gcs.station import Peer
 
 K = TypeVar("K", bound=Hashable)
 
-#: Hosts with the same hash share a budget, so that made-up ones need no more memory than this. The hash of a text is
-#: another in each process: nobody can choose an address that shares the pilot's.
+#: Hosts with the same hash share a budget, so forged ones cannot use more memory than this. The hash of a text differs
+#: between processes, so an attacker cannot choose an address that shares the pilot's budget.
 _HOST_GROUPS = 1024
 
 

@@ -8,8 +8,7 @@ from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
 from bridge.gcs.station import Peer
 
-#: Messages a second to all ground stations together. The defaults are 55 a second. Those with standing share half of
-#: it, at least 75 a second for each of the 16 on a link, and the others the rest.
+#: Messages a second to all ground stations together. The defaults are 55 a second. Peers with standing share one half, at least 75 a second for each of the 16 on a link, all others the other half.
 _MOST_PER_S = 2400
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
@@ -85,5 +84,5 @@ class MessageRates:
 
 
 def _share(peers: int) -> Rate:
-    """The share of each of so many peers in a half."""
+    """Each peer's share of half the total rate."""
     return Rate(_MOST_PER_S / 2 / max(peers, 1), _MOST_PER_S / 2 / max(peers, 1))

@@ -85,7 +85,7 @@ class Runner:
         return task
 
     def reset(self, now: float) -> None:
-        """End the running conversation, whatever it waits for, as if the line were gone."""
+        """End the running conversation as if the line were gone."""
         if self._current is not None and not self._busy:
             self._advance(LinkLost("internal error"), now)
 

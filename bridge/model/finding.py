@@ -25,7 +25,7 @@ _PARAMS: Mapping[int, tuple[str, ...]] = {
 }
 _METRES = ("alt_m", "Hit Rad")
 
-#: Makes a finding of an item: field, value as sent, what it becomes, why.
+#: Makes a finding of an item: field, value as sent, value as stored, reason.
 Note = Callable[[MissionItem, str, float | None, float | str | None, str], None]
 
 

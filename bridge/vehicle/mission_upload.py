@@ -51,7 +51,7 @@ _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few 
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 #: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
 _REMINDERS_S = (2.0, 4.0)
-#: The limit of uploads at a time. Of more, the one with the slowest progress ends.
+#: The maximum number of simultaneous uploads. Beyond it the one with the slowest progress ends.
 _MOST_UPLOADS = 64
 #: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
 #: out the others. A pause ends that.

@@ -33,7 +33,7 @@ _TICK_S = 1.0
 _POLLS_INTERVAL_S = 0.25
 #: Mission Planner needs two heartbeats to connect.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
-#: Home, and what prevents arming, are repeated for newcomers no more often.
+#: The minimum interval at which home and arming blockers are repeated for newcomers.
 _REPEAT_S = 5.0
 #: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
 _SILENT_S = 3.0
@@ -51,7 +51,7 @@ _READINGS = {row.msgid: row.reading for row in TELEMETRY}
 (_SYS_STATUS,) = (row for row in TELEMETRY if row.msgid == messages.MAVLINK_MSG_ID_SYS_STATUS)
 _DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | dict.fromkeys(_TICKED_STREAMS, _TICK_S)
 
-#: What a heartbeat shows: armed, mode, failsafe.
+#: The values in a heartbeat: armed, mode, failsafe.
 _ShownState = tuple[bool | None, FlightMode | str | None, bool]
 
 
@@ -315,7 +315,7 @@ class OwnVehicle:
             self._ground.broadcast(vehicle_messages.mission_item_reached(seq))
 
     def _tell_readiness(self) -> None:
-        """Report what prevents arming, whenever that changes; nothing in flight."""
+        """Report the arming blockers whenever they change, except in flight."""
         readiness = self._session.vehicle.last(Readiness)
         if readiness is None or readiness.blockers == self._told_blockers:
             return

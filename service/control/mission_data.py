@@ -37,7 +37,7 @@ def strict(value: Any) -> Any:
 
 
 def mission_items(data: object) -> list[MissionItem]:
-    """Read the items of a list from plain data; ValueError explains what is wrong."""
+    """Read the items of a list from plain data; ValueError gives the reason."""
     if not isinstance(data, list):
         raise ValueError("items must be a list")
     return [_item(entry) for entry in data]

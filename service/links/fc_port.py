@@ -21,7 +21,7 @@ _READ_SIZE = 4096
 _RETRY_S = 0.25
 #: Unsent bytes above this are dropped: ground stations can send faster than a UART.
 _MAX_UNSENT = 8192
-#: So many reads within this time cost more than the delay of gathering is worth. Timers are rounded up to whole ms.
+#: From this many reads within this time on, each costs more than the delay of gathering. Timers round up to whole ms.
 _MANY_READS = 100
 _RATE_WINDOW_S = 0.1
 _GATHER_S = 0.0019

@@ -128,7 +128,7 @@ class _TcpClient:
             return
         if self._unsent:
             if not self._unsent.add(data):
-                # With so many unread replies, another one is useless.
+                # With this many unread replies, another one would be useless.
                 self._hang_up()
             return
         sent = self._try_send(memoryview(data))

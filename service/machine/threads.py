@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Threads beside the event loop: the way back to it, and a thread for work on a disk that may hang.
+"""Threads alongside the event loop: the way back to it, and a thread for work on a disk that may hang.
 
 Neither the event loop nor the end of the process waits for the disk.
 """

@@ -32,5 +32,5 @@ class WebSettings:
 
 
 def parse_listen(text: str) -> ListenAddress:
-    """Read "HOST:PORT"; AddressError explains what is wrong."""
+    """Read "HOST:PORT"; AddressError gives the reason."""
     return ListenAddress(*parse_host_port(f"web.listen {text}", text, _FORMS))

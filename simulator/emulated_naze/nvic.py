@@ -82,7 +82,7 @@ class Nvic:
         self._choose()
 
     def _choose(self) -> None:
-        """Find the exception to take now: the most urgent one, if it would preempt what is active."""
+        """Find the exception to take now: the most urgent one, if it would preempt the active one."""
         waiting = list(self._system_pending)
         pending = self._pending & self._enabled
         while pending:

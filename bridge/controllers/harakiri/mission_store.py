@@ -46,7 +46,7 @@ _BUSY_INTERVAL_S = 0.1
 _MAX_BEGINS = 3
 #: A push may take this long, and twice the time of its bytes on the line: Mission Planner waits 4.9 s for the ack.
 _PUSH_S = 3.8
-#: How long to ask what has become of a COMMIT without a reply.
+#: How long to ask for the outcome of a COMMIT without a reply.
 _LOOK_S = 0.6
 #: Losses in a row without progress before a push is given up.
 _MAX_VAIN = 20
@@ -140,7 +140,7 @@ class HarakiriMissions(HarakiriStore):
         except LinkLost:
             failure = PushFailure.NO_ANSWER
         if self._may_be_stored:
-            return PushResult((yield from self._look_what_is_stored(wanted, failure)))
+            return PushResult((yield from self._outcome_of_commit(wanted, failure)))
         return PushResult(failure)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
@@ -268,7 +268,7 @@ class HarakiriMissions(HarakiriStore):
             committing = False
             most = max(most // 2, 1)
 
-    def _look_what_is_stored(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
+    def _outcome_of_commit(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
         """Ask if COMMIT succeeded after all; only silence leaves it uncertain."""
         try:
             yield TimeLimit(_LOOK_S)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV: the list is only in RAM until SAVE; an incomplete list cannot be flown (docs/inav.md).
 
-Its store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all of them are counted and read;
+Its store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all missions are counted and read;
 armed, only the loaded one. Writing record 1 wipes them all, so they are written again behind a new list.
 """
 

@@ -40,7 +40,7 @@ def _reached(records: Sequence[NavRecord], starts: set[int]) -> set[int]:
 
 
 def lands_after_rth(records: Sequence[NavRecord]) -> bool:
-    """True if an INAV lands after any RTH of the list: the last record's p1 decides, whatever its action is.
+    """True if an INAV lands after any RTH of the list: the last record's p1 decides, regardless of its action.
 
     INAV keeps a JUMP's target as an index, so one to the first record counts as 0.
     """

@@ -50,7 +50,7 @@ _TRIES = 5
 #: changes, and transfers, have to wait until it ends.
 _CHECKS = 6
 _LEAST_COMPARED, _MOST_COMPARED = 4, 12
-#: So many former lists are remembered: LOAD, or another client, is likely to bring one of them back.
+#: The number of former lists remembered: LOAD or another client is likely to bring one of them back.
 _FORMER = 3
 #: Restarts of one push after a read-back mismatch.
 _MAX_BEGINS = 3
@@ -164,7 +164,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return before
 
     def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
-        """Restore the old list if that takes no time; True if it is there."""
+        """Restore the old list if that takes no time; True if it is restored."""
         yield from ()
         return False
 
@@ -247,7 +247,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
             self._watched, self._compared = known, 0
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
-        """Write the old list again, if known; True if it is there."""
+        """Write the old list again, if known; True if it is restored."""
         if not before or self._vehicle.armed:
             return False
         try:
