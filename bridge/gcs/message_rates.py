@@ -8,7 +8,8 @@ from bridge.gcs.budget import TokenBucket
 from bridge.gcs.cost import Rate
 from bridge.gcs.station import Peer
 
-#: Messages a second to all ground stations together. The defaults are 55 a second. Peers with standing share one half, at least 75 a second for each of the 16 on a link, all others the other half.
+#: Messages a second to all ground stations together. The defaults are 55 a second. Peers with standing share one half,
+#: at least 75 a second for each of the 16 on a link; all others share the other half.
 _MOST_PER_S = 2400
 #: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
