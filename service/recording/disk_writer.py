@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes from the event loop to a slow disk, through a thread: the loop never waits."""
+"""Records from the event loop to a slow disk, through a thread: the loop never waits."""
 
 import threading
 from collections.abc import Callable
+from typing import Generic, TypeVar
 
 import structlog
 
@@ -11,45 +12,40 @@ _FLUSH_S = 1.0
 #: For the last write: a hanging disk must not keep the daemon from ending.
 _CLOSE_TIMEOUT_S = 1.0
 #: Bytes beyond this are dropped while an SD card stalls: minutes of telemetry, 90 s of a full UART at 115200.
+#: (Telemetry takes six times as much memory while it waits.)
 _MAX_WAITING = 1 << 20
 
 _log = structlog.get_logger()
 
+T = TypeVar("T")
 
-class DiskWriter:
-    """Calls `write` on its thread once a second, with the bytes from `put`.
 
-    `lock` guards the bytes. `on_take` is called with it held, when bytes are taken: bytes put after that go into the
-    next `write`. `on_end` is called after the last `write`.
-    """
+class DiskWriter(Generic[T]):
+    """Calls `write` on its thread once a second, with the records from `put`. `on_end` is called after the last."""
 
-    def __init__(
-        self,
-        name: str,
-        write: Callable[[bytes], None],
-        on_end: Callable[[], None],
-        on_take: Callable[[], None] = lambda: None,
-    ) -> None:
+    def __init__(self, name: str, write: Callable[[list[T]], None], on_end: Callable[[], None]) -> None:
         self._name = name
         self._write = write
         self._on_end = on_end
-        self._on_take = on_take
-        self._waiting = bytearray()
+        self._waiting: list[T] = []
+        self._size = 0
         self._ending = threading.Event()
-        self.lock = threading.Lock()
+        self._lock = threading.Lock()
         #: Bytes dropped because too many were waiting.
         self.dropped = 0
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def put(self, data: bytes) -> None:
-        """Queue bytes, or drop them if too many are waiting. Hold `lock`."""
-        if len(self._waiting) + len(data) <= _MAX_WAITING:
-            self._waiting += data
-            return
+    def put(self, record: T, size: int) -> None:
+        """Queue a record of so many bytes, or drop it if too many are waiting."""
+        with self._lock:
+            if self._size + size <= _MAX_WAITING:
+                self._waiting.append(record)
+                self._size += size
+                return
         if not self.dropped:
             _log.warning("disk.too_slow", writing=self._name, why="the disk does not keep up; some data is dropped")
-        self.dropped += len(data)
+        self.dropped += size
 
     def close(self) -> None:
         """Write the rest, then end the thread."""
@@ -63,7 +59,6 @@ class DiskWriter:
         self._on_end()
 
     def _flush(self) -> None:
-        with self.lock:
-            data, self._waiting = self._waiting, bytearray()
-            self._on_take()
-        self._write(bytes(data))
+        with self._lock:
+            records, self._waiting, self._size = self._waiting, [], 0
+        self._write(records)

@@ -2,7 +2,7 @@
 """Writes the frames to and from ground stations into telemetry logs."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from protocols.mavlink.dialect import messages
@@ -13,6 +13,8 @@ from service.settings import TlogLimits
 
 #: A larger jump means that the clock was set: a Pi gets the time only from the network.
 _CLOCK_STEP_US = 10_000_000
+#: When frames were sent or received, monotonic nanoseconds, and the frames.
+_Taken = tuple[int, Sequence[bytes]]
 
 
 class TlogRecorder:
@@ -28,26 +30,20 @@ class TlogRecorder:
         self._folder = TlogFolder(folder, limits)
         self._read_clock = read_clock
         self._epoch_us = self._present_epoch_us()
-        self._file_is_over = False
         self._is_flying = False
         self._has_flown = False  # since the last write
         self._awaits_vehicle = True
-        self._writer = DiskWriter("telemetry log", self._write, self._folder.close, self._taken)
+        self._writer = DiskWriter("telemetry log", self._write, self._folder.close)
 
     def on_frames(self, frames: Sequence[bytes]) -> None:
-        """Record whole frames that were sent or received just now."""
-        now_us = time.monotonic_ns() // 1000
-        with self._writer.lock:
-            at_us = self._epoch_us + now_us
-            if self._awaits_vehicle:
-                frames = self._from_vehicle_on(frames)
-            self._writer.put(b"".join([tlog_record(frame, at_us) for frame in frames]))
+        """Record whole frames that were sent or received just now; they must not change any more."""
+        self._writer.put((time.monotonic_ns(), frames), sum(map(len, frames)))
 
     def flies(self, *, is_flying: bool) -> None:
         """Mark the following frames as part of a flight, or not."""
-        with self._writer.lock:
-            self._is_flying = is_flying
-            self._has_flown = self._has_flown or is_flying
+        self._is_flying = is_flying
+        if is_flying:
+            self._has_flown = True
 
     def describe(self) -> str:
         """The file in use, or the reason why there is none, for the status."""
@@ -69,21 +65,23 @@ class TlogRecorder:
             found.append(frame)
         return found
 
-    def _taken(self) -> None:
-        """Choose the file for the following frames: a time step needs a new one."""
+    def _write(self, taken: list[_Taken]) -> None:
+        """Runs on the writer's thread, as do all methods from here on. A time step needs a new file."""
         epoch_us = self._present_epoch_us()
         stepped = abs(epoch_us - self._epoch_us) > _CLOCK_STEP_US
-        self._file_is_over = stepped or self._folder.is_full
-        if self._file_is_over:
+        file_is_over = stepped or self._folder.is_full
+        is_flight, self._has_flown = self._has_flown, self._is_flying
+        self._folder.write(b"".join(self._records(taken)), time.monotonic(), is_flight=is_flight)
+        if file_is_over:
+            self._folder.close()
             self._epoch_us = epoch_us
             self._awaits_vehicle = True
 
-    def _write(self, records: bytes) -> None:
-        with self._writer.lock:
-            is_flight, self._has_flown = self._has_flown, self._is_flying
-        self._folder.write(records, time.monotonic(), is_flight=is_flight)
-        if self._file_is_over:
-            self._folder.close()
+    def _records(self, taken: list[_Taken]) -> Iterator[bytes]:
+        for at_ns, frames in taken:
+            at_us = self._epoch_us + at_ns // 1000
+            for frame in self._from_vehicle_on(frames) if self._awaits_vehicle else frames:
+                yield tlog_record(frame, at_us)
 
     def _present_epoch_us(self) -> int:
         """The time at which the monotonic clock was 0, microseconds since the Unix epoch."""

@@ -57,13 +57,12 @@ class UartRecorder:
             self._end(f"it has {self._size >> 20} MB, the maximum")
             return
         self._size += len(line)
-        with self._writer.lock:
-            self._writer.put(line)
+        self._writer.put(line, len(line))
 
-    def _write(self, lines: bytes) -> None:
+    def _write(self, lines: list[bytes]) -> None:
         if not lines:
             return
-        view = memoryview(lines)
+        view = memoryview(b"".join(lines))
         try:
             while view:
                 view = view[os.write(self._descriptor, view) :]

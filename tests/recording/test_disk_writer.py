@@ -10,15 +10,14 @@ from service.recording.disk_writer import DiskWriter
 ROOM = 1 << 20
 
 
-def put(writer: DiskWriter, data: bytes) -> None:
-    with writer.lock:
-        writer.put(data)
+def put(writer: DiskWriter[bytes], data: bytes) -> None:
+    writer.put(data, len(data))
 
 
 def test_everything_is_written_in_order_before_the_end() -> None:
     written: list[bytes] = []
     ended: list[bool] = []
-    writer = DiskWriter("test", written.append, lambda: ended.append(True))
+    writer = DiskWriter[bytes]("test", written.extend, lambda: ended.append(True))
     pieces = [bytes((number,)) * number for number in range(100)]
     for piece in pieces:
         put(writer, piece)
@@ -31,12 +30,12 @@ def test_a_hung_disk_blocks_nothing_and_is_reported_once() -> None:
     hangs, goes_on = threading.Event(), threading.Event()
     written: list[bytes] = []
 
-    def write(data: bytes) -> None:
-        written.append(data)
+    def write(records: list[bytes]) -> None:
+        written.extend(records)
         hangs.set()
         assert goes_on.wait(30)
 
-    writer = DiskWriter("test", write, lambda: None)
+    writer = DiskWriter[bytes]("test", write, lambda: None)
     put(writer, b"first")
     assert hangs.wait(30)
     with capture_logs() as events:
