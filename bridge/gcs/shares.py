@@ -8,6 +8,8 @@ from bridge.gcs.cost import Rate
 
 #: Counts grow by this factor before they are scaled back, which forgets those below 1 / 1000.
 _RESCALE_AT = 1e6
+#: After so many times the memory's length nothing is left of a count; the clock may also begin at any value.
+_ALL_FORGOTTEN = 50.0
 
 
 class Shares:
@@ -24,7 +26,7 @@ class Shares:
 
     def left(self, now: float) -> float:
         """The uses left; below 0 if more were spent."""
-        self._unit *= exp(max(0.0, now - self._unit_at) / self._memory_s)
+        self._unit *= exp(min(max(0.0, now - self._unit_at) / self._memory_s, _ALL_FORGOTTEN))
         self._unit_at = now
         if self._unit >= _RESCALE_AT:
             kept = {account: used / self._unit for account, used in self._used.items()}
