@@ -8,8 +8,8 @@ from simulator.flight import FlightState
 from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
 from simulator.msp_sensors import MspCommand, SensorReplies
 from simulator.multiwii_mission import MultiWiiMission
-from simulator.multiwii_navigation import MultiWiiNavigation
-from simulator.nav_status import Mode, State
+from simulator.multiwii_navigation import HIGHEST_M, SAFE_DISTANCE_M, MultiWiiNavigation
+from simulator.nav_status import Error, Mode, State
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import WaypointCraft
 
@@ -56,7 +56,7 @@ class MultiWiiFirmware(MspFirmware):
         if self.armed:
             self._home = self._navigation.home = self._craft.position
         else:
-            self._navigation.end()
+            self._navigation.end(Error.DISARMED)
             self._craft.rest()
 
     def _state(self) -> FlightState:
@@ -110,8 +110,7 @@ class MultiWiiFirmware(MspFirmware):
             return self._told(navigation.step, navigation.step.action, (lat, lon), flag).pack(number)
         if navigation.state is not State.NONE:
             return self._told(navigation.step, 0, home, _FLAG_IN_PROGRESS).pack(number)
-        navigation.step, is_sound = self._mission.recall(number)
-        navigation.number = number
+        navigation.number, navigation.step, is_sound = self._mission.recall(number)
         return (navigation.step if is_sound else replace(navigation.step, flag=_FLAG_CRC_ERROR)).pack(number)
 
     @staticmethod
@@ -125,7 +124,7 @@ class MultiWiiFirmware(MspFirmware):
             case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
             case MspCommand.NAV_CONFIG:
-                speeds = (200, 500, 100, 400, 100)
+                speeds = (200, SAFE_DISTANCE_M, HIGHEST_M, 400, 100)
                 limits = (40, 3000, 20, 100, 600)
                 return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
         return _SENSORS.payload(command, self.craft_at(self._clock))

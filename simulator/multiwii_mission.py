@@ -6,12 +6,12 @@ import struct
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 
 SLOT_SIZE = WAYPOINT_SIZE + 1
-_BLANK = NavWaypoint(action=0, flag=0)
+_ERASED = b"\xff" * SLOT_SIZE
 
 
 def blank_eeprom(capacity: int) -> bytearray:
     """A factory-new EEPROM: no waypoint's checksum is valid."""
-    return bytearray(b"\xff" * (SLOT_SIZE * (capacity + 1)))
+    return bytearray(_ERASED * (capacity + 1))
 
 
 class MultiWiiMission:
@@ -32,12 +32,13 @@ class MultiWiiMission:
             found.append(slot[:-1])
         return found
 
-    def recall(self, number: int) -> tuple[NavWaypoint, bool]:
-        """A waypoint, and True if its checksum is valid."""
-        if number > self._capacity:
-            return _BLANK, False
-        slot = self._slot(number)
-        return unpack_waypoint(slot[:-1])[1], _is_sound(slot)
+    def recall(self, number: int) -> tuple[int, NavWaypoint, bool]:
+        """A waypoint with the number in its slot, and True if its checksum is valid.
+
+        Above the capacity are the EEPROM's other contents; here it is erased.
+        """
+        slot = self._slot(number) if number <= self._capacity else _ERASED
+        return *unpack_waypoint(slot[:-1]), _is_sound(slot)
 
     def store(self, number: int, waypoint: NavWaypoint) -> bool:
         """Write one; False if the number is out of range."""

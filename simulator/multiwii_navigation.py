@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii 2.4's return home, and its mission mode (GPS.cpp): it fetches one step after the other from the EEPROM.
 
-Not simulated: safe distances, the settling before a landing, and resuming an interrupted mission.
+Not simulated: the fence, the settling before a landing, and resuming an interrupted mission.
 """
 
+import math
+
+from simulator.flight import METRES_PER_DEGREE, METRES_PER_DEGREE_EAST
 from simulator.multiwii_mission import MultiWiiMission
 from simulator.nav_status import Error, Mode, NavStatus, State
 from simulator.nav_waypoint import FLAG_LAST, Action, NavWaypoint
@@ -14,6 +17,8 @@ _HOVER_HEIGHT_M = 10.0
 #: NAV_CONFIG's rth_altitude: the lowest altitude of an RTH, unless the step's own is higher.
 _RTH_HEIGHT_M = 20.0
 _NO_JUMP = -10
+#: NAV_CONFIG's safe_wp_distance and nav_max_altitude: a longer leg is not begun, and no greater height is flown at.
+SAFE_DISTANCE_M, HIGHEST_M = 500, 100
 
 
 class MultiWiiNavigation:
@@ -22,20 +27,21 @@ class MultiWiiNavigation:
     def __init__(self, mission: MultiWiiMission, craft: WaypointCraft) -> None:
         self._mission = mission
         self._craft = craft
-        self._error = Error.NONE
+        self._error = Error.DISARMED
         self._next_step = 1
         self._jumps = _NO_JUMP
         self._held_s = self._rth_height_m = 0.0
+        self._leg_from = craft.position
         self.home = craft.position
         self.mode = Mode.NONE
         self.state = State.NONE
         self.step = NavWaypoint(action=0, flag=0)
         self.number = 0
 
-    def end(self) -> None:
+    def end(self, error: Error) -> None:
         """Stop: disarmed, or the switch is off."""
         self.mode, self.state = Mode.NONE, State.NONE
-        self._error = Error.NONE
+        self._error = error
 
     def status(self) -> NavStatus:
         """The content of MSP_NAV_STATUS."""
@@ -44,12 +50,13 @@ class MultiWiiNavigation:
     def fly(self, seconds: float, mode: Mode) -> None:
         """Advance the flight; `mode`: the one that the pilot's switches select."""
         if mode is not self.mode:
-            self.end()
+            self.end(Error.NONE)
             self.mode = mode
             if mode is Mode.RTH:
                 self._rth_height_m, self.state = max(self._craft.height_m, _RTH_HEIGHT_M), State.RTH_START
             elif mode is Mode.NAV:
                 self._next_step, self._jumps = 1, _NO_JUMP
+                self._leg_from = self._craft.position
                 self.state = State.PROCESS_NEXT
         match self.state:
             case State.NONE:
@@ -82,16 +89,16 @@ class MultiWiiNavigation:
 
     def _process_next(self) -> None:
         self._error = Error.NONE
-        self.number = self._next_step
-        self.step, is_sound = self._mission.recall(self.number)
+        self.number, self.step, is_sound = self._mission.recall(self._next_step)
         if not is_sound:
             self._abort(Error.WP_CRC)
             return
         match self.step.action:
             case Action.WAYPOINT | Action.POSHOLD_TIME | Action.POSHOLD_UNLIM | Action.LAND:
-                self.state = State.WP_ENROUTE
+                self._begin_leg()
             case Action.RTH:
-                self._rth_height_m = max(self._craft.height_m, self.step.alt_cm / 100 or _RTH_HEIGHT_M)
+                height_m = max(self._craft.height_m, self.step.alt_cm / 100 or _RTH_HEIGHT_M)
+                self._rth_height_m = min(height_m, HIGHEST_M)
                 self.state = State.RTH_START
             case Action.JUMP if 0 < self.step.p1 < self.number:
                 self._jumps = self.step.p2 if self._jumps == _NO_JUMP else self._jumps
@@ -103,6 +110,13 @@ class MultiWiiNavigation:
             case _:
                 self._abort(Error.INVALID_DATA)
         self._next_step += 1
+
+    def _begin_leg(self) -> None:
+        start, self._leg_from = self._leg_from, (self.step.lat_e7, self.step.lon_e7)
+        if _distance_m(start, self._leg_from) >= SAFE_DISTANCE_M:
+            self._abort(Error.TOO_FAR)
+        else:
+            self.state = State.WP_ENROUTE
 
     def _jump(self) -> None:
         if self._jumps == 0:
@@ -117,7 +131,7 @@ class MultiWiiNavigation:
 
     def _fly_leg(self, seconds: float) -> None:
         target = (self.step.lat_e7, self.step.lon_e7)
-        if not self._craft.fly_to(target, self.step.alt_cm / 100, _CRUISE_MS, seconds):
+        if not self._craft.fly_to(target, min(self.step.alt_cm / 100, HIGHEST_M), _CRUISE_MS, seconds):
             return
         if self.step.action == Action.LAND:
             self.state = State.LAND_IN_PROGRESS
@@ -136,3 +150,8 @@ class MultiWiiNavigation:
         if self._held_s >= (1000 * self.step.p1 % 0x10000) / 1000:
             self._error = Error.TIMEWAIT
             self.state = State.PROCESS_NEXT
+
+
+def _distance_m(start: tuple[int, int], end: tuple[int, int]) -> float:
+    north, east = (end[0] - start[0]) * METRES_PER_DEGREE, (end[1] - start[1]) * METRES_PER_DEGREE_EAST
+    return math.hypot(north, east) / 1e7

@@ -44,6 +44,7 @@ class Error(IntEnum):
     TIMEWAIT = 5
     INVALID_JUMP = 6
     INVALID_DATA = 7
+    DISARMED = 10
     LANDING = 11
 
 

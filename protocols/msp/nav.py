@@ -17,8 +17,9 @@ _INFO = struct.Struct("<BBBB")
 _STATUS = struct.Struct("<BBBBBH")
 WP_SIZE = _WP.size
 INFO_SIZE = _INFO.size
-#: MSP_NAV_CONFIG in MultiWii 2.4; only its end is used.
-NAV_CONFIG_SIZE = 32
+#: MSP_NAV_CONFIG in MultiWii 2.4, and its limits, behind two bytes of flags and the waypoint radius.
+NAV_CONFIG_SIZE = 22
+_LIMITS_AT, _LIMITS = 4, struct.Struct("<HH")
 _HIGHEST_NUMBER = 254
 
 #: The flag of the last record of a mission, and of a leg that INAV flies to home instead.
@@ -168,6 +169,14 @@ def decode_info(payload: bytes) -> NavInfo | None:
 def decode_nav_config(payload: bytes) -> int | None:
     """Read the capacity in records from MultiWii's MSP_NAV_CONFIG: the last byte but one."""
     return payload[-2] if len(payload) >= 2 else None
+
+
+def decode_nav_limits(payload: bytes) -> tuple[int, int] | None:
+    """Read the limits of a leg from MultiWii's MSP_NAV_CONFIG, metres: safe_wp_distance and nav_max_altitude."""
+    if len(payload) < _LIMITS_AT + _LIMITS.size:
+        return None
+    distance_m, height_m = _LIMITS.unpack_from(payload, _LIMITS_AT)
+    return distance_m, height_m
 
 
 def decode_nav_status(payload: bytes) -> NavStatus | None:

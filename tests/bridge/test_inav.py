@@ -19,7 +19,7 @@ from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.nav import LAST, Nav, NavAction
 from tests.support.conversations import Download, Upload, clear_message, count_message, waypoints
-from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy
+from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy, nav_config
 from tests.support.world import Air, GroundStation, World
 
 RULES = NavRules(inav_profile())
@@ -178,6 +178,22 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     assert len(inav.records) < 59
     assert any("armed meanwhile" in text for text in station.texts())
     assert world.bridge.missions.held is None
+
+
+def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
+    multiwii = FakeMultiwii()
+    _, station = found(multiwii)
+    sent = plan(10)
+    sent[5] = replace(sent[5], lat_e7=453848000)  # 110 m away
+    assert Upload(station, sent).run() is ACCEPTED
+    assert not [text for text in station.texts() if "WP" in text]
+    multiwii.answers = {**multiwii.answers, 122: nav_config(60, safe_wp_distance=100, nav_max_altitude=25)}
+    assert Upload(station, sent).run() is ACCEPTED
+    told = " ".join(station.texts())
+    assert "WP 9: flown at 25 m" in told
+    assert "WP 4: flown" not in told
+    assert "WP 5: 100 m or more from the waypoint before: the mission stops there" in told
+    assert "WP 4: 100 m" not in told
 
 
 def test_a_multiwii_that_arms_while_it_is_read_is_sent_no_write() -> None:

@@ -166,6 +166,15 @@ def test_a_jump_target_is_renumbered_for_the_flight_controller() -> None:
     assert [shown.p1 for shown in verdict.items if shown.command == C.DO_JUMP] == [3]
 
 
+def test_a_leg_at_which_a_multiwii_stops_is_warned_of_also_after_a_jump() -> None:
+    """400 m north of each other: only the way back is too long. A turn in between is no leg."""
+    second, third = (replace(WP, lat_e7=LAT + 36_000 * place) for place in (1, 2))
+    yaw = item(C.CONDITION_YAW, at=False, p1=90.0)
+    legs = (WP, second, yaw, third, jump(1), third)
+    assert said(*legs, rules=MULTIWII) == [(5, "lat_e7", 0, 0)]
+    assert said(*legs) == []
+
+
 def test_a_jump_to_a_merged_or_dropped_item_goes_to_the_next() -> None:
     assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=LAST)
     takeoff = item(C.NAV_TAKEOFF, at=False, alt_m=5.0)

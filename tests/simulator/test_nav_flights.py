@@ -19,7 +19,7 @@ from tests.support.nav_rows import ROWS, Row, table
 PAGE = Path(__file__).parents[2] / "docs" / "inav.md"
 SWITCH = {"inav": 1 << BOXES["9.1.0"].index(NAV_WP), "multiwii": 1 << 10}
 LONGEST_S = 600.0
-FINISHED, HOVERS_AT_HOME, LANDED, HOLDS, HOLDS_FOR_EVER, LANDING = 4, 13, 10, 4, 3, 9
+TOO_FAR, FINISHED, HOVERS_AT_HOME, LANDED, HOLDS, HOLDS_FOR_EVER, LANDING = 1, 4, 13, 10, 4, 3, 9
 USUAL_MS, USUAL_M = 3.0, 20.0
 
 
@@ -52,6 +52,8 @@ class Flight:
             self.bench.run(0.2)
             _, state, action, number, error = struct.unpack("<5Bh", self.bench.payload(121))[:5]
             seconds, before = self.bench.now - before, self.bench.now
+            if error == TOO_FAR:
+                return "stops"
             if action in (Action.JUMP, Action.SET_POI, Action.SET_HEAD) or not state:
                 if error == FINISHED and self._height_is_steady():
                     return "hovers"

@@ -27,6 +27,7 @@ LENGTHS = {
 }
 MISSION, RETURN = 1 << 10, 1 << 7
 CRC_ERROR, IN_PROGRESS = 0xFE, 0xFF
+DISARMED = 10
 
 
 @pytest.mark.parametrize(("command", "length"), LENGTHS.items())
@@ -84,6 +85,14 @@ def test_half_a_frame_swallows_the_next() -> None:
     assert bench.ask(100) is None
     assert bench.ask(100) is None
     assert bench.ask(100) is not None
+
+
+def test_a_blank_place_is_read_as_it_is_also_above_the_capacity() -> None:
+    bench = MspBench("multiwii")
+    assert status(bench) == (0, 0, 0, 0, DISARMED)
+    for number in (3, 254):
+        assert bench.read(number).pack(number) == bytes((number, *b"\xff" * 19, 0xFE))
+        assert status(bench) == (0, 0, 255, 255, DISARMED)
 
 
 def flying() -> MspBench:

@@ -96,7 +96,7 @@ class FakeMultiwii(FakeInav):
 
     def __init__(self, capacity: int = 60, drop: Callable[[MspFrame], str] = lambda _frame: "") -> None:
         super().__init__(capacity, drop)
-        self.answers = {100: ident(241, 1 << 4), 116: b"ANGLE;ARM;MISSION;", 122: bytes(30) + bytes((capacity, 7))}
+        self.answers = {100: ident(241, 1 << 4), 116: b"ANGLE;ARM;MISSION;", 122: nav_config(capacity)}
         self.places: dict[int, bytes] = {}
 
     def answer(self, frame: MspFrame) -> bytes | None:
@@ -124,6 +124,11 @@ class FakeMultiwii(FakeInav):
             if flown[-1][-1] == LAST:
                 break
         return flown
+
+
+def nav_config(capacity: int, safe_wp_distance: int = 500, nav_max_altitude: int = 100) -> bytes:
+    """MSP_NAV_CONFIG, with metres."""
+    return struct.pack("<4xHH12xBx", safe_wp_distance, nav_max_altitude, capacity)
 
 
 def lossy(rate: float, seed: int) -> Callable[[MspFrame], str]:

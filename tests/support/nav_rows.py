@@ -60,6 +60,8 @@ ROWS = (
     Row("WAYPOINT, Delay 70", (replace(ONE, p1=70), TWO), "1 (70 s) 2 hovers", "1 (65 s) 2 hovers"),
     Row("WAYPOINT at 0 m", (ONE, leg(4, alt_m=0.0)), "1 2 hovers at 2 m", "1 2 hovers at 2 m"),
     Row("WAYPOINT at -5 m", (ONE, leg(4, alt_m=-5.0)), "1 2 hovers at -5 m", "1 2 hovers at -5 m"),
+    Row("WAYPOINT at 150 m", (ONE, leg(20, alt_m=150.0)), "1 2 hovers at 150 m", "1 2 hovers at 100 m"),
+    Row("WAYPOINT 600 m away", (ONE, leg(31)), "1 2 hovers", "1 stops"),
     Row("WAYPOINT above sea level", (leg(1, frame=0, alt_m=151.0), TWO), "1 2 hovers", "1 2 hovers"),
     Row("LOITER_UNLIM", (ONE, leg(2, Command.NAV_LOITER_UNLIM)), "1 2 (stays)", "1 2 hovers"),
     Row("LOITER_TURNS", (ONE, leg(2, Command.NAV_LOITER_TURNS, p1=3)), "1 2 hovers", "1 2 hovers"),

@@ -6,11 +6,13 @@ lands there: after each conversation it is cleared, as after power-on.
 """
 
 from contextlib import suppress
+from dataclasses import replace
 
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.line.conversation import Conversation, LinkLost, ask
-from bridge.missions.fc_mission_store import PushProgress, PushResult
-from protocols.msp.nav import LAST, Nav, NavRecord, encode_set_wp
+from bridge.missions.fc_mission_store import PushProgress, PushResult, StoreReport
+from protocols.msp.frame import request
+from protocols.msp.nav import LAST, NAV_CONFIG_SIZE, Nav, NavRecord, decode_nav_limits, encode_set_wp
 
 #: Flags of invalid records: a wrong checksum in EEPROM, and erased EEPROM.
 _NO_RECORD = (0xFE, 0xFF)
@@ -27,6 +29,14 @@ class MultiwiiMissions(NavMissions):
     _stores_slowly = True
     #: The records of a list that reads as empty.
     _empty: tuple[NavRecord, ...] = NOTHING
+
+    def report(self) -> Conversation[StoreReport | None]:
+        """As on any of these, with the limits of its legs: the pilot may change these settings at any time."""
+        config = yield from ask(request(Nav.NAV_CONFIG), Nav.NAV_CONFIG, NAV_CONFIG_SIZE)
+        limits = None if config is None else decode_nav_limits(config.payload)
+        if limits is not None:
+            self._profile = replace(self._profile, stops_at_m=limits[0], highest_m=limits[1])
+        return (yield from super().report())
 
     def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list and verify it."""

@@ -30,7 +30,8 @@ class NavProfile:
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
     must go back, and its loop contain no other; else it may go to any leg not next to it. longest_hold: seconds.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
-    decides if it lands; else the last record's p1 does.
+    decides if it lands; else the last record's p1 does. stops_at_m: a mission stops before a leg of this length,
+    metres. highest_m: it flies no higher above home, metres. None: unlimited.
     """
 
     name: str
@@ -43,6 +44,8 @@ class NavProfile:
     longest_hold: Range
     ends_on_any_record: bool
     own_rth_landing: bool
+    stops_at_m: int | None = None
+    highest_m: int | None = None
 
     @property
     def max_items(self) -> int:
@@ -80,6 +83,9 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         longest_hold=Range(0, 65, "it holds at most 65 s"),
         ends_on_any_record=False,
         own_rth_landing=True,
+        # Its defaults; a board reports its own (NAV_CONFIG).
+        stops_at_m=500,
+        highest_m=100,
     )
 
 
