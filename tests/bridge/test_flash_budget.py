@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strangers on an open link write as often as they can for a day; the pilot still writes, and the flash endures."""
+"""During a day of writes by strangers on an open link the pilot can still write, and the flash survives."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ from tests.support.world import Air, GroundStation, World
 
 HOUR_S = 3600.0
 PILOT = Peer("udp", ("10.0.0.1", 14550))
-#: A page lasts 10,000: four weeks of uninterrupted attack.
+#: At this rate a page's 10,000 erases last for four weeks of uninterrupted attack.
 MOST_IN_A_DAY = 64 + 24 * 12 + 1
 
 
@@ -26,7 +26,7 @@ def host(number: int) -> Peer:
 
 
 class Field:
-    """A link whose stations send heartbeats, and the writes that they were allowed."""
+    """A link, its stations' heartbeats, and the writes they were granted."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -47,7 +47,7 @@ class Field:
 
 
 def steady(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
-    """The same hosts all day."""
+    """An attack by the same hosts all day."""
     strangers = [host(number) for number in range(hosts)]
     field.comes(*strangers)
 
@@ -60,7 +60,7 @@ def steady(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
 
 
 def rotating(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
-    """As many at a time, each replaced by a new one after its first write."""
+    """An attack by as many hosts at a time, each replaced by a new one after its first write."""
     names = itertools.count()
     present: list[Peer] = []
 
@@ -86,7 +86,7 @@ def test_a_day_of_attacks(attack: Callable[[Field, int], Iterator[Callable[[], N
         strike()
         field.now += 600
     assert field.writes <= MOST_IN_A_DAY
-    # The pilot, who was there first, writes at once, and then every two hours.
+    # The pilot, connected earlier, writes at once and then every two hours.
     assert field.writes_now(PILOT)
     for _ in range(2):
         for _ in range(24):
@@ -95,8 +95,8 @@ def test_a_day_of_attacks(attack: Callable[[Field, int], Iterator[Callable[[], N
         assert field.writes_now(PILOT)
 
 
-def test_a_pilot_who_comes_after_a_day_of_attacks_writes_at_once() -> None:
-    """All 16 places with precedence are taken."""
+def test_a_pilot_who_arrives_after_a_day_of_attacks_writes_at_once() -> None:
+    """All 16 places with precedence are occupied."""
     field = Field()
     strikes = steady(field, 16)
     for strike in itertools.islice(strikes, 24 * 6):
@@ -107,7 +107,7 @@ def test_a_pilot_who_comes_after_a_day_of_attacks_writes_at_once() -> None:
     assert field.writes_now(PILOT)
 
 
-def test_a_pilot_alone_writes_half_of_all() -> None:
+def test_a_single_pilot_gets_half_of_the_total() -> None:
     field = Field()
     field.comes(PILOT)
     assert [field.writes_now(PILOT) for _ in range(33)] == [True] * 32 + [False]
@@ -116,7 +116,7 @@ def test_a_pilot_alone_writes_half_of_all() -> None:
         assert field.writes_now(PILOT)
 
 
-def test_a_list_that_was_there_already_is_no_write() -> None:
+def test_an_unchanged_list_is_not_counted() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     pilot = GroundStation(world)
@@ -126,7 +126,7 @@ def test_a_list_that_was_there_already_is_no_write() -> None:
 
 
 @pytest.mark.parametrize(("hosts", "lists"), [(3, 4), (16, 1)])
-def test_the_pilots_list_goes_before_those_of_stations_that_write_on_and_on(hosts: int, lists: int) -> None:
+def test_the_pilots_list_precedes_those_of_frequent_writers(hosts: int, lists: int) -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))

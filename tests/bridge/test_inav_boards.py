@@ -73,7 +73,7 @@ def without_home(items: list[MissionItem]) -> list[MissionItem]:
 
 
 @pytest.mark.parametrize("version", BOXES)
-def test_a_mission_comes_back_as_it_was_sent_on_each_version(version: str) -> None:
+def test_a_mission_reads_back_as_sent_on_each_version(version: str) -> None:
     board, world, station = board_with(version=version)
     assert world.kind is inav.PROFILE
     sent = mixed()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Requests of other programs to an INAV: long replies, and which requests only read."""
+"""Requests of other programs to an INAV: long replies, and requests that only read."""
 
 import pytest
 
@@ -11,7 +11,7 @@ BOXNAMES, DATAFLASH_READ, SERVO_MIXER, SAFEHOME, SET_SAFEHOME = 116, 71, 0x2020,
 
 
 @pytest.mark.parametrize(("command", "size"), [(BOXNAMES, 700), (SERVO_MIXER, 700), (DATAFLASH_READ, MAX_REPLY)])
-def test_a_long_reply_is_forwarded_and_the_link_goes_on(command: int, size: int) -> None:
+def test_a_long_reply_is_forwarded_and_the_link_continues(command: int, size: int) -> None:
     board = FakeInav()
     board.answers = {**board.answers, command: bytes(size)}
     world = World(speeds=(115200,), peer=board)
@@ -27,7 +27,7 @@ def test_a_long_reply_is_forwarded_and_the_link_goes_on(command: int, size: int)
 
 
 @pytest.mark.parametrize(("command", "is_refused"), [(SAFEHOME, False), (SET_SAFEHOME, True)])
-def test_a_request_that_says_what_to_read_is_no_change(command: int, is_refused: bool) -> None:
+def test_a_request_with_a_payload_may_only_read(command: int, is_refused: bool) -> None:
     world = World(speeds=(115200,), peer=FakeInav())
     world.wait_ready(5)
     frame = MspFrame(Direction.REQUEST, command, b"\0")

@@ -133,7 +133,7 @@ def test_a_number_that_does_not_exist(store: MissionStore) -> None:
         store.conclude(5, "VERIFIED", "", 1.0)
 
 
-def test_a_closed_store_says_so(tmp_path: Path) -> None:
+def test_a_closed_store_reports_it(tmp_path: Path) -> None:
     store = open_store(tmp_path / "missions.db", now=0.0).store
     store.close()
     with pytest.raises(StoreError, match=r"cannot list .*closed"):

@@ -71,7 +71,7 @@ def _whole(line: str) -> bool:
     return line.endswith("\n")
 
 
-def test_a_power_cut_tears_only_what_was_not_acknowledged(tmp_path: Path) -> None:
+def test_a_power_cut_damages_only_unacknowledged_data(tmp_path: Path) -> None:
     """After add() has returned, the log up to that point is on the disk; any part of later writes may be."""
     path = tmp_path / "live" / "missions.db"
     log = path.with_name("missions.db-wal")

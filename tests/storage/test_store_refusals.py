@@ -124,7 +124,7 @@ def test_a_directory_in_place_of_the_file(tmp_path: Path) -> None:
         open_store(tmp_path, now=0.0)
 
 
-def test_a_store_of_a_newer_release_is_left_alone(tmp_path: Path) -> None:
+def test_a_store_of_a_newer_release_is_not_changed(tmp_path: Path) -> None:
     path = tmp_path / "missions.db"
     with open_store(path, now=0.0).store as store:
         store.add(mission(1))
