@@ -113,7 +113,7 @@ def test_a_second_run_keeps_the_key_and_the_hotspot(tmp_path: Path, model: str) 
     pi.carry_out(missing_steps(pi, SetupChoices(key="secret words")))
     (step,) = missing_steps(pi, SetupChoices(page=False))[:1]
     pi.carry_out(missing_steps(pi, SetupChoices(page=False)))
-    assert step.purpose == "settings: fc = auto, status page off"
+    assert step.purpose == "save the settings: fc = auto, status page off"
     settings = tomllib.loads(pi.read(SETTINGS_FILE))
     assert "web" not in settings
     assert "key_file" in settings["gcs"][0]

@@ -2,6 +2,8 @@
 """`naze-bridge setup`."""
 
 import socket
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -10,12 +12,15 @@ from service.cli.doctor.command import diagnose
 from service.cli.sentences import fail
 from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
+from service.control.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
 from service.web.token import DEFAULT_NAME
 
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
+#: Both speeds and protocols of every port are tried by then.
+_SEARCH_S = 30
 _ADDRESS_OF_HOTSPOT = "10.42.0.1"
 
 
@@ -87,8 +92,11 @@ def setup(
     _tell_where(host, answers)
     if any(step.needs_reboot for step in steps):
         click.echo("\nReboot once for the UART: sudo reboot. After that: naze-bridge doctor")
-    elif host.path("/run/systemd/system").exists() and not diagnose():
-        raise SystemExit(1)
+    elif host.path("/run/systemd/system").exists():
+        if steps:
+            _await_flight_controller()
+        if not diagnose():
+            raise SystemExit(1)
 
 
 def _show(steps: list[Step]) -> None:
@@ -112,6 +120,16 @@ def _carry_out(steps: list[Step], machine: Machine) -> None:
             click.echo("failed")
             fail(f"{error}; earlier changes are kept, and setup can be run again")
         click.echo("done")
+
+
+def _await_flight_controller() -> None:
+    """Give the service that was just started time to find it, so that doctor's verdict is right."""
+    click.echo(f"\nLooking for the flight controller, up to {_SEARCH_S} s ...")
+    for _ in range(_SEARCH_S):
+        with suppress(ControlError):
+            if ask_daemon(None, STATUS)["flight_controller"] is not None:
+                return
+        time.sleep(1)
 
 
 def _tell_where(host: Host, answers: SetupChoices) -> None:

@@ -139,7 +139,7 @@ def _settings(host: Host, answers: SetupChoices) -> Iterator[Step]:
         changes: list[Change] = [WriteFile(SETTINGS_FILE, text)]
         if _now(host) and host.path(_WANTED_BY).is_symlink():
             changes.append(Run(("systemctl", "restart", "naze-bridge.service")))
-        yield Step(f"settings: {what}", changes)
+        yield Step(f"save the settings: {what}", changes)
 
 
 def _others(host: Host, answers: SetupChoices) -> Iterator[Step]:
