@@ -72,7 +72,7 @@ class Finding:
         if self.was == self.becomes:
             # Nothing is changed: the warning is about the value as sent.
             return f"{who}: {self.why}"
-        label = self._label()
+        label = value_label(self.command, self.field)
         unit = " m" if self.field in _METRES or label in _METRES else ""
         was, becomes = self._shown(self.was), self._shown(self.becomes)
         if was == becomes:
@@ -81,15 +81,6 @@ class Finding:
         verb = "raised" if is_raised else "changed"
         change = f"set to {becomes}" if self.was is None else f"{verb} from {was} to {becomes}"
         return f"{who}: {label} {change}{unit} ({self.why})"
-
-    def _label(self) -> str:
-        if self.field in _LABELS:
-            return _LABELS[self.field]
-        if self.field not in ("p1", "p2", "p3", "p4"):
-            return self.field
-        number = int(self.field[1])
-        names = _PARAMS.get(self.command or 0, ("",) * 4)
-        return names[number - 1] or f"param{number}"
 
     def _shown(self, value: str | float | int | None) -> str:
         if value is None or isinstance(value, str):
@@ -104,6 +95,15 @@ class Finding:
 def without_defaults(findings: Iterable[Finding]) -> list[Finding]:
     """The findings that are news to the pilot: filled-in defaults are not."""
     return [finding for finding in findings if finding.news != News.NONE]
+
+
+def value_label(command: int | None, field: str) -> str:
+    """Mission Planner's name for a field of an item."""
+    if field not in ("p1", "p2", "p3", "p4"):
+        return _LABELS.get(field, field)
+    number = int(field[1])
+    names = _PARAMS.get(command or 0, ("",) * 4)
+    return names[number - 1] or f"param{number}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ import difflib
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from bridge.model.finding import DROPPED, REJECTED, Finding, without_defaults
+from bridge.model.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
 from service.control.mission_data import Json, mission_findings, mission_items
@@ -90,8 +90,10 @@ def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> l
 
 
 def shown(item: MissionItem) -> Json:
-    """An item for the page: numbers, None for values not given, and the command's name."""
-    return {"seq": item.seq, "name": command_name(item.command), **dict(zip(_VALUES, _key(item), strict=True))}
+    """An item for the page: numbers, None for values not given, the command's name and those of p1..p4."""
+    params = [value_label(item.command, name) for name in ("p1", "p2", "p3", "p4")]
+    values = dict(zip(_VALUES, _key(item), strict=True))
+    return {"seq": item.seq, "name": command_name(item.command), "params": params, **values}
 
 
 def _pairs(

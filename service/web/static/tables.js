@@ -2,7 +2,7 @@
 // Mission lists as tables: one list, as sent and as stored, or two lists compared.
 import { make } from "./dom.js";
 
-const NAMES = { p1: "p1", p2: "p2", p3: "p3", p4: "p4", alt_m: "altitude", frame: "frame", lat_e7: "lat", lon_e7: "lon" };
+const PARAMS = ["p1", "p2", "p3", "p4"], NAMES = { alt_m: "Alt", frame: "frame", lat_e7: "Lat", lon_e7: "Long" };
 const KINDS = {
   changed: "changed", dropped: "dropped: not stored", rejected: "the list was rejected because of this item",
   added: "added", removed: "removed",
@@ -38,7 +38,7 @@ export function pairKey(rows) {
 
 function pairRow(row, titles) {
   const reasons = Object.entries(row.changes).filter(([, why]) => why)
-    .map(([name, why]) => make("span", { class: "why" }, name === "command" ? why : `${NAMES[name]}: ${why}`));
+    .map(([name, why]) => make("span", { class: "why" }, name === "command" ? why : `${label(row.left, name)}: ${why}`));
   const left = make("td", { "data-title": titles[0] }, ...(row.left ? values(row.left, row.changes) : ["–"]));
   const right = make("td", { "data-title": titles[1] }, ...(row.right ? values(row.right, row.changes) : [KINDS[row.kind] && row.left ? KINDS[row.kind] : "–"]), ...reasons);
   return make("tr", { class: row.kind }, number(row.left ?? row.right, row.right), left, right);
@@ -50,11 +50,14 @@ function number(item, becomes = item) {
 }
 
 function values(item, changes) {
-  const shown = Object.keys(NAMES).filter((name) => name in changes || (name !== "frame" && item[name]));
+  const shown = [...PARAMS, ...Object.keys(NAMES)].filter((name) => name in changes || (name !== "frame" && item[name]));
   const command = make("span", { class: `value${"command" in changes ? " is-changed" : ""}` }, make("b", {}, item.name));
   return [command, ...shown.flatMap((name) => [" ", make(
-    "span", { class: `value${name in changes ? " is-changed" : ""}` }, `${NAMES[name]} ${text(name, item[name])}`)])];
+    "span", { class: `value${name in changes ? " is-changed" : ""}` }, `${label(item, name)} ${text(name, item[name])}`)])];
 }
+
+// As Mission Planner calls it.
+const label = (item, name) => NAMES[name] ?? item.params[PARAMS.indexOf(name)];
 
 function text(name, value) {
   if (value === null) return "not given";
