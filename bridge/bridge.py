@@ -108,7 +108,7 @@ class Bridge:
         self._pass_on_news(now)
 
     def take_fc_output(self) -> list[bytes]:
-        """The bytes to be written to the port at the present `session.speed`."""
+        """The bytes to be written to the port at the present `session.state.speed`."""
         return self.session.take_output()
 
     # The ground stations' side.
@@ -161,7 +161,7 @@ class Bridge:
         for peer in self.ground.expire(now):
             self._incoming.forget(peer)
         if now >= self._announcer.due:
-            self._say(self._announcer.tick(now, self.session.trouble))
+            self._say(self._announcer.tick(now, self.session.state.trouble))
         if self._is_represented:
             self._vehicle.tick(now)
 
@@ -197,7 +197,7 @@ class Bridge:
         vehicle = self.session.vehicle
         self.is_passing_through = controller is not None and controller.profile.is_passed_through
         if controller is None:
-            trouble = self.session.trouble
+            trouble = self.session.state.trouble
             self.missions.use(Refusal(MissionResult.DENIED, trouble) if trouble else NO_LINK)
             self._uploads.link_lost(now)
             self._announcer.lost(now if vehicle.heard_at is None else vehicle.heard_at)

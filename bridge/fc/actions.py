@@ -64,7 +64,7 @@ class FcActions:
 
     def start(self, action: FcAction, on_done: Callable[[ActionResult], None], now: float) -> None:
         """Start an action; `on_done` gets the result, possibly before this returns."""
-        controller = self._session.controller
+        controller = self._session.state.controller
         if controller is None or controller.arm_bit is None:
             # Without an arm flag it is unknown whether the craft is flying.
             on_done(ActionResult.NO_LINK)

@@ -69,8 +69,9 @@ class MspSharing:
         return ""
 
     def _refusal(self, frame: MspFrame, *, may_write: bool) -> str:
-        link = self._session.link
-        if link is None or self._session.controller is None:
+        state = self._session.state
+        link = state.link
+        if link is None or state.controller is None:
             return "no flight controller speaks MSP now"
         if self._session.vehicle.armed is not False:
             return "the craft is armed" if self._session.vehicle.armed else "not yet known to be disarmed"

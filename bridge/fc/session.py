@@ -14,7 +14,6 @@ from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink
 from bridge.fc.states.msp import Identifying, MspLine, Polling
 from bridge.fc.states.searching import Searching
-from bridge.line.msp_link import MspLink
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
 from bridge.model.events import EventLog, Incidents, Level
@@ -66,37 +65,8 @@ class FcSession:
         #: From the port's opening or a loss until a flight controller is found.
         self._incident = ""
         self._on_change = on_change
+        #: The present state, with the flight controller, the MSP link, and the speed to which the port must be set.
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
-
-    @property
-    def controller(self) -> FlightController | None:
-        """The flight controller on the line; None until it is identified."""
-        return self.state.controller
-
-    @property
-    def link(self) -> MspLink | None:
-        """The MSP link, while MSP is spoken."""
-        return self.state.link
-
-    @property
-    def speed(self) -> int | None:
-        """The speed that the port must be set to, baud; None where it has none."""
-        return self.state.speed
-
-    @property
-    def trouble(self) -> str:
-        """Why the board on the line cannot be used and what the pilot must do; empty if nothing."""
-        return self.state.trouble
-
-    @property
-    def is_searching(self) -> bool:
-        """True until the flight controller is known."""
-        return self.state.is_searching
-
-    @property
-    def bad_checksums(self) -> int | None:
-        """Damaged frames since the flight controller was found; None if that is not counted."""
-        return self.state.bad_checksums
 
     def opened(self, now: float) -> None:
         """The port is open."""
@@ -132,7 +102,7 @@ class FcSession:
         return self.state.deadline()
 
     def take_output(self) -> list[bytes]:
-        """The bytes to be written to the port at the present `speed`."""
+        """The bytes to be written to the port at the state's `speed`."""
         output, self._port.output = self._port.output, []
         return output + self.state.take_output()
 

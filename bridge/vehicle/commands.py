@@ -125,7 +125,7 @@ class CommandService:
             case messages.MAV_CMD_GET_MESSAGE_INTERVAL:
                 return self._tell_interval(station, _msgid(params[0]))
             case messages.MAV_CMD_DO_SEND_BANNER:
-                controller = self._session.controller
+                controller = self._session.state.controller
                 name = "no flight controller" if controller is None else controller.name
                 self._ground.say(Severity.INFO, f"naze-bridge {self._version}: {name}", station)
                 return CommandResult.ACCEPTED

@@ -240,7 +240,7 @@ class OwnVehicle:
             _want(wanted, row.reading, interval_s)
         polls = self._session.polls
         polls.want(wanted)
-        self._stale_s = {} if self._session.link is None else _stale_ages_s(polls.line_interval_s)
+        self._stale_s = {} if self._session.state.link is None else _stale_ages_s(polls.line_interval_s)
 
     def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:
         if msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:

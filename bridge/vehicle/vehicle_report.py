@@ -167,15 +167,15 @@ class VehicleReporter:
         )
 
     def _link(self) -> Link:
-        session, controller = self._session, self._session.controller
-        msp = session.link
+        state = self._session.state
+        controller, msp = state.controller, state.link
         return Link(
-            state=session.state.name,
+            state=state.name,
             flight_controller=None if controller is None else controller.name,
-            speed_baud=None if controller is None else session.speed,
+            speed_baud=None if controller is None else state.speed,
             round_trip_ms=None if msp is None else round(msp.round_trip_s * 1000, 1),
             requests_lost=None if msp is None else msp.requests_lost,
-            bad_checksums=session.bad_checksums,
+            bad_checksums=state.bad_checksums,
             ground_stations=tuple(str(peer) for peer in self._ground.peers()),
         )
 

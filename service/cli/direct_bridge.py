@@ -36,10 +36,10 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
     job: asyncio.Future[Json] | None = None
     try:
         patience_s = _SEARCH_PATIENCE_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
-        await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.controller), patience_s)
+        await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.state.controller), patience_s)
         if daemon.fc_trouble:
             raise ControlError(daemon.fc_trouble)
-        if daemon.bridge.session.controller is None:
+        if daemon.bridge.session.state.controller is None:
             where = daemon.fc_where
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.

@@ -136,7 +136,7 @@ class Daemon:
     @property
     def fc_trouble(self) -> str:
         """Why the flight controller cannot be used: its port, or its state; empty if it can be."""
-        return self._port.trouble or self.bridge.session.trouble
+        return self._port.trouble or self.bridge.session.state.trouble
 
     @property
     def fc_where(self) -> str:
@@ -230,7 +230,7 @@ class Daemon:
     def flush(self) -> None:
         """Carry out the outputs that the bridge has after an input."""
         bridge = self.bridge
-        self._port.set_speed(bridge.session.speed)
+        self._port.set_speed(bridge.session.state.speed)
         self._port.may_gather = bridge.is_passing_through
         if output := bridge.take_fc_output():
             data = b"".join(output)
@@ -372,7 +372,7 @@ class Daemon:
     def _report_search(self) -> None:
         if self._search_report is not None:
             self._search_report.cancel()
-        if self.bridge.session.is_searching:
+        if self.bridge.session.state.is_searching:
             _log.info("fc.searching", fc=self.fc_where)
         self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)
 

@@ -91,15 +91,15 @@ class _Reporting:
 def link_line(daemon: Daemon) -> str:
     """The flight controller and the ground stations in one line."""
     bridge = daemon.bridge
-    session = bridge.session
+    state = bridge.session.state
     if daemon.fc_trouble:
         where = daemon.fc_trouble
-    elif session.controller is None:
+    elif state.controller is None:
         where = f"looking for a flight controller on {daemon.fc_where}"
     else:
-        speed = "" if session.speed is None else f", {session.speed} baud"
-        armed = {None: "", True: ", armed", False: ", disarmed"}[session.vehicle.armed]
-        where = f"{session.controller.name} ({session.state.name}{speed}{armed})"
+        speed = "" if state.speed is None else f", {state.speed} baud"
+        armed = {None: "", True: ", armed", False: ", disarmed"}[bridge.session.vehicle.armed]
+        where = f"{state.controller.name} ({state.name}{speed}{armed})"
     count = len(list(bridge.ground.peers()))
     return f"{where}; {count} ground station{'' if count == 1 else 's'}"
 

@@ -33,8 +33,8 @@ class LinkHistory:
 
     def start(self) -> None:
         """Take the first sample; more follow until `close`."""
-        link = self._daemon.bridge.session.link
-        damaged = self._daemon.bridge.session.bad_checksums or 0
+        state = self._daemon.bridge.session.state
+        link, damaged = state.link, state.bad_checksums or 0
         lost = 0 if link is None else link.requests_lost
         lost_before, damaged_before = self._before
         self._before = lost, damaged

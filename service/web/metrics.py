@@ -127,9 +127,7 @@ class _State(Collector):
         yield from self._vehicle()
         for name, value in self._daemon.followers_status().items():
             if name in _COUNTED:
-                counted = _counters(name, f"As `naze-bridge status` shows it: {name}.")
-                counted.add_metric([], value)
-                yield counted
+                yield _counted(name, f"As `naze-bridge status` shows it: {name}.", value)
             elif isinstance(value, int):
                 yield _gauge(name, f"As in `naze-bridge status`: {name}.", {}, value)
 
@@ -150,32 +148,28 @@ class _State(Collector):
         for (link, msgid), count in bridge.ground.frames_received.items():
             frames.add_metric([link, str(msgid)], count)
         yield frames
-        damaged = _counters("ground_damaged_frames", "Frames of ground stations with a wrong checksum.")
-        damaged.add_metric([], bridge.ground.bad_frames)
-        yield damaged
+        damaged = bridge.ground.bad_frames
+        yield _counted("ground_damaged_frames", "Frames of ground stations with a wrong checksum.", damaged)
         refused = _counters("refused_frames", "Frames of ground stations without write access.", "link", "why")
         for (link, why), count in bridge.guard.refused.items():
             refused.add_metric([link, why], count)
         yield refused
 
     def _flight_controller(self) -> Iterator[Metric]:
-        session = self._daemon.bridge.session
-        state = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the link's current state.", labels=["state"])
+        state = self._daemon.bridge.session.state
+        states = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the link's current state.", labels=["state"])
         for each in TRANSITIONS:
-            state.add_metric([each.name], float(type(session.state) is each))
-        yield state
-        # This one and those of MSP restart at 0 with each flight controller, which Prometheus permits for counters.
-        damaged = _counters("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.")
-        damaged.add_metric([], session.bad_checksums or 0)
-        yield damaged
-        dropped = _counters("fc_dropped_bytes", "Bytes for the flight controller that its line was too slow for.")
-        dropped.add_metric([], self._daemon.fc_dropped_bytes)
-        yield dropped
-        if session.link is not None:
-            lost = _counters("fc_lost_requests", "MSP requests that were not answered in time.")
-            lost.add_metric([], session.link.requests_lost)
-            yield lost
-            yield _round_trips(session.link.round_trips)
+            states.add_metric([each.name], float(type(state) is each))
+        yield states
+        dropped = self._daemon.fc_dropped_bytes
+        yield _counted("fc_dropped_bytes", "Bytes for the flight controller that its line was too slow for.", dropped)
+        # These restart at 0 with each flight controller found, which Prometheus permits for counters.
+        damaged = state.bad_checksums or 0
+        yield _counted("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.", damaged)
+        if state.link is not None:
+            lost = state.link.requests_lost
+            yield _counted("fc_lost_requests", "MSP requests that were not answered in time.", lost)
+            yield _round_trips(state.link.round_trips)
 
     def _vehicle(self) -> Iterator[Metric]:
         report = self._daemon.bridge.report.whole()
@@ -206,6 +200,10 @@ def _gauge(name: str, meaning: str, labels: Mapping[str, str], value: float) -> 
     family = GaugeMetricFamily(_PREFIX + name, meaning, labels=list(labels))
     family.add_metric(list(labels.values()), value)
     return family
+
+
+def _counted(name: str, meaning: str, value: float) -> Metric:
+    return CounterMetricFamily(_PREFIX + name, meaning, value)
 
 
 def _counters(name: str, meaning: str, *labels: str) -> CounterMetricFamily:

@@ -49,7 +49,7 @@ def test_found_within_seconds_at_every_speed(baud: int, extension: bool) -> None
         assert world.wait_until(verdict, 20) <= (1.5 if baud == SPEEDS[0] else 8)
         world.wait_ready()
         assert world.kind is (harakiri.PATCHED if extension else harakiri.UNPATCHED)
-        assert world.bridge.session.speed == baud
+        assert world.bridge.session.state.speed == baud
         found = world.events("fc.found")
         assert [event.facts["speed_baud"] for event in found] == [baud]
         assert "two equal answers" in str(found[0].facts["why"])
@@ -85,7 +85,7 @@ def test_losing_the_end_of_a_frame_later_does_not_lose_the_board(extension: bool
         world.naze.receive(frame[:length], world.now)
         world.run(3)
         assert world.events("fc.lost") == []
-        link = world.bridge.session.link
+        link = world.bridge.session.state.link
         assert link is not None
         assert world.now - link.last_heard_at < 0.5
         world.assert_line_was_clean()
@@ -135,7 +135,7 @@ def test_found_within_3_s_of_booting_after_a_power_cycle_at_any_moment(baud: int
         began = world.now
 
         def answers(world: World, began: float = began) -> bool:
-            link = world.bridge.session.link
+            link = world.bridge.session.state.link
             return link is not None and link.last_heard_at > began
 
         assert world.wait_until(answers, 20) <= 3
@@ -220,11 +220,11 @@ def test_frsky_telemetry_while_armed_is_ignored() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
     world.wait_ready()
     world.faults.armed = True
-    world.wait_until(lambda w: w.bridge.session.speed == 9600 and w.kind is harakiri.PATCHED, 15)
+    world.wait_until(lambda w: w.bridge.session.state.speed == 9600 and w.kind is harakiri.PATCHED, 15)
     world.run(30)
     assert world.bridge.session.vehicle.armed
     world.faults.armed = False
-    world.wait_until(lambda w: w.bridge.session.speed == 115200 and w.kind is harakiri.PATCHED, 8)
+    world.wait_until(lambda w: w.bridge.session.state.speed == 115200 and w.kind is harakiri.PATCHED, 8)
     assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
     world.assert_line_was_clean()
 
@@ -238,7 +238,7 @@ def test_bit_errors_delay_identification_but_never_change_it(rate: float, extens
         faults = Faults(bit_error_rate=rate, extension=extension)
         world = World(SimOptions(seed=seed), faults, speeds=(115200,))
         world.run_until(lambda w: w.kind is not None, 8)
-        controller = world.bridge.session.controller
+        controller = world.bridge.session.state.controller
         if controller is None:
             continue
         found += 1

@@ -83,7 +83,7 @@ def test_it_is_recognised_when_the_port_is_opened(kind: str) -> None:
     world.run(30)
     assert is_in_cli(world)
     assert " ".join(station.texts()).count(TROUBLE) == 3
-    assert world.bridge.session.trouble == TROUBLE
+    assert world.bridge.session.state.trouble == TROUBLE
     assert not world.events("fc.found")
     assert Upload(station, waypoints(5)).run() is MissionResult.DENIED
     assert " ".join(station.texts()[-2:]) == TROUBLE
@@ -122,7 +122,7 @@ def test_unplugging_it_brings_it_back(kind: str) -> None:
     world.run(10)
     world.power_off()
     world.wait_until(lambda w: isinstance(w.bridge.session.state, Searching), 10)
-    assert world.bridge.session.trouble == ""
+    assert world.bridge.session.state.trouble == ""
     world.power_on()
     world.wait_until(lambda w: w.is_found, 20)
     world.run(1)

@@ -51,8 +51,8 @@ def found(peer: FakeInav) -> tuple[World, GroundStation]:
 def test_the_board_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
     world, _ = found(make())
     assert world.kind is kind
-    assert world.bridge.session.controller is not None
-    assert world.bridge.session.controller.capacity == capacity
+    assert world.bridge.session.state.controller is not None
+    assert world.bridge.session.state.controller.capacity == capacity
     assert world.bridge.session.vehicle.armed is False
 
 

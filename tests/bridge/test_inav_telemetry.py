@@ -35,8 +35,8 @@ def introduced(**options: Any) -> tuple[MspBoard, World, GroundStation]:
 @pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
 def test_its_version_is_known(version: str) -> None:
     _, world, _ = introduced(version=version)
-    assert world.bridge.session.controller is not None
-    assert world.bridge.session.controller.version == tuple(map(int, version.split(".")))
+    assert world.bridge.session.state.controller is not None
+    assert world.bridge.session.state.controller.version == tuple(map(int, version.split(".")))
 
 
 @pytest.mark.parametrize(

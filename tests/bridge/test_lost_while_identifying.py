@@ -29,7 +29,7 @@ def begun(baud: int, protocol: TelemetryProtocol) -> World:
 
 @cache
 def identification_s(baud: int, protocol: TelemetryProtocol) -> float:
-    return begun(baud, protocol).wait_until(lambda w: not w.bridge.session.is_searching, 20)
+    return begun(baud, protocol).wait_until(lambda w: not w.bridge.session.state.is_searching, 20)
 
 
 def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryProtocol.MSP) -> World:
@@ -42,7 +42,7 @@ def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryPro
 
 
 def is_known(world: World) -> bool:
-    return world.bridge.session.controller is not None
+    return world.bridge.session.state.controller is not None
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)

@@ -75,7 +75,7 @@ def test_one_vehicle_while_frsky_is_sent(board: type[SimulatedNaze], wanted: Pro
     for _ in range(2):
         station.heard.clear()
         faults.armed = True
-        world.wait_until(lambda w: w.bridge.session.speed == 9600 and w.kind is wanted, 5)
+        world.wait_until(lambda w: w.bridge.session.state.speed == 9600 and w.kind is wanted, 5)
         world.run(60)
         assert world.kind is wanted
         assert station.said("HEARTBEAT")[-1].base_mode & 128
@@ -88,7 +88,7 @@ def test_one_vehicle_while_frsky_is_sent(board: type[SimulatedNaze], wanted: Pro
         assert world.now - next(at for at, message in reversed(station.heard) if message is status) <= 1.1
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         faults.armed = False
-        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.speed == 115200, 5)
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.bridge.session.state.speed == 115200, 5)
         world.run(3)
         assert max(heartbeat_gaps(station)) <= 1.5
     world.assert_line_was_clean()

@@ -97,7 +97,7 @@ async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_p
 
         async def found() -> None:
             async with asyncio.timeout(20):
-                while daemon.bridge.session.controller is None:  # noqa: ASYNC110
+                while daemon.bridge.session.state.controller is None:  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
 
         await found()
@@ -109,7 +109,7 @@ async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_p
 
         daemon.bridge.session.tick = faulty  # type: ignore[assignment,method-assign]
         async with asyncio.timeout(20):
-            while daemon.bridge.session.controller is not None:  # noqa: ASYNC110
+            while daemon.bridge.session.state.controller is not None:  # noqa: ASYNC110
                 await asyncio.sleep(0)
         await found()
         running.cancel()

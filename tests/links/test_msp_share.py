@@ -82,7 +82,7 @@ async def test_requests_are_answered_alongside_telemetry(is_v2: bool) -> None:
         async with asyncio.timeout(PATIENCE):
             while daemon.traffic["fc"].pieces_received < polled + 30:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
-        assert daemon.bridge.session.controller is not None
+        assert daemon.bridge.session.state.controller is not None
 
 
 @pytest.mark.parametrize(

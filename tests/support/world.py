@@ -227,7 +227,7 @@ class World:
 
     @property
     def kind(self) -> Profile | None:
-        controller = self.bridge.session.controller
+        controller = self.bridge.session.state.controller
         return None if controller is None else controller.profile
 
     @property
@@ -262,7 +262,8 @@ class World:
         self.now = max(self.now, wanted)
         data = self.naze.advance(self.now)
         if data and self._plugged:
-            heard = garble(data, self.naze.baud, self.bridge.session.speed) if self.bridge.session.speed else data
+            speed = self.bridge.session.state.speed
+            heard = garble(data, self.naze.baud, speed) if speed else data
             if heard:
                 self.bridge.fc_received(heard, self.now)
                 self._flush()
@@ -307,7 +308,7 @@ class World:
                 f"not whole frames: {data.hex()}"
             )
             assert is_clean(data) or self.kind in (inav.PROFILE, multiwii.PROFILE), data.hex()
-        speed = self.bridge.session.speed
+        speed = self.bridge.session.state.speed
         self.written.append((self.now, speed, data))
         self.naze.receive(garble(data, speed, self.naze.baud) if speed else data, self.now)
 

@@ -95,12 +95,14 @@ class State(ABC):
     is_searching: ClassVar[bool] = False
     #: Why the board cannot be used and what the pilot must do; empty if nothing.
     trouble: ClassVar[str] = ""
+    #: The flight controller on the line; None until it is identified.
     controller: FlightController | None = None
+    #: While MSP is spoken.
     link: MspLink | None = None
 
     def __init__(self, port: Port, event: Event, now: float) -> None:
         self.port = port
-        #: Of the port, baud.
+        #: The port must be set to it, baud; None where it has none.
         self.speed = event.speed if isinstance(event, Found) else None
 
     @abstractmethod
