@@ -223,12 +223,12 @@ ReadingT = TypeVar("ReadingT", bound=Reading)
 class Vehicle:
     """The latest reading of each kind, and home."""
 
-    def __init__(self, airframe: Airframe = Airframe.QUADROTOR) -> None:
-        self.forget(airframe)
+    def __init__(self) -> None:
+        self.forget()
 
-    def forget(self, airframe: Airframe = Airframe.QUADROTOR) -> None:
+    def forget(self) -> None:
         """Begin again: the board is another one than before."""
-        self.airframe = airframe
+        self.airframe = Airframe.QUADROTOR
         #: The firmware version: major, minor, patch level.
         self.version: tuple[int, int, int] | None = None
         self.home: Home | None = None

@@ -79,16 +79,7 @@ class MissionJobs:
         future: asyncio.Future[Json] = self._loop.create_future()
 
         def done(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | None) -> None:
-            answer: Json = {"ack": f"MAV_MISSION_{outcome.ack.name}", "text": outcome.text}
-            if arrived is not None:
-                answer |= {
-                    "verdict": arrived.verdict.result.name,
-                    "sent": as_dicts(arrived.items),
-                    "stored": as_dicts(arrived.verdict.items),
-                    "findings": as_dicts(arrived.verdict.findings),
-                    "mission": outcome.number if isinstance(outcome, DeliveryResult) else None,
-                }
-            _resolve(future, answer)
+            _resolve(future, delivery_data(outcome, arrived))
 
         def tell(records: int) -> None:
             progress({"progress": records})
@@ -171,6 +162,20 @@ class MissionJobs:
         """Push a stored mission again, as it was sent; the current rules apply."""
         data = await self.show_mission(number)
         return await self.push(mission_items(data["received"]["items"]), f"restore of mission {number}", progress)
+
+
+def delivery_data(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | None) -> Json:
+    """The result of a mission, with the lists as sent and as stored if it was checked."""
+    answer: Json = {"ack": f"MAV_MISSION_{outcome.ack.name}", "text": outcome.text}
+    if arrived is not None:
+        answer |= {
+            "verdict": arrived.verdict.result.name,
+            "sent": as_dicts(arrived.items),
+            "stored": as_dicts(arrived.verdict.items),
+            "findings": as_dicts(arrived.verdict.findings),
+            "mission": outcome.number if isinstance(outcome, DeliveryResult) else None,
+        }
+    return answer
 
 
 def listed(store: MissionStore, limit: int) -> Json:

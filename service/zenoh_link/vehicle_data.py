@@ -9,6 +9,7 @@ from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from service.control.mission_data import Json, strict
+from service.daemon.api import delivery_data
 from service.zenoh_link.payload import plain
 from service.zenoh_link.time_source import SampleClock
 
@@ -50,19 +51,7 @@ def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
 
 def mission_report(mission: ArrivedMission, delivery: DeliveryResult) -> Json:
     """The result of a received mission."""
-    verdict = mission.verdict
-    body: Json = strict(
-        {
-            "mission": delivery.number,
-            "source": mission.source,
-            "ack": f"MAV_MISSION_{delivery.ack.name}",
-            "text": delivery.text,
-            "verdict": verdict.result.name,
-            "findings": [asdict(finding) for finding in verdict.findings],
-            "sent": [asdict(item) for item in mission.items],
-            "stored": [asdict(item) for item in verdict.items],
-        }
-    )
+    body: Json = strict(delivery_data(delivery, mission) | {"source": mission.source})
     return body
 
 

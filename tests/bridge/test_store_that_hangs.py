@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Telemetry and mission uploads work even if the SD card answers after minutes or never."""
 
-from bridge.model.mission_log import Outcome
+from bridge.controllers.harakiri import profile as harakiri
+from bridge.fc.states.msp import Identifying
+from bridge.line.conversation import save
+from bridge.model.mission_log import ArrivedMission, Outcome
+from bridge.model.verdict import CLEARED_LIST
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding
@@ -43,6 +47,21 @@ def test_the_flight_controller_is_still_found_and_read() -> None:
     world.plug()
     world.wait_ready(8)
     assert len(Download(GroundStation(world)).run(10)) == 5
+
+
+def test_identification_behind_many_missions_is_given_up_and_repeated() -> None:
+    """Each of the missions waits 3 s for the store, and the flight controller's questions wait behind them."""
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    world.store.delay_s = NEVER
+    for _ in range(10):
+        world.bridge.runner.start(save(ArrivedMission("", (), CLEARED_LIST)), lambda *_: None, world.now)
+    world.unplug()
+    world.plug()
+    world.wait_until(lambda w: isinstance(w.bridge.session.state, Identifying), 8)
+    world.wait_until(lambda w: not isinstance(w.bridge.session.state, Identifying), 15.1)
+    assert world.kind is None
+    world.wait_until(lambda w: w.kind is harakiri.PATCHED, 30)
 
 
 def test_a_late_reply_of_the_store_is_dropped() -> None:

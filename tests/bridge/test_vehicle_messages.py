@@ -228,7 +228,9 @@ def test_the_throttle_stick_in_percent(throttle: int, shown: int) -> None:
     ],
 )
 def test_the_mixer_determines_the_type(mixer: int, mav_type: int) -> None:
-    assert make.heartbeat(Vehicle(airframe(mixer)), is_lost=False).type == mav_type
+    vehicle = Vehicle()
+    vehicle.airframe = airframe(mixer)
+    assert make.heartbeat(vehicle, is_lost=False).type == mav_type
 
 
 @pytest.mark.parametrize(
@@ -251,7 +253,8 @@ def test_modes_from_boxes(
     flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
     copter, plane, rover, boat = Airframe.QUADROTOR, Airframe.FIXED_WING, Airframe.ROVER, Airframe.BOAT
     for kind, mode in ((copter, copter_mode), (plane, plane_mode), (rover, rover_mode), (boat, rover_mode)):
-        state = told(Vehicle(kind), who, STATUS=status(flags=flags))
+        state = told(Vehicle(), who, STATUS=status(flags=flags))
+        state.airframe = kind
         beat = make.heartbeat(state, is_lost=False)
         assert (beat.custom_mode, beat.system_status) == (mode, m.MAV_STATE_ACTIVE)
         assert state.armed
