@@ -8,7 +8,7 @@ from bridge.gcs.cost import Rate
 
 #: Counts grow by this factor before they are scaled back, which forgets those below 1 / 1000.
 _RESCALE_AT = 1e6
-#: After so many times the memory's length nothing is left of a count; the clock may also begin at any value.
+#: After this many times the memory's length every count has decayed to 0; the clock may also start at any value.
 _ALL_FORGOTTEN = 50.0
 
 
@@ -18,7 +18,7 @@ class Shares:
     def __init__(self, rate: Rate) -> None:
         self._burst = rate.burst
         self._memory_s = rate.burst / rate.per_s
-        # Instead of shrinking all counts as time passes, the unit in which they are counted grows.
+        # Instead of shrinking all counts over time, the unit of counting grows.
         self._unit = 1.0
         self._unit_at = 0.0
         self._used: dict[Hashable, float] = {}

@@ -12,18 +12,18 @@ from bridge.gcs.station import Peer, Station
 
 #: A UDP peer that is silent for this long has left; a TCP peer leaves with its connection.
 EXPIRY_S = 60.0
-#: The same for a peer all of whose ids are now heard from elsewhere: its Wi-Fi gave it another address.
+#: The same for a peer whose ids are all heard at another address now, as after Wi-Fi roaming.
 MOVED_S = 5.0
 #: Peers on one link: as many as a network has hosts whose addresses differ in the last byte.
 MAX_PEERS = 256
-#: Those of them that have precedence.
+#: The number of these that have precedence.
 PRECEDENCE = 16
 #: The same for peers that may only read, so that they take no slot from those with the key.
 MAX_LISTENERS = 8
-#: A peer is steady once it has been heard this often, with pauses of at least `_BEAT_S`: as heartbeats at 1 Hz are.
+#: A peer is steady once it has been heard this often, with pauses of at least `_BEAT_S`, like heartbeats at 1 Hz.
 _STEADY_BEATS = 3
 _BEAT_S = 0.7
-#: Addresses remembered that came to a full link: at 20,000 a second, most of them for at least a second.
+#: The number of remembered addresses that a full link refused: at 20,000 a second, most of them for at least a second.
 _REMEMBERED = 1 << 16
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
@@ -56,7 +56,7 @@ def displaced(peers: Mapping[Peer, float], steady: Collection[Peer] = ()) -> Pee
 
 
 def _by_precedence(peers: Iterable[Peer], steady: Collection[Peer]) -> list[Peer]:
-    """Steady peers first; of them, as of the others, one of each host, then the second of each; then by arrival."""
+    """Steady peers first; within each kind one peer of each host, then the second of each; then by arrival."""
     rounds: Counter[tuple[bool, Hashable]] = Counter()
     order: list[tuple[bool, int, Peer]] = []
     for peer in peers:
@@ -79,7 +79,7 @@ class Stations:
 
     def __init__(self) -> None:
         self._known: dict[Peer, _Known] = {}  # in order of arrival
-        self._orders: dict[tuple[str, bool], list[Peer]] | None = None  # made again after each change
+        self._orders: dict[tuple[str, bool], list[Peer]] | None = None  # recomputed after each change
         self._turned_away = array("I", [0]) * _REMEMBERED
         self._displaced: list[Peer] = []
         self._expiry_due = inf
@@ -229,7 +229,7 @@ class Stations:
                 latest[key] = max(heard_at, latest.get(key, -inf))
         times = {}
         for peer, known in self._known.items():
-            # Heard later than here means that it was elsewhere.
+            # Heard later at another address: the station has moved there.
             moved = all(latest[peer.link, known.is_listener, who] > at for who, at in known.speakers.items())
             times[peer] = known.heard_at + (MOVED_S if moved else EXPIRY_S)
         return times

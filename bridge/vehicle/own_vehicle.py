@@ -219,7 +219,7 @@ class OwnVehicle:
         return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
 
     def _follow_requests(self) -> None:
-        """Set the polls now, or soon if that was just done."""
+        """Update the polls now, or shortly after the last update."""
         if self._now >= self._polls_set_at + _POLLS_INTERVAL_S:
             self._set_polls(self._ground.everyone())
         else:

@@ -44,7 +44,7 @@ _FINISH_S = 1.0
 _ABORT_S = 0.6
 _STORE_TIMEOUT_S = 0.2
 _REST_INTERVAL_S = 0.02
-#: A timer that would fire sooner than this before the deadline is worth a new one: it would wake the process in vain.
+#: A timer that fires earlier than the deadline by more than this is replaced; it would wake the process for nothing.
 _TOO_EARLY_S = 0.01
 #: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}

@@ -37,7 +37,7 @@ class DiskWriter(Generic[T]):
         self._thread.start()
 
     def put(self, record: T, size: int) -> None:
-        """Queue a record of so many bytes, or drop it if too many are waiting."""
+        """Queue a record of `size` bytes, or drop it if too many are waiting."""
         with self._lock:
             if self._size + size <= _MAX_WAITING:
                 self._waiting.append(record)

@@ -36,7 +36,7 @@ class TlogRecorder:
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close)
 
     def on_frames(self, frames: Sequence[bytes]) -> None:
-        """Record whole frames that were sent or received just now; they must not change any more."""
+        """Record whole frames that were sent or received just now; the caller must not modify them."""
         self._writer.put((time.monotonic_ns(), frames), sum(map(len, frames)))
 
     def flies(self, *, is_flying: bool) -> None:

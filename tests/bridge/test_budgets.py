@@ -58,7 +58,7 @@ def test_the_clock_begins_anywhere_and_may_rest_for_years() -> None:
         assert budgets.allows(Cost.RECEIVED, peer, now)
 
 
-def test_a_newcomer_finds_as_much_left_as_each_greedy_host_has_used() -> None:
+def test_a_newcomer_gets_as_much_as_each_greedy_host() -> None:
     budgets = Budgets(lambda _peer: False)
     hosts = [Peer("udp", (f"10.0.0.{host}", 14550)) for host in range(2, 12)]
     for peer in hosts * 1000:

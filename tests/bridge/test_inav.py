@@ -196,8 +196,8 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
     assert "WP 4: 100 m" not in told
 
 
-def test_a_multiwii_that_arms_while_it_is_read_is_sent_no_write() -> None:
-    """Not even the one that clears the record in RAM: telemetry has not noticed arming yet."""
+def test_a_multiwii_that_arms_during_a_read_gets_no_write() -> None:
+    """Not even the one that clears the record in RAM, although telemetry has not noticed arming yet."""
     multiwii = FakeMultiwii()
     world, station = found(multiwii)
     assert Upload(station, plan(10)).run() is ACCEPTED

@@ -289,8 +289,8 @@ def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> 
 
 
 @pytest.mark.parametrize("streams_hz", [0, 50])
-def test_a_former_list_that_is_loaded_again_is_noticed_within_two_seconds(streams_hz: int) -> None:
-    """Another client has changed one of many records and not saved its list; the sticks bring the saved one back."""
+def test_a_former_list_loaded_again_is_noticed_within_two_seconds(streams_hz: int) -> None:
+    """Another client has changed one of many records without saving; the sticks load the saved list."""
     board, world, station = board_with(serial_task_ms=10.0)
     ours = packed(plan(CAPACITY + 1))
     assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED

@@ -40,7 +40,7 @@ def same_again(draw: random.Random) -> Callable[[], Address]:
 
 
 def many_hosts(draw: random.Random) -> Callable[[], Address]:
-    """Most addresses of a network, each of which comes again and again."""
+    """Most addresses of a network, each sending repeatedly."""
     return lambda: (f"10.0.0.{draw.randrange(200)}", 14550)
 
 
