@@ -52,9 +52,11 @@ def test_axe_finds_no_violation_in_any_state(
         assert violations(page) == []
         web.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
+        page.wait_text("#checked form", "disarm to change the mission")
         assert violations(page) == []
         web.board.set("unplug")
         page.wait_text("#badges", "LOST")
+        page.wait_text("#held-text", "13 records, checksum 068b9e81, as last read")  # it may still fly it
         assert violations(page) == []
         web.daemon.end()
         page.wait_text("#badges", "NO REPLY")

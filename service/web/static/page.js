@@ -52,11 +52,14 @@ function onceVisible() {
 }
 
 async function showHeld(state) {
-  const mission = JSON.stringify(state.mission);
+  const isLost = state.lost_s !== null, mission = JSON.stringify([state.mission, isLost]);
   if (mission !== shown.mission) {
-    held = await ask("/api/held");
+    const now = await ask("/api/held");
     shown.mission = mission;
-    setText(byId("held-text"), held.count === null ? "The mission has not been read yet." : held.count ? `${held.count} records, checksum ${held.checksum}` : "No mission.");
+    const isOld = isLost && now.count === null && held.count > 0; // the lost craft may still fly it
+    if (!isOld) held = now;
+    const text = held.count ? `${held.count} records, checksum ${held.checksum}${isOld ? ", as last read" : ""}` : "No mission.";
+    setText(byId("held-text"), held.count === null ? "The mission has not been read yet." : text);
     byId("held-list").replaceChildren(listTable(held.items));
     showProfile(byId("profile"), held.items);
   }

@@ -9,13 +9,13 @@ let armed = null;
 // start: posts the request with a token and resolves to {id}.
 export function writeForm(label, start) {
   const button = make("button", { class: "write" }, label);
-  const result = make("p", { class: "result", role: "status" });
+  const result = make("p", { class: "result", role: "status" }), hint = make("p", { class: "why" });
   const bar = make("progress", { hidden: "", "aria-label": "Records written" });
-  const form = { id: null, begunAt: 0, button, result, bar, element: null };
+  const form = { id: null, begunAt: 0, button, hint, result, bar, element: null };
   form.element = make("form", { class: "row", onsubmit: (event) => {
     event.preventDefault();
     press(form, start);
-  } }, tokenField(), button, bar, result);
+  } }, tokenField(), button, hint, bar, result);
   forms.add(form);
   block(form);
   return form.element;
@@ -61,7 +61,7 @@ function follow(form, { write, transfer }) {
 
 function block(form) {
   form.button.disabled = armed === true;
-  form.button.title = armed === true ? "Armed: disarm to change the mission" : "";
+  setText(form.hint, armed === true ? "Armed: disarm to change the mission." : "");
 }
 
 function say(form, kind, text) {
