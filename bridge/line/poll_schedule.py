@@ -132,6 +132,7 @@ class PollSchedule:
         self._line_scale = 1.0
         self._quality = 1.0
         self._free_at = 0.0
+        self._asked_at = -inf
         self._lost_before = 0
         self._beside_missions = False
 
@@ -171,7 +172,7 @@ class PollSchedule:
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
         """Send the requests that are due, as far as the link has room."""
         self._look_at(link, beside_missions)
-        limit = now
+        self._asked_at = limit = now
         soon = now + _GATHER_S
         near = [slot for slot in self._slots.values() if slot.due <= soon]
         while near and now >= self._free_at:
@@ -212,6 +213,10 @@ class PollSchedule:
 
     def next_deadline(self, link: MspLink) -> float:
         """The time of the next request; infinity if a reply must arrive first."""
+        earliest = min(map(_DUE, self._slots.values()), default=inf)
+        if earliest > self._asked_at:
+            # Until then its previous reply will probably have arrived, and the link will have room.
+            return max(earliest, self._free_at)
         room = link.room
         earliest = inf
         for slot in sorted(self._slots.values(), key=_DUE):
