@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
  * A flight controller in memory around the mission core: for the host tests, the emulated Cortex-M3, the fuzzer and, as a
- * shared library, for Python (tests/conformance/c_core.py).
+ * shared library, for Python (tests/support/c_core.py).
  *
  * Its flash follows the rules of the STM32F103's: erase works on whole pages and sets every bit; program works on erased
  * half-words, or writes 0000. Anything else is refused and counted in `violations`. The page after the core's represents the

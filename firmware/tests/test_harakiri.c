@@ -180,7 +180,7 @@ static bool has(uint16_t count, uint8_t fill)
 
 /* ---- tests ------------------------------------------------------------------------------------------------------------ */
 
-static void test_a_list_from_before_the_patch_is_taken_over(void)
+static void test_a_list_from_before_the_patch_is_imported(void)
 {
     new_chip(5, 9);
     CHECK(has(5, 9));
@@ -188,13 +188,13 @@ static void test_a_list_from_before_the_patch_is_taken_over(void)
     CHECK(has(5, 9) && mission.sequence == 1);
 }
 
-static void test_a_configuration_that_cannot_be_right_has_no_list(void)
+static void test_an_invalid_configuration_has_no_list(void)
 {
     new_chip(NM_CAPACITY + 1, 9);
     CHECK(has(0, 0));
 }
 
-static void test_an_upload_that_breaks_off_leaves_the_stored_list(void)
+static void test_an_interrupted_upload_keeps_the_stored_list(void)
 {
     for (uint16_t stored = 0; stored <= 3; stored += 3) {
         new_chip(stored, 9);
@@ -267,9 +267,9 @@ static void test_with_feature_pass_writes_wait_for_the_throttle(void)
 int main(void)
 {
     static void (*const tests[])(void) = {
-        test_a_list_from_before_the_patch_is_taken_over,
-        test_a_configuration_that_cannot_be_right_has_no_list,
-        test_an_upload_that_breaks_off_leaves_the_stored_list,
+        test_a_list_from_before_the_patch_is_imported,
+        test_an_invalid_configuration_has_no_list,
+        test_an_interrupted_upload_keeps_the_stored_list,
         test_a_write_of_the_configuration_ends_an_upload,
         test_the_configurations_copy_follows_with_the_next_write,
         test_writing_waits_for_a_scheduled_write,

@@ -163,7 +163,7 @@ static int simple(uint8_t command)
     return sim_request(&board, command, buffer, 0);
 }
 
-/* The companion's procedure, shortened: BEGIN, CHUNKs, COMMIT. Returns the last status, or -2. */
+/* A companion's upload: BEGIN, CHUNKs, COMMIT. Returns the last status, or -2. */
 static int push(const list_t *list)
 {
     int status = begin(list);
@@ -332,7 +332,7 @@ static void test_a_loop_of_requests_cannot_wear_out_the_flash(void)
     CHECK(simple(NM_INFO) == 24 && buffer[2] == 0);
     CHECK(radius(300, 300 ^ 0xFFFF) == NM_OK && simple(NM_INFO) == 24 && buffer[2] == (2 | 8));
     sim_advance(&board, NM_WRITE_INTERVAL_MS);
-    CHECK(push(&list) == NM_OK && holds(&list)); /* a list that takes the last write is written whole */
+    CHECK(push(&list) == NM_OK && holds(&list)); /* a list that uses the last write is written completely */
     CHECK(begin(&old) == NM_BUSY && store(&old) == NM_OK && holds(&old)); /* the firmware's own save always goes through */
 
     sim_advance(&board, 3 * NM_WRITE_INTERVAL_MS);
@@ -478,7 +478,7 @@ static void test_flash_failures_leave_the_old_list(void)
     }
 }
 
-static void test_rot_is_noticed(void)
+static void test_damaged_flash_is_noticed(void)
 {
     const list_t old = list_of(10, 1), list = list_of(12, 2);
     fresh_board(&old);
@@ -503,7 +503,7 @@ static int receive(const uint8_t *bytes, int length, uint8_t *reply)
     return replied;
 }
 
-static void test_a_cut_frame_is_forgotten(void)
+static void test_a_truncated_frame_is_dropped(void)
 {
     static const uint8_t info[6] = {'$', 'M', '<', 0, 190, 190};
     uint8_t reply[SIM_FRAME_SIZE];
@@ -683,8 +683,8 @@ int main(void)
         test_busy,
         test_a_silent_transfer_is_dropped,
         test_flash_failures_leave_the_old_list,
-        test_rot_is_noticed,
-        test_a_cut_frame_is_forgotten,
+        test_damaged_flash_is_noticed,
+        test_a_truncated_frame_is_dropped,
         test_power_cuts,
     };
     for (unsigned i = 0; i < sizeof tests / sizeof *tests; i++)

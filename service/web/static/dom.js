@@ -20,7 +20,7 @@ export function setClass(element, name) {
   if (element.className !== name) element.className = name;
 }
 
-// The same for a parent of simple elements: only those are touched whose text has changed.
+// The same for a parent of simple elements: only those with changed text are updated.
 export function setList(parent, name, texts) {
   while (parent.children.length > texts.length) parent.lastElementChild.remove();
   texts.forEach((text, index) => {

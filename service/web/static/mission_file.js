@@ -10,7 +10,7 @@ import { writeForm } from "./write_form.js";
 const MOST_BYTES = 256 * 1024;
 const result = byId("checked"), drop = byId("drop"), chooser = byId("file");
 let preview = null; // { map, items } of the file that is shown
-let latest = 0; // a later file overtakes the check of an earlier one
+let latest = 0; // the check of an earlier file is ignored once a later one was chosen
 
 chooser.addEventListener("change", () => chooser.files.length && check(chooser.files[0]));
 chooser.addEventListener("click", () => { chooser.value = ""; }); // the same file again, after an edit

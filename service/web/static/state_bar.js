@@ -54,7 +54,7 @@ function showTransfer(transfer) {
   Object.assign(byId("transfer-bar"), { max: Math.max(total, 1), value: done });
 }
 
-// Ages count on without a word; the first state is on the page anyway.
+// Growing ages are not announced, nor is the first state, which is on the page anyway.
 function announce(names) {
   if (spoken !== null && names !== spoken) setText(byId("spoken"), names.toLowerCase());
   spoken = names;

@@ -56,7 +56,7 @@ function values(item, changes) {
     "span", { class: `value${name in changes ? " is-changed" : ""}` }, `${label(item, name)} ${text(name, item[name])}`)])];
 }
 
-// As Mission Planner calls it.
+// The name in Mission Planner.
 const label = (item, name) => NAMES[name] ?? item.params[PARAMS.indexOf(name)];
 
 function text(name, value) {
