@@ -8,6 +8,7 @@ from service.control.mission_data import Json
 
 #: Older values are left out: there are no ages to judge them by.
 _OLDEST_S = 10.0
+_GREATEST = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,31 @@ def overview_of(state: Json) -> Overview:
         mission_count=mission.get("count"),
         mission_checksum=None if checksum is None else int(checksum, 16),
     )
+
+
+def state_of(overview: Json) -> Json:
+    """The parts of a state that an overview has; None where it has none. It may be foreign."""
+
+    def scaled(name: str, scale: float) -> float | None:
+        value = overview.get(name)
+        return value / scale if isinstance(value, int) and abs(value) <= _GREATEST else None
+
+    checksum = overview.get("mission_checksum")
+    return {
+        "time_s": overview.get("time_s"),
+        "link": {"state": overview.get("link")},
+        "status": {name: overview.get(name) for name in ("armed", "mode")},
+        "battery": {"voltage_v": scaled("battery_cv", 100)},
+        "position": {
+            "lat_deg": scaled("lat_e7", 1e7),
+            "lon_deg": scaled("lon_e7", 1e7),
+            "height_m": scaled("height_m", 1),
+        },
+        "mission": {
+            "count": overview.get("mission_count"),
+            "checksum": f"{checksum:08x}" if isinstance(checksum, int) and 0 <= checksum <= _GREATEST else None,
+        },
+    }
 
 
 def _fresh(group: Json) -> Json:

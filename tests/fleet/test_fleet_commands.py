@@ -14,6 +14,7 @@ import zenoh
 
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import Command
+from service.cli.fleet.session import FleetAddress, open_session
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
 from tests.support.programs import run_naze_bridge, until
@@ -41,15 +42,10 @@ def plan_file(folder: Path, plan: list[PlanRow]) -> Path:
     return path
 
 
-def session_of(fleet: Fleet) -> zenoh.Session:
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([fleet.router.endpoint]))
-    return zenoh.open(config)
-
-
 def test_list(fleet: Fleet) -> None:
-    vehicles = fleet.listed()
+    listed = fleet.ask("list", "--json")
+    assert listed.returncode == 0, listed
+    vehicles = {each["name"]: each for each in json.loads(listed.stdout)["vehicles"]}
     assert list(vehicles) == list(NAMES)
     for name, vehicle in vehicles.items():
         status = fleet.daemons[name].status()
@@ -71,8 +67,9 @@ def test_push_to_all_and_pull_again(fleet: Fleet, tmp_path: Path) -> None:
     assert pushed.stdout.endswith("3 of 3 vehicles hold the mission, verified\n")
     records = records_of(judge(plan))
     assert [fleet.daemons[name].held()["records"] for name in NAMES] == [records] * 3
-    until(lambda: {each["mission_count"] for each in fleet.listed().values()} == {9}, "the news")
-    assert len({each["mission_checksum"] for each in fleet.listed().values()}) == 1
+    wanted = {(9, fleet.daemons["kite"].held()["checksum"])}
+    found = ("mission_count", "mission_checksum")
+    until(lambda: {tuple(map(each.get, found)) for each in fleet.listed().values()} == wanted, "the news")
     folder = tmp_path / "pulled"
     assert fleet.ask("pull", folder).returncode == 0
     assert sorted(path.name for path in folder.iterdir()) == [f"{name}.waypoints" for name in NAMES]
@@ -145,7 +142,7 @@ def test_an_unknown_name(fleet: Fleet, tmp_path: Path) -> None:
 def test_invalid_states_of_strangers(fleet: Fleet) -> None:
     """Tokens and states of other programs neither stop the list nor reach the terminal."""
     with ExitStack() as stack:
-        session = stack.enter_context(session_of(fleet))
+        session = stack.enter_context(open_session(FleetAddress(connect=(fleet.router.endpoint,))))
         liveliness = session.liveliness()
         for key in (
             "fleet/ghost/v1/alive/0",

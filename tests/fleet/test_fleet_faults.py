@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import zenoh
 
 from protocols.mission_file import write_qgc_wpl
 from service.cli.fleet.roll_call import roll_call
@@ -23,7 +22,7 @@ from service.zenoh_link.keys import UPLOAD
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import NAZE_BRIDGE, PATIENCE, until
-from tests.support.zenoh_bench import ask, session
+from tests.support.zenoh_bench import ask_surely
 
 #: At this speed 146 records take seconds, enough time to inject a fault.
 _SLOW_BAUD = 9600
@@ -152,9 +151,9 @@ def test_ctrl_c_during_a_push(fleet: Fleet) -> None:
 
 
 def test_a_second_push_during_the_first_is_refused(fleet: Fleet) -> None:
-    with session(connect=fleet.router.endpoint) as opened:
-        command = long_push(fleet, "--json")
-        (second,) = ask(opened, UPLOAD.suffix, (fleet.folder / "long.waypoints").read_bytes(), vehicle="snail")
+    command = long_push(fleet, "--json")
+    payload = (fleet.folder / "long.waypoints").read_bytes()
+    second = ask_surely(fleet.session, UPLOAD.suffix, payload, vehicle="snail")
     assert "error" in second, second
     code, _, _ = command.end()
     assert code == 0
@@ -239,17 +238,13 @@ def test_watch_shows_vehicles_that_come_and_go(fleet: Fleet) -> None:
 def test_a_hung_router_is_not_an_empty_fleet(fleet: Fleet) -> None:
     """The router hangs after the session was opened."""
     router = fleet.router.process
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([fleet.router.endpoint]))
-    with zenoh.open(config) as session:
-        router.send_signal(signal.SIGSTOP)
-        try:
-            until(lambda: _is_stopped(router.pid), "the stopped router")
-            with pytest.raises(FleetError, match="the router did not list the vehicles within 2 s"):
-                roll_call(session, "fleet")
-        finally:
-            router.send_signal(signal.SIGCONT)
+    router.send_signal(signal.SIGSTOP)
+    try:
+        until(lambda: _is_stopped(router.pid), "the stopped router")
+        with pytest.raises(FleetError, match="the router did not list the vehicles within 2 s"):
+            roll_call(fleet.session, "fleet")
+    finally:
+        router.send_signal(signal.SIGCONT)
     fleet.wait("kite", "snail")
 
 

@@ -5,9 +5,12 @@ import json
 import signal
 import subprocess
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from service.cli.fleet.roll_call import roll_call
+from service.cli.fleet.session import FleetAddress, open_session
 from tests.support.programs import Board, Daemon, run_naze_bridge, until
 from tests.support.zenoh_router import Router, running_router
 
@@ -22,6 +25,8 @@ class Fleet:
         self.folder = folder
         self._stack = stack
         self.router: Router = stack.enter_context(running_router(folder))
+        #: For what the tests wait for: a `fleet list` for each look would be a program of its own.
+        self.session = stack.enter_context(open_session(FleetAddress(connect=(self.router.endpoint,))))
         self.daemons: dict[str, Daemon] = {}
         self.boards: dict[str, Board] = {}
 
@@ -56,10 +61,8 @@ class Fleet:
         return run_naze_bridge("fleet", *arguments, "--connect", self.router.endpoint, **options)
 
     def listed(self) -> dict[str, Vehicle]:
-        """The output of `fleet list` for each vehicle, by name."""
-        listed = self.ask("list", "--json")
-        assert listed.returncode == 0, listed
-        return {vehicle["name"]: vehicle for vehicle in json.loads(listed.stdout)["vehicles"]}
+        """The vehicles that `fleet list` would show, by name."""
+        return {vehicle.name: asdict(vehicle) for vehicle in roll_call(self.session, "fleet")}
 
     def wait(self, *names: str) -> None:
         """Wait until vehicles are seen and have read their flight controllers' missions."""

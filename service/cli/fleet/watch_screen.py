@@ -62,6 +62,7 @@ def show_screen(seen: Watch, session: zenoh.Session, conditions: Sequence[Condit
             page = max(console.height - _OTHER_LINES, 1)
             rows = _rows(seen, conditions)
             top = max(0, min(top, len(rows) - page))
+            seen.follow([row.vehicle.name for row in rows[top : top + page]])
             live.update(screen(rows, top, page, is_connected=is_connected(session)), refresh=True)
             top += _wait_for_scroll(_REFRESH_S, page)
 
@@ -85,6 +86,7 @@ def screen(rows: Sequence[ScreenRow], top: int, page: int, *, is_connected: bool
 
 def print_changes(seen: Watch, conditions: Sequence[Condition]) -> None:
     """Print a line for each vehicle that appears, changes or disappears, until KeyboardInterrupt."""
+    seen.follow(["*"])
     known: dict[str, FleetVehicle] = {}
     while True:
         now = {row.vehicle.session_id: row.vehicle for row in _rows(seen, conditions)}
