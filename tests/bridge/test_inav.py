@@ -28,7 +28,7 @@ CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
 
 
 def plan(count: int, seed: int = 0) -> list[MissionItem]:
-    """Waypoints that INAV stores as they are."""
+    """Waypoints that INAV stores unchanged."""
     home, *legs = waypoints(count, seed)
     # The fake's own home, so that it reads back as sent.
     home = replace(home, lat_e7=453838000, lon_e7=84733000)

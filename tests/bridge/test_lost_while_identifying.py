@@ -33,7 +33,7 @@ def identification_s(baud: int, protocol: TelemetryProtocol) -> float:
 
 
 def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryProtocol.MSP) -> World:
-    """A world somewhere in the middle of identification."""
+    """A world at some moment of identification."""
     world = begun(baud, protocol)
     if seed:
         world.run(identification_s(baud, protocol) * random.Random(seed).random())

@@ -982,7 +982,7 @@ def test_late_wake_ups_lose_nothing(late_s: float) -> None:
 
 
 def test_a_flood_of_requests_fills_no_queue() -> None:
-    """The world asserts that the queue of conversations stays short; here the rest is checked."""
+    """The world checks the queue of conversations; the other queues are checked here."""
     world, station = holding()
     for number in range(3000):
         station.send(count_message(5 + number % 90))

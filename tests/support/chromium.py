@@ -90,7 +90,7 @@ class Browser:
 
 
 class Browsers:
-    """Chromium with light and with dark pages: each is started once and kept until `close`, because its start takes
+    """Chromium with light and with dark pages; each is started once and kept until `close`, because its start takes
     longer than most tests. Needs Debian's packages chromium and chromium-driver."""
 
     def __init__(self) -> None:
