@@ -166,8 +166,8 @@ def test_a_jump_target_is_renumbered_for_the_flight_controller() -> None:
     assert [shown.p1 for shown in verdict.items if shown.command == C.DO_JUMP] == [3]
 
 
-def test_a_leg_at_which_a_multiwii_stops_is_warned_of_also_after_a_jump() -> None:
-    """400 m north of each other: only the way back is too long. A turn in between is no leg."""
+def test_a_warning_for_legs_at_which_a_multiwii_stops() -> None:
+    """Waypoints 400 m apart: only the jump back is too long. A heading change in between is not a leg."""
     second, third = (replace(WP, lat_e7=LAT + 36_000 * place) for place in (1, 2))
     yaw = item(C.CONDITION_YAW, at=False, p1=90.0)
     legs = (WP, second, yaw, third, jump(1), third)

@@ -87,7 +87,7 @@ def test_half_a_frame_swallows_the_next() -> None:
     assert bench.ask(100) is not None
 
 
-def test_a_blank_place_is_read_as_it_is_also_above_the_capacity() -> None:
+def test_blank_records_are_returned_even_above_the_capacity() -> None:
     bench = MspBench("multiwii")
     assert status(bench) == (0, 0, 0, 0, DISARMED)
     for number in (3, 254):

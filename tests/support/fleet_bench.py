@@ -25,7 +25,7 @@ class Fleet:
         self.folder = folder
         self._stack = stack
         self.router: Router = stack.enter_context(running_router(folder))
-        #: For what the tests wait for: a `fleet list` for each look would be a program of its own.
+        #: For waiting in tests: `fleet list` would start a process for each look.
         self.session = stack.enter_context(open_session(FleetAddress(connect=(self.router.endpoint,))))
         self.daemons: dict[str, Daemon] = {}
         self.boards: dict[str, Board] = {}

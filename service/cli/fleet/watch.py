@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fleet as it changes: the vehicles that are alive, and the newest state of each.
 
-A state once a second costs a vehicle about 1,200 B/s, its overview 12 B/s: so all send the overview, and those whose
-details are shown the state as well.
+A state once a second costs a vehicle about 1,200 B/s, its overview 12 B/s: so all send the overview, and only the
+vehicles whose details are shown also send the state.
 """
 
 import threading
@@ -38,14 +38,14 @@ class Watch:
         self._followed: dict[str, zenoh.Subscriber[None]] = {}
 
     def follow(self, names: Collection[str]) -> None:
-        """Take the states of these vehicles, "*" of all; overviews are taken of all. For one thread."""
+        """Subscribe to the states of these vehicles ("*": all); overviews always come from all. Not thread-safe."""
         for name in self._followed.keys() - set(names):
             self._followed.pop(name).undeclare()  # type: ignore[no-untyped-call]
         for name in set(names) - self._followed.keys():
             self._followed[name] = self._session.declare_subscriber(self._key(name, STATE.suffix), self.sample)
 
     def ask(self, name: str) -> None:
-        """Query the state of a vehicle, "*" of all."""
+        """Query a vehicle's state ("*": all vehicles)."""
         send_query(self._session, self._key(name, STATE.suffix), self.reply, lambda: None, None, _STATE_TIMEOUT_S)
 
     def token(self, sample: zenoh.Sample) -> None:
