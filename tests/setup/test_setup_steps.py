@@ -185,6 +185,9 @@ def test_the_command_shows_the_planned_changes(tmp_path: Path, model: str) -> No
     [
         (["--hotspot", "naze"], "a hotspot needs a password"),
         (["--hotspot", "n" * 33, "--password-file", "{}"], "is not a network name"),
+        (["--country", "germany"], "is not a country code"),
+        (["--name", "my pi"], "is not a host name"),
+        (["--name", "kite.local"], "is not a host name"),
         (["--fc", "naze"], "is not a flight controller connection"),
     ],
 )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge setup`."""
 
+import re
 import socket
 import time
 from contextlib import suppress
@@ -21,6 +22,8 @@ from service.web.token import DEFAULT_NAME
 _LEAST_PASSWORD, _MOST_PASSWORD, _MOST_SSID = 8, 63, 32
 #: Both speeds and protocols of every port are tried by then.
 _SEARCH_S = 30
+_NEEDS_ROOT = "setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run"
+_HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 _ADDRESS_OF_HOTSPOT = "10.42.0.1"
 
 
@@ -53,8 +56,8 @@ def setup(
 
     Exit code 0: done, 1: a change failed, or doctor found a problem.
     """
-    if not (dry_run or is_root()):
-        fail("setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run")
+    if not (yes or dry_run or is_root()):
+        fail(_NEEDS_ROOT)  # before its questions
     host = Host(root)
     try:
         fc = str(parse_fc(fc))
@@ -73,6 +76,10 @@ def setup(
             raise click.UsageError("a hotspot needs a password: --password-file FILE")
         password = click.prompt("Its password, 8 characters or more", hide_input=True, confirmation_prompt=True)
     _check_wifi(hotspot, password)
+    if country is not None and not re.fullmatch("[A-Za-z]{2}", country):
+        raise click.UsageError(f"{country!r} is not a country code: two letters, such as DE")
+    if name is not None and not _HOST_NAME.fullmatch(name):
+        raise click.UsageError(f"{name!r} is not a host name: letters, digits and hyphens, at most 63")
     answers = SetupChoices(
         fc=fc,
         page=page,
@@ -86,6 +93,8 @@ def setup(
     if dry_run:
         return
     if steps:
+        if not is_root():
+            fail(_NEEDS_ROOT)
         if not yes and not click.confirm("Make these changes?", default=True):
             raise click.Abort
         _carry_out(steps, Machine(host))
