@@ -17,7 +17,7 @@ _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
 _UNKNOWN_COMMAND = 0
 #: DO_CHANGE_SPEED: param1 ground speed, param2 "as set on the flight controller".
 GROUND_SPEED, AS_SET = 1, -2
-_HIGHEST_HEADING = 359
+HIGHEST_HEADING = 359
 
 
 def home_item(place: tuple[int, int] | None, alt_m: float = 0.0) -> MissionItem:
@@ -104,7 +104,7 @@ def _shown(seq: int, record: NavRecord, sent_as: int | None) -> MissionItem:
             return _item(seq, Command.NAV_RETURN_TO_LAUNCH, p1=int(record.p1 > 0), alt_m=record.alt_cm / 100)
         case NavAction.SET_POI:
             return _leg(seq, sent_as if sent_as in ROI_COMMANDS else Command.NAV_ROI, record)
-        case NavAction.SET_HEAD if 0 <= record.p1 <= _HIGHEST_HEADING:
+        case NavAction.SET_HEAD if 0 <= record.p1 <= HIGHEST_HEADING:
             return _item(seq, Command.CONDITION_YAW, p1=record.p1)
         case NavAction.SET_HEAD:
             return _item(seq, Command.DO_SET_ROI_NONE)

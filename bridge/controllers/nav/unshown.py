@@ -2,13 +2,24 @@
 """Values of a record that no item can show, from other planners: kept if the leg is written again unchanged."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
+from bridge.controllers.nav.items import HIGHEST_HEADING, leg_speed
 from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
 
 _ABOVE_SEA = 1
+#: The fields of a record that items do not show, by its action; of these, only a LAND's p2 changes a flight.
+_HIDDEN: Mapping[int, tuple[str, ...]] = {
+    NavAction.WAYPOINT: ("p2",),
+    NavAction.POSHOLD_UNLIM: ("p1", "p2"),
+    NavAction.RTH: ("lat_e7", "lon_e7", "p2", "p3"),
+    NavAction.SET_POI: ("p1", "p2"),
+    NavAction.JUMP: ("lat_e7", "lon_e7", "alt_cm", "p3"),
+    NavAction.SET_HEAD: ("lat_e7", "lon_e7", "alt_cm", "p2", "p3"),
+    NavAction.LAND: ("p2",),
+}
 
 
 def flies_home(record: NavRecord) -> bool:
@@ -33,8 +44,19 @@ def keep_unshown(records: Sequence[NavRecord], former: Sequence[NavRecord]) -> t
 
 
 def _shown(record: NavRecord) -> NavRecord:
-    p2 = 0 if record.action == NavAction.LAND else record.p2
-    return replace(record, p2=p2, p3=record.p3 & _ABOVE_SEA, flag=0)
+    """The record without what its item does not show."""
+    hidden = dict.fromkeys(_HIDDEN.get(record.action, ()), 0)
+    record = replace(record, **{"p3": record.p3 & _ABOVE_SEA, "flag": 0, **hidden})
+    match record.action:
+        case NavAction.WAYPOINT | NavAction.LAND:
+            return replace(record, p1=leg_speed(record, 0))
+        case NavAction.POSHOLD_TIME:
+            return replace(record, p2=leg_speed(record, 0))
+        case NavAction.RTH:
+            return replace(record, p1=int(record.p1 > 0))
+        case NavAction.SET_HEAD if not 0 <= record.p1 <= HIGHEST_HEADING:
+            return replace(record, p1=-1)
+    return record
 
 
 def _unshown(record: NavRecord) -> list[str]:
