@@ -47,7 +47,7 @@ class Cost(IntEnum):  # its hash is an int's, in C: it is made for each datagram
 class Limit:
     """`each`: for every peer with standing, and every host of the others. `total`: shared by all the others.
 
-    bridge.gcs.budget describes standing, bridge.gcs.shares the sharing.
+    bridge.gcs.budget describes standing and sharing.
     """
 
     each: Rate

@@ -7,10 +7,9 @@ All ground stations on open links together get no more than that, so that strang
 
 from collections.abc import Callable, Hashable
 
-from bridge.gcs.budget import TokenBucket
+from bridge.gcs.budget import Shares, TokenBucket
 from bridge.gcs.cost import Rate
 from bridge.gcs.guard import Standing
-from bridge.gcs.shares import Shares
 from bridge.gcs.station import Peer
 from bridge.gcs.stations import PRECEDENCE, Stations
 

@@ -88,6 +88,8 @@ class FcMissionStore(ABC, Generic[RecordT]):
     reads_armed: bool = False
     #: The interval at which `is_current` should be asked.
     watch_s: float = 1.0
+    #: Further missions in its store, as last read. Only one mission at a time is loaded and flown.
+    others: tuple[tuple[RecordT, ...], ...] = ()
 
     @property
     def wp_radius_cm(self) -> int | None:
@@ -122,11 +124,6 @@ class FcMissionStore(ABC, Generic[RecordT]):
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""
         return items
-
-    @property
-    def others(self) -> tuple[tuple[RecordT, ...], ...]:
-        """Further missions in its store, as last read. Only one mission at a time is loaded and flown."""
-        return ()
 
     def erased_by(self, records: Sequence[RecordT]) -> tuple[tuple[RecordT, ...], ...]:
         """The `others` that do not fit alongside a new list; writing it erases them."""

@@ -376,7 +376,7 @@ class MissionService:
 
     def _copy_erased(self, fc_store: AnyFcMissionStore, records: Sequence[Any]) -> Conversation[bool]:
         """Store the missions that the new list will erase; False if that fails."""
-        for mission in fc_store.erased_by(records):
+        for mission in fc_store.erased_by(records) if fc_store.others else ():
             items = fc_store.items(mission, {})
             verdict = Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, mission, items)
             number = yield from save(ArrivedMission(_ERASED_SOURCE, items, verdict))

@@ -38,7 +38,6 @@ class InavMissions(NavMissions):
     """The mission store of one INAV. Record 1 wipes all missions, and no list is valid before its last record."""
 
     reads_armed = True
-    _others: tuple[Mission, ...] = ()
     #: The other missions that are written again behind a new list.
     _kept: tuple[Mission, ...] = ()
     #: Records in the store before the loaded mission's first.
@@ -48,20 +47,15 @@ class InavMissions(NavMissions):
     #: The same, as of the last check for changes.
     _last_look: tuple[NavInfo, int] | None = None
 
-    @property
-    def others(self) -> tuple[Mission, ...]:
-        """The missions in its store that are not loaded."""
-        return self._others
-
     def erased_by(self, records: Sequence[NavRecord]) -> tuple[Mission, ...]:
         """The last of the others, as many as do not fit."""
-        return erased(self._others, self._profile.capacity - len(records or NOTHING))
+        return erased(self.others, self._profile.capacity - len(records or NOTHING))
 
     def push(self, records: Mission, progress: PushProgress) -> Conversation[PushResult]:
         """Write the list, with the other missions behind it, and verify it."""
         result = yield from super().push(records, progress)
         if result.failure is None:
-            self._others, self._before_loaded = self._kept, 0
+            self.others, self._before_loaded = self._kept, 0
         return result
 
     def pull(self) -> Conversation[Mission | None]:
@@ -119,16 +113,16 @@ class InavMissions(NavMissions):
         is_armed = bool(self._vehicle.armed)
         loaded = flown(missions, 1 if is_armed else seen[1])
         if not is_armed:
-            self._others = tuple(mission for mission in missions if mission is not loaded)
+            self.others = tuple(mission for mission in missions if mission is not loaded)
             self._before_loaded = sum(map(len, missions[: missions.index(loaded)])) if loaded else 0
         self._known = () if loaded == NOTHING else loaded
 
     def _rules(self) -> NavRules:
-        return NavRules(self._profile, self._known or (), self._others)
+        return NavRules(self._profile, self._known or (), self.others)
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new one goes there."""
-        self._kept = self._others[: len(self._others) - len(self.erased_by(records))]
+        self._kept = self.others[: len(self.others) - len(self.erased_by(records))]
         return (*records, *chain.from_iterable(self._kept))
 
     def _order(self, wanted: Mission) -> list[tuple[int, NavRecord]]:
@@ -180,7 +174,7 @@ class InavMissions(NavMissions):
         with suppress(LinkLost):
             yield from ask(LOAD_REQUEST, Nav.LOAD, 0)
             loaded = yield from self.pull()
-            if loaded == before and (loaded or self._others):
+            if loaded == before and (loaded or self.others):
                 return True
         return (yield from super()._restore(before))
 
