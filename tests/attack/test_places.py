@@ -40,8 +40,10 @@ def guarded(start: Starter, key_file: Path) -> Bench:
 
 
 def crowd(bench: Bench, stack: ExitStack, *spoken: Message, size: int = CROWD, per_s: float = 30) -> Attack:
-    """Strangers from several machines; each sends a heartbeat, or something else, from time to time."""
-    strangers = [Stranger(bench.daemon.address, f"127.0.1.{1 + number % 9}") for number in range(size)]
+    """Strangers, each with its own address; it sends a heartbeat, or something else, from time to time."""
+    strangers = [
+        Stranger(bench.daemon.address, f"127.0.{1 + number // 200}.{1 + number % 200}") for number in range(size)
+    ]
     for stranger in strangers:
         stack.callback(stranger.close)
     turns = itertools.cycle(strangers)

@@ -12,6 +12,7 @@ from bridge.gcs.station import Peer, Station
 from bridge.gcs.stations import Stations
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
+from simulator.options import SimOptions
 from tests.support.conversations import Upload, records_of, waypoints
 from tests.support.world import Air, GroundStation, World
 
@@ -127,7 +128,7 @@ def test_an_unchanged_list_is_not_counted() -> None:
 
 @pytest.mark.parametrize(("hosts", "lists"), [(3, 4), (16, 1)])
 def test_the_pilots_list_precedes_those_of_frequent_writers(hosts: int, lists: int) -> None:
-    world = World(speeds=(115200,))
+    world = World(SimOptions(flash_erase_ms=400.0), speeds=(115200,))
     world.wait_ready()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))
     strangers = [GroundStation(world, f"stranger {number}", sysid=number) for number in range(1, hosts + 1)]
