@@ -91,5 +91,7 @@ def _tell(checked: Checked, *, as_json: bool) -> None:
         return
     grade = click.style(f"{checked.grade.value:7}", fg=_COLOURS[checked.grade], bold=checked.grade is Grade.PROBLEM)
     say(f"{checked.check}: {checked.found}", prefix=f"{grade}  ", indent=9)
-    if checked.remedy:  # one line, so that a command can be copied
+    if checked.remedy.startswith("sudo "):  # one line, to be copied
         click.echo(f"{'':7}  -> {checked.remedy}")
+    elif checked.remedy:
+        say(checked.remedy, prefix=f"{'':7}  -> ", indent=12)
