@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""zenoh's time ranges, as in `history?_time=[now(-1h)..now()]`. Sans-IO."""
+"""zenoh's time ranges, as in `history?_time=[now(-1h)..now()]`. Sans-IO.
+
+Not its form with a duration, `[now(-1h);30m]`: in a query a semicolon ends the parameter (zenoh 1.10).
+"""
 
 import re
 from dataclasses import dataclass
@@ -7,9 +10,7 @@ from datetime import UTC, datetime
 from math import inf
 
 _UNITS_S = {"": 1, "u": 1e-6, "ms": 1e-3, "s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
-_RANGE = re.compile(
-    r"(?P<open>[\[\]])(?P<start>[^;\[\]]*?)(?:\.\.(?P<end>[^;\[\]]*)|;(?P<length>[^;\[\]]*))(?P<close>[\[\]])"
-)
+_RANGE = re.compile(r"[\[\]](?P<start>[^\[\]]*?)\.\.(?P<end>[^\[\]]*)[\[\]]")
 _NOW = re.compile(r"now\((?P<offset>[^()]*)\)")
 _DURATION = re.compile(r"(?P<number>-?\d+(?:\.\d+)?)(?P<unit>u|ms|s|m|h|d|w|)")
 
@@ -30,10 +31,7 @@ def parse_time_range(text: str, now_s: float) -> TimeRange:
     match = _RANGE.fullmatch(text.strip())
     if match is None:
         raise _wrong(text)
-    start_s = _time(match["start"], now_s, -inf)
-    if match["length"] is not None:
-        return TimeRange(start_s, start_s + _duration(match["length"]))
-    return TimeRange(start_s, _time(match["end"], now_s, inf))
+    return TimeRange(_time(match["start"], now_s, -inf), _time(match["end"], now_s, inf))
 
 
 def _time(text: str, now_s: float, default: float) -> float:
@@ -58,5 +56,5 @@ def _duration(text: str) -> float:
 
 def _wrong(text: str) -> ValueError:
     return ValueError(
-        f"{text[:40]!r} is not a time range: write one like [now(-1h)..now()] or [2026-05-01T10:00:00Z;30m]"
+        f"{text[:40]!r} is not a time range: write one like [now(-1h)..now()] or [2026-05-01T10:00Z..2026-05-01T10:30Z]"
     )

@@ -14,9 +14,9 @@ NOW_S = 1_800_000_000.0
         ("[now(-1h)..now()]", -3600, 0),
         ("[now(-1.5m)..]", -90, float("inf")),
         ("[..now(-2d)]", float("-inf"), -172800),
-        ("[now(-1h);30m]", -3600, -1800),
+        ("[now(-1h)..now(-30m)]", -3600, -1800),
         ("]2027-01-15T08:00:00Z..2027-01-15T08:00:01[", 0, 1),
-        ("[2027-01-15T09:00:00+01:00;500ms]", 0, 0.5),
+        ("[2027-01-15T08:00Z..2027-01-15T09:00:00.5+01:00]", 0, 0.5),
     ],
 )
 def test_ranges(text: str, start_s: float, end_s: float) -> None:
@@ -25,7 +25,9 @@ def test_ranges(text: str, start_s: float, end_s: float) -> None:
     assert max(found.start_s, NOW_S - 1e6) in found
 
 
-@pytest.mark.parametrize("text", ["", "now()", "[now()]", "[yesterday..]", "[now(-1y)..]", "[..];[..]", "[" * 1000])
+@pytest.mark.parametrize(
+    "text", ["", "now()", "[now()]", "[yesterday..]", "[now(-1y)..]", "[..];[..]", "[now(-1h);30m]", "[" * 1000]
+)
 def test_invalid_ranges_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"write one like \[now"):
         parse_time_range(text, NOW_S)
