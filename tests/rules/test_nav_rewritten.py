@@ -55,7 +55,7 @@ def test_values_that_no_item_shows_are_kept(record: NavRecord) -> None:
     former = (
         NavRecord(NavAction.WAYPOINT, 453838000, 84733000, 2000),
         record,
-        NavRecord(NavAction.RTH, 1, 2, 0, p1=0, p2=9, flag=LAST),
+        NavRecord(NavAction.RTH, 1, 2, 0, p1=7, p2=9, flag=LAST),
     )
     verdict = check_list(items_from_records(former, home_item(None)), NavRules(inav_profile(), former))
     assert verdict.records == former
