@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rate limits for each ground station and for all of them together. Sans-IO: the time is passed in."""
 
+from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable
 from math import exp
 from typing import TypeVar
@@ -10,9 +11,8 @@ from bridge.gcs.station import Peer
 
 K = TypeVar("K", bound=Hashable)
 
-#: Hosts with the same hash share a budget, so forged ones cannot use more memory than this. The hash of a text differs
-#: between processes, so an attacker cannot choose an address that shares the pilot's budget.
-_HOST_GROUPS = 1024
+#: The number of accounts for hosts: forged ones cannot use more memory.
+_ACCOUNTS = 1024
 #: Counts grow by this factor before they are scaled back, which forgets those below 1 / 1000.
 _RESCALE_AT = 1e6
 #: After this many times the memory's length every count has decayed to 0; the clock may also start at any value.
@@ -91,6 +91,8 @@ class Budgets:
         self._has_standing = has_standing
         self._peers: dict[tuple[Cost, Peer], TokenBucket] = {}
         self._hosts: dict[tuple[Cost, int], TokenBucket] = {}
+        #: The account of each host, the host heard least recently first.
+        self._accounts: OrderedDict[Hashable, int] = OrderedDict()
         self._totals = {cost: Shares(limit.total) for cost, limit in LIMITS.items()}
         #: How often each limit was exceeded.
         self.exceeded = dict.fromkeys(Cost, 0)
@@ -98,18 +100,27 @@ class Budgets:
     def allows(self, cost: Cost, peer: Peer, now: float) -> bool:
         """Count one for a peer; False if that exceeds a limit."""
         if self._has_standing(peer):
-            bucket, group = _bucket(self._peers, (cost, peer), cost), None
+            bucket, account = _bucket(self._peers, (cost, peer), cost), None
         else:
-            group = hash(str(peer.host)) % _HOST_GROUPS
-            bucket = _bucket(self._hosts, (cost, group), cost)
+            account = self._account(peer.host)
+            bucket = _bucket(self._hosts, (cost, account), cost)
         total = self._totals[cost]
-        if not (bucket.has(now) and (group is None or total.left(now) > total.used(group))):
+        if not (bucket.has(now) and (account is None or total.left(now) > total.used(account))):
             self.exceeded[cost] += 1
             return False
         bucket.spend()
-        if group is not None:
-            total.spend(group)
+        if account is not None:
+            total.spend(account)
         return True
+
+    def _account(self, host: Hashable) -> int:
+        """The host's account. If all are taken, a new host continues that of the host heard least recently."""
+        account = self._accounts.pop(host, None)
+        if account is None:
+            is_room = len(self._accounts) < _ACCOUNTS
+            account = len(self._accounts) if is_room else self._accounts.popitem(last=False)[1]
+        self._accounts[host] = account
+        return account
 
     def keep(self, peers: Iterable[Peer]) -> None:
         """Forget peers that are gone."""
