@@ -13,7 +13,8 @@ from service.links.gcs_events import GcsEvents
 from service.links.send_queue import SendQueue
 from service.settings.addresses import GcsAddress, family_of
 
-_READ_SIZE = 2048
+#: Small, so that the requests of a client that floods do not delay those of others.
+_READ_SIZE = 512
 #: The unread bytes of a stalled client, above which telemetry for it is dropped, oldest first.
 _MAX_UNSENT = 65536
 _KERNEL_BUFFER = 32768
