@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Limits the writes to the flight controller's flash, a page of which endures 10,000. Sans-IO.
 
-A Harakiri with the mission extension allows 64 writes after a restart, and then one in 5 minutes (docs/msp-mission.md).
-All ground stations on open links together get no more than that, so that strangers cannot wear it out: 352 in 24 h.
+All ground stations on open links together get 160 writes at once and 12 an hour: to wear out a page, strangers would
+have to write for three weeks. A Harakiri with the mission extension has a limit of its own (docs/msp-mission.md).
 """
 
 from collections.abc import Callable, Hashable
@@ -13,17 +13,17 @@ from bridge.gcs.guard import Standing
 from bridge.gcs.station import Peer
 from bridge.gcs.stations import PRECEDENCE, Stations
 
-_WRITES = Rate(1 / 300, 64)
+_WRITES = Rate(1 / 300, 160)
 
 #: The text for a ground station whose share is used up.
-TOO_MANY_WRITES = "Flash wear limit: try again in 5 minutes"
+TOO_MANY_WRITES = "Flash wear limit: try again in 10 minutes"
 
 
 class FlashBudget:
     """Shares the writes between the hosts with precedence on an open link; all others have one account.
 
     The last writes are kept for hosts that have not written lately, one for each. Above that, a host may write while
-    more than half as many writes are left as it has used: a single one gets 32 at once and 6 an hour. A host that gains
+    more than half as many writes are left as it has used: a single one gets 96 at once and 7 an hour. A host that gains
     precedence takes over the account of one that has lost it: changing addresses gains nothing.
 
     A peer with the key or a listed address has a budget of its own, but its writes count for the others, too.
