@@ -27,6 +27,9 @@ _HEIGHT_GROUP = (_HEIGHT_M, _HEIGHT_CM, _HEADING, _HEADING_FRACTION)
 _POWER, _PLACE = (_CELL, _VOLTS, _DECIVOLTS), (*_LATITUDE, *_LONGITUDE)
 #: Without a voltage sensor or a GPS the values of these are left out.
 _SLOW_GROUPS = {(_TEMPERATURE, *power, *place) for power in ((), _POWER) for place in ((), _PLACE)}
+#: The groups that no other value continues. Harakiri sends nothing for 0.1 s after most of them, so that the time would
+#: be wrong by as much if the end of the group were awaited.
+_WHOLE_GROUPS = {_HEIGHT_GROUP, (_TEMPERATURE, *_POWER, *_PLACE)}
 _CELLS = range(2, 7)
 
 
@@ -57,7 +60,7 @@ class FrskyParser:
         self._inside = False
 
     def feed(self, data: bytes) -> list[FrskyReport]:
-        """Take bytes as they come. A group is complete when the next one begins."""
+        """Take bytes as they come. A group is complete when it has its last value, or when the next one begins."""
         reports = []
         for byte in data:
             if byte == _MARK:
@@ -88,9 +91,10 @@ class FrskyParser:
             self._break()
         elif self._value:
             self._end_value()
+            if tuple(identifier for identifier, _ in self._group) in _WHOLE_GROUPS:
+                report = self._end_group()
         elif self._inside:
-            report = _read(self._group)
-            self._group.clear()
+            report = self._end_group()
         self._value.clear()
         self._inside = True
         return report
@@ -102,6 +106,11 @@ class FrskyParser:
             return
         self.values_in_a_row += 1
         self._group.append((identifier, high << 8 | low))
+
+    def _end_group(self) -> FrskyReport | None:
+        report = _read(self._group)
+        self._group.clear()
+        return report
 
     def _break(self) -> None:
         self.values_in_a_row = 0

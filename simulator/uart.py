@@ -6,6 +6,9 @@ from collections import deque
 from simulator.options import Counters
 from simulator.receive_ring import EPSILON_BYTES, GATHER_SECONDS, ReceiveRing
 
+#: The longest time that a port holds bytes back while more arrive.
+_LONGEST_READ_S = 0.02
+
 
 class Uart(ReceiveRing):
     """Bytes on their way in (`receive` to `read`) and out (`write` to `transmitted`)."""
@@ -68,11 +71,14 @@ class Uart(ReceiveRing):
         return sent
 
     def next_departure(self) -> float | None:
-        """The time for the next call of `transmitted`: the end of a burst, or of one soon after it."""
+        """The time for the next call of `transmitted`: the end of a burst, or of one soon after it.
+
+        Within a long burst on a slow line it is earlier, as a port passes bytes on while more arrive.
+        """
         if not self._burst_ends:
             return None
         latest = self._burst_ends[0] + GATHER_SECONDS
-        return max(end for end in self._burst_ends if end <= latest)
+        return min(max(end for end in self._burst_ends if end <= latest), self._dma_time + _LONGEST_READ_S)
 
     def _outstanding(self) -> int:
         return self._dma_left + (self._head - self._tail) % self._size
