@@ -26,8 +26,8 @@
 
 PYTHON ?= python3
 UV ?= uv
-# Most tests wait for programs, so two cores can run five at once.
-JOBS ?= 5
+# Most tests wait for programs, so two cores can run six at once.
+JOBS ?= 6
 VENV := .venv
 BIN := $(VENV)/bin
 

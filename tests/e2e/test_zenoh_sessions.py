@@ -157,7 +157,7 @@ def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Pat
             taken = until(partial(daemon.has_logged, "zenoh.name_taken"), "a log entry about the other vehicle")
             assert taken["vehicle"] == VEHICLE
         reader.wait("state", lambda state: state["others_of_this_name"] == 1)
-        assert reader.events("zenoh.name_taken")
+        until(lambda: reader.events("zenoh.name_taken"), "the event")
         status = first.daemon.status()
         assert status is not None
         assert status["zenoh_others_of_this_name"] == 1

@@ -88,11 +88,11 @@ class Line:
         return first + count
 
     async def feed_until_gathered(self, first: int = 0) -> int:
-        """Send 3000 frames a second until there are fewer reads than frames; a busy machine may need several tries."""
+        """Send frames without a pause until there are fewer reads than frames; a busy machine may need several tries."""
         async with asyncio.timeout(PATIENCE):
             while True:
                 before = self.reads
-                first = await self.feed(first, 500, 3000)
+                first = await self.feed(first, 500, 1_000_000)
                 await self.has_come(first)
                 if self.reads - before < 300:
                     return first

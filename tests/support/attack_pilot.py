@@ -109,7 +109,8 @@ class Watch:
 
 def assert_uploads(pilot: PlainStation, board: Board, plan: Sequence[PlanRow]) -> None:
     """The pilot's list is accepted and stored on the board."""
-    assert pilot.upload(plan) is MissionResult.ACCEPTED
+    result = pilot.upload(plan)
+    assert result is MissionResult.ACCEPTED, result.name
     assert board.records() == records_of(judge(plan))
 
 
