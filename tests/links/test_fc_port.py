@@ -88,7 +88,7 @@ class Line:
         return first + count
 
     async def feed_until_gathered(self, first: int = 0) -> int:
-        """Send frames without a pause until there are fewer reads than frames; a busy machine may need several tries."""
+        """Send frames without a pause until there are fewer reads than frames; a busy machine needs several tries."""
         async with asyncio.timeout(PATIENCE):
             while True:
                 before = self.reads
