@@ -25,6 +25,7 @@ class Uart(ReceiveRing):
         self._dma_time = 0.0
         self._sent = bytearray()
         self._burst_ends: deque[float] = deque()
+        self._read_at = 0.0
 
     def set_baud(self, baud: int, now: float) -> None:
         """Reinitialise the UART, as the firmware does on arming: the rings are cleared."""
@@ -64,6 +65,7 @@ class Uart(ReceiveRing):
     def transmitted(self, now: float) -> bytes:
         """The bytes sent from the TX pin since the last call."""
         self._transmit(now)
+        self._read_at = now
         while self._burst_ends and self._burst_ends[0] <= now:
             self._burst_ends.popleft()
         sent = bytes(self._sent)
@@ -78,7 +80,8 @@ class Uart(ReceiveRing):
         if not self._burst_ends:
             return None
         latest = self._burst_ends[0] + GATHER_SECONDS
-        return min(max(end for end in self._burst_ends if end <= latest), self._dma_time + _LONGEST_READ_S)
+        burst = max(end for end in self._burst_ends if end <= latest)
+        return min(burst, max(self._read_at, self._dma_time) + _LONGEST_READ_S)
 
     def _outstanding(self) -> int:
         return self._dma_left + (self._head - self._tail) % self._size
