@@ -21,7 +21,6 @@ _LONG = (
     "tests/e2e/test_mission_planner",
     "tests/bridge/test_push_faults",
     "tests/e2e/test_soak",
-    "tests/simulator/test_sim_links",
     "tests/web/test_page_accessibility",
 )
 #: Folders of tests that mostly wait for programs, those with the longest files first.

@@ -231,7 +231,7 @@ def test_a_link_taken_over_by_another_simulator_is_not_removed(start: Callable[.
 
 def test_the_link_of_a_running_simulator_is_not_replaced(start: Callable[..., Simulator], tmp_path: Path) -> None:
     first = start()
-    with serial.Serial(str(first.link), 115200, timeout=PATIENCE, exclusive=True) as port:
+    with serial.Serial(str(first.link), 115200, timeout=0.05, exclusive=True) as port:
         program = "from simulator.command import sim; sim()"
         second = subprocess.run(
             [sys.executable, "-c", program, "--link", str(first.link)], capture_output=True, text=True, timeout=PATIENCE
