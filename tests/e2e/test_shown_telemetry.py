@@ -202,7 +202,8 @@ def test_dronekit_shows_the_flight_correctly(bench: Bench) -> None:
             place, local, now = vehicle.location.global_relative_frame, vehicle.location.local_frame, truth(bench)
             north_m = (now["lat_e7"] - FIELD_LAT_E7) / 1e7 * METRES_PER_DEGREE
             return (
-                metres_from(now, place.lat, place.lon) <= POSITION_M
+                place.lat is not None
+                and metres_from(now, place.lat, place.lon) <= POSITION_M
                 and abs(place.alt - now["height_m"]) <= HEIGHT_M
                 and local.north is not None
                 and abs(local.north - north_m) <= POSITION_M
