@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import event, given, settings
+from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from bridge.controllers.nav.check import NavRules
@@ -405,6 +405,7 @@ profiles = st.sampled_from([INAV, MULTIWII])
 
 
 @given(lists, profiles)
+@example([item(C.NAV_WAYPOINT), item(C.NAV_LAND, alt_m=1e307)], INAV)
 @settings(max_examples=MANY, deadline=None)
 def test_nothing_raises_and_nothing_dangerous_is_kept(sent: list[MissionItem], rules: NavRules) -> None:
     verdict = check_list([HOME, *sent], rules)

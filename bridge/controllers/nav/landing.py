@@ -9,6 +9,9 @@ from bridge.model.finding import Note
 from protocols.mission_item import Frame, MissionItem
 from protocols.msp.nav import LEGS, NavRecord
 
+#: The height of half a centimetre, which a record stores as 0.
+_ROUNDED_TO_0_M = 0.005
+
 
 def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) -> MissionItem:
     """Fill in a LAND's missing position and altitude from the previous leg.
@@ -22,7 +25,7 @@ def placed_landing(item: MissionItem, records: Sequence[NavRecord], note: Note) 
         note(item, "lat_e7", item.lat_e7, before.lat_e7, "not given, end of the leg before")
         note(item, "lon_e7", item.lon_e7, before.lon_e7, "not given, end of the leg before")
         item = replace(item, lat_e7=before.lat_e7, lon_e7=before.lon_e7)
-    if round(item.alt_m * 100) <= 0 < before.alt_cm:
+    if item.alt_m <= _ROUNDED_TO_0_M and before.alt_cm > 0:
         height_m = before.alt_cm / 100
         note(item, "alt_m", item.alt_m, height_m, "flown there, then landed")
         frame = Frame.GLOBAL if before.p3 & 1 else Frame.GLOBAL_RELATIVE_ALT
