@@ -13,8 +13,8 @@ from service.settings import TlogLimits
 
 #: A larger jump means that the clock was set: a Pi gets the time only from the network.
 _CLOCK_STEP_US = 10_000_000
-#: When frames were sent or received, monotonic nanoseconds, and the frames.
-_Taken = tuple[int, Sequence[bytes]]
+#: When frames were sent or received, monotonic nanoseconds; True if they belong to a flight; and the frames.
+_Taken = tuple[int, bool, Sequence[bytes]]
 
 
 class TlogRecorder:
@@ -31,19 +31,16 @@ class TlogRecorder:
         self._read_clock = read_clock
         self._epoch_us = self._present_epoch_us()
         self._is_flying = False
-        self._has_flown = False  # since the last write
         self._awaits_vehicle = True
         self._writer = DiskWriter("telemetry log", self._write, self._folder.close)
 
     def on_frames(self, frames: Sequence[bytes]) -> None:
         """Record whole frames that were sent or received just now; the caller must not modify them."""
-        self._writer.put((time.monotonic_ns(), frames), sum(map(len, frames)))
+        self._writer.put((time.monotonic_ns(), self._is_flying, frames), sum(map(len, frames)))
 
     def flies(self, *, is_flying: bool) -> None:
         """Mark the following frames as part of a flight, or not."""
         self._is_flying = is_flying
-        if is_flying:
-            self._has_flown = True
 
     def describe(self) -> str:
         """The file in use, or the reason why there is none, for the status."""
@@ -53,6 +50,24 @@ class TlogRecorder:
     def close(self) -> None:
         """Write the unsaved frames."""
         self._writer.close()
+
+    def _write(self, taken: list[_Taken]) -> None:
+        """Runs on the writer's thread, as do all methods from here on. A time step needs a new file."""
+        epoch_us = self._present_epoch_us()
+        stepped = abs(epoch_us - self._epoch_us) > _CLOCK_STEP_US
+        file_is_over = stepped or self._folder.is_full
+        is_flight = any(is_flying for _, is_flying, _ in taken)
+        self._folder.write(b"".join(self._records(taken)), time.monotonic(), is_flight=is_flight)
+        if file_is_over:
+            self._folder.close()
+            self._epoch_us = epoch_us
+            self._awaits_vehicle = True
+
+    def _records(self, taken: list[_Taken]) -> Iterator[bytes]:
+        for at_ns, _, frames in taken:
+            at_us = self._epoch_us + at_ns // 1000
+            for frame in self._from_vehicle_on(frames) if self._awaits_vehicle else frames:
+                yield tlog_record(frame, at_us)
 
     def _from_vehicle_on(self, frames: Sequence[bytes]) -> Sequence[bytes]:
         found: list[bytes] = []
@@ -64,24 +79,6 @@ class TlogRecorder:
                 self._awaits_vehicle = False
             found.append(frame)
         return found
-
-    def _write(self, taken: list[_Taken]) -> None:
-        """Runs on the writer's thread, as do all methods from here on. A time step needs a new file."""
-        epoch_us = self._present_epoch_us()
-        stepped = abs(epoch_us - self._epoch_us) > _CLOCK_STEP_US
-        file_is_over = stepped or self._folder.is_full
-        is_flight, self._has_flown = self._has_flown, self._is_flying
-        self._folder.write(b"".join(self._records(taken)), time.monotonic(), is_flight=is_flight)
-        if file_is_over:
-            self._folder.close()
-            self._epoch_us = epoch_us
-            self._awaits_vehicle = True
-
-    def _records(self, taken: list[_Taken]) -> Iterator[bytes]:
-        for at_ns, frames in taken:
-            at_us = self._epoch_us + at_ns // 1000
-            for frame in self._from_vehicle_on(frames) if self._awaits_vehicle else frames:
-                yield tlog_record(frame, at_us)
 
     def _present_epoch_us(self) -> int:
         """The time at which the monotonic clock was 0, microseconds since the Unix epoch."""
