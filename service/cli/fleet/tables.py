@@ -11,7 +11,7 @@ from rich.progress import Progress as Bars
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import News
+from bridge.model.finding import without_defaults
 from service.cli.fleet.payload import text
 from service.cli.fleet.push import FleetPush, PushState
 from service.cli.fleet.trial import Trial
@@ -144,7 +144,7 @@ def _result(progress: PushState) -> Text:
 def dry_run_table(trials: Sequence[Trial]) -> Table:
     """One row per vehicle, and below them the corrections, once for all vehicles that would hold the same records."""
     corrections = {
-        trial.checksum: [finding.text() for finding in trial.findings if finding.news is not News.NONE]
+        trial.checksum: [finding.text() for finding in without_defaults(trial.findings)]
         for trial in trials
         if trial.is_taken
     }
