@@ -349,9 +349,8 @@ class Daemon:
 
     def _tell_followers(self) -> None:
         report = self.bridge.report
-        fresh = report.take_fresh() if report.fresh else None
-        for follower in self._followers:
-            if fresh:
+        if report.fresh and (fresh := report.take_fresh()):
+            for follower in self._followers:
                 follower.telemetry(fresh)
 
     def _mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
