@@ -27,8 +27,8 @@ _HEIGHT_GROUP = (_HEIGHT_M, _HEIGHT_CM, _HEADING, _HEADING_FRACTION)
 _POWER, _PLACE = (_CELL, _VOLTS, _DECIVOLTS), (*_LATITUDE, *_LONGITUDE)
 #: Without a voltage sensor or a GPS the values of these are left out.
 _SLOW_GROUPS = {(_TEMPERATURE, *power, *place) for power in ((), _POWER) for place in ((), _PLACE)}
-#: The groups that no other value continues. Harakiri sends nothing for 0.1 s after most of them, so that the time would
-#: be wrong by as much if the end of the group were awaited.
+#: Groups that end with their last value. Harakiri sends nothing for 0.1 s after most of them: if they counted only when
+#: the next one begins, climb and speed would be derived from the wrong times.
 _WHOLE_GROUPS = {_HEIGHT_GROUP, (_TEMPERATURE, *_POWER, *_PLACE)}
 _CELLS = range(2, 7)
 
