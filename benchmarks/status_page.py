@@ -23,7 +23,7 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.idle import cpu_percent, listener, resident_mb, udpout
 from benchmarks.missions import random_mission
 from benchmarks.processes import ENVIRONMENT, ROOT, daemon, simulated_naze
-from service.control.client import ask_daemon
+from service.daemon.client import ask_daemon
 
 _PUSHES = 9
 _ADDRESSES = ("127.0.0.1", "127.0.0.2", "127.0.0.3")

@@ -14,7 +14,7 @@ from bridge.model import vehicle_groups as groups
 from bridge.model.finding import Finding
 from bridge.model.vehicle_groups import Group, VehicleReport
 from protocols.mission_item import MissionItem
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.zenoh_link.compact import CBOR_KEY, SCHEMAS, object_schema
 from service.zenoh_link.keys import VERSION
 from service.zenoh_link.overview import Overview

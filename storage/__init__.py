@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Missions on disk. Uses SQLite and knows nothing about MAVLink or MSP."""
+"""Files on disk: the missions, in SQLite, and small ones. Knows nothing about MAVLink or MSP."""

@@ -32,10 +32,9 @@ PACKAGES = {
 }
 SERVICE = {
     "service.machine": set[str](),
-    "service.settings": {"service.machine"},
-    "service.control": {"service.settings"},
+    "service.settings": set[str](),
     "service.links": {"service.machine", "service.settings"},
-    "service.recording": {"service.links", "service.machine", "service.settings"},
+    "service.recording": {"service.links", "service.settings"},
 }
 SERVICE["service.daemon"] = {*SERVICE}
 SERVICE["service.web"] = SERVICE["service.zenoh_link"] = {*SERVICE}

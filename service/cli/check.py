@@ -22,7 +22,7 @@ from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import complain, say
-from service.control.mission_data import verdict_data
+from service.daemon.mission_data import verdict_data
 from service.settings import SettingsError, takeoff_limit_m
 
 #: The rules of each flight controller that stores missions.

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import click
 
 from service.cli.sentences import complain, fail
-from service.control.client import ControlError, Interrupted, NoDaemonError, ask_daemon
-from service.control.mission_data import Json
+from service.daemon.client import ControlError, Interrupted, NoDaemonError, ask_daemon
+from service.daemon.mission_data import Json
 from service.settings import SettingsError, default_state_dir
 from service.settings.addresses import AddressError, parse_fc
 from storage.store_error import StoreError
@@ -111,7 +111,7 @@ def ask_store(state_dir: Path | None, request: Json) -> Json:
 
 def _read_store(state_dir: Path | None, request: Json) -> Json:
     from service.daemon.api import listed, shown
-    from service.recording.store_worker import DATABASE_NAME
+    from service.daemon.store_worker import DATABASE_NAME
     from storage.mission_store import read_store
 
     folders = [state_dir] if state_dir is not None else [default_state_dir(), SERVICE_STATE]

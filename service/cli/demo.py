@@ -22,8 +22,8 @@ from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_table
 from service.cli.sentences import fail
-from service.control.client import ControlError, ask_daemon
-from service.control.mission_data import Json, mission_findings, mission_items
+from service.daemon.client import ControlError, ask_daemon
+from service.daemon.mission_data import Json, mission_findings, mission_items
 from service.machine.host import Host
 
 #: A link to examples/ in the repository, a file in the installed package.

@@ -13,7 +13,7 @@ from service.cli.mission_source import load_mission, save_mission
 from service.cli.mission_table import mission_table
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import complain, fail, say
-from service.control.mission_data import Json, mission_findings, mission_items
+from service.daemon.mission_data import Json, mission_findings, mission_items
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _NO_SPACE = "MAV_MISSION_NO_SPACE"

@@ -9,7 +9,7 @@ import click
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.cli.sentences import complain
-from service.machine.bounded_file import read_bounded
+from storage.bounded_file import read_bounded
 
 MAX_BYTES = 8 * 2**20  # 65,535 items, the most that MAVLink can count, are about 5 MB of text
 

@@ -11,7 +11,7 @@ from rich.text import Text
 from bridge.model.finding import DROPPED, Finding, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
-from service.control.mission_data import Json, mission_items
+from service.daemon.mission_data import Json, mission_items
 
 _CHANGED = "yellow"
 _DROPPED = "red"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from service.control.mission_data import to_json
+from service.daemon.mission_data import to_json
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.sentences import fail
-from service.control.client import ControlError, socket_of_daemon
 from service.daemon.api import ControlServer
+from service.daemon.client import ControlError, socket_of_daemon
 from service.daemon.daemon import Daemon
 from service.daemon.lifecycle import run_until_signal
 from service.links.gcs_links import LinkError

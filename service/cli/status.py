@@ -9,8 +9,8 @@ import click
 from service.cli.daemon_client import ask, bridge_options
 from service.cli.printing import print_json
 from service.cli.sentences import say
-from service.control.client import STATUS
-from service.control.mission_data import Json
+from service.daemon.client import STATUS
+from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings.addresses import client_hosts, parse_gcs
 from service.settings.web import ListenAddress, parse_listen

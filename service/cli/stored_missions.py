@@ -15,7 +15,7 @@ from service.cli.mission_commands import show_delivery
 from service.cli.mission_table import difference_table, mission_table
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import say
-from service.control.mission_data import MOST, Json, mission_findings, mission_items
+from service.daemon.mission_data import MOST, Json, mission_findings, mission_items
 from service.web.comparison import difference
 
 

@@ -21,11 +21,11 @@ from bridge.model.mission_log import ArrivedMission
 from bridge.model.refusal import Refusal
 from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
-from service.control.client import ControlError
-from service.control.mission_data import MOST, Json, mission_items, to_json, verdict_data, whole_number
+from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
+from service.daemon.mission_data import MOST, Json, mission_items, to_json, verdict_data, whole_number
+from service.daemon.store_worker import as_dicts
 from service.machine.package import version
-from service.recording.store_worker import as_dicts
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission
 from storage.store_error import StoreError
 

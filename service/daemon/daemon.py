@@ -23,7 +23,8 @@ from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
 from protocols.msp.frame import MspFrame
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
+from service.daemon.store_worker import StoreWorker
 from service.links.fc_device import device_opener
 from service.links.fc_port import MOVED_ON, STOPPED
 from service.links.gcs_links import GcsLink, LinkError, open_link
@@ -33,7 +34,6 @@ from service.links.signing_state import SigningState
 from service.machine.host import Host
 from service.machine.package import page, version
 from service.recording.recorder import Recording
-from service.recording.store_worker import StoreWorker
 from service.settings import PassThroughRule, Settings
 from service.settings.addresses import AutoFc, FcAddress, GcsAddress, SerialFc
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from service.machine.bounded_file import read_bounded
 from service.settings.key import Problem, short
 from service.settings.table import KEYS, TABLES
+from storage.bounded_file import read_bounded
 
 DROP_INS = "conf.d"
 _MAX_BYTES = 1 << 20

@@ -30,10 +30,10 @@ from starlette.routing import Route
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionItem
-from service.control.client import ControlError
-from service.control.mission_data import MOST, Json, mission_items, to_json
 from service.daemon.api import MissionJobs
+from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
+from service.daemon.mission_data import MOST, Json, mission_items, to_json
 from service.machine.host import Host
 from service.machine.package import version
 from service.recording.recorder import TLOG_FOLDER

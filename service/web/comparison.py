@@ -8,7 +8,7 @@ from itertools import zip_longest
 from bridge.model.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
-from service.control.mission_data import Json, mission_findings, mission_items
+from service.daemon.mission_data import Json, mission_findings, mission_items
 
 #: No flight controller holds more: a longer list was rejected.
 MAX_ROWS = 500

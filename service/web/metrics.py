@@ -18,8 +18,8 @@ from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from service.control.mission_data import Json
 from service.daemon.daemon import Daemon
+from service.daemon.mission_data import Json
 from service.machine.package import version
 from service.settings.zenoh import host_name
 

@@ -15,9 +15,9 @@ from starlette.requests import ClientDisconnect, Request
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.control.client import ControlError
-from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
+from service.daemon.client import ControlError
+from service.daemon.mission_data import Json
 from service.web.access import Refused
 from service.web.comparison import MAX_ROWS, checked_mission
 from storage.store_error import StoreError

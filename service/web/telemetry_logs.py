@@ -7,7 +7,7 @@ A connection lasts only seconds (service.web.connection_limit), so a browser fet
 import os
 from pathlib import Path
 
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.recording.tlog_folder import is_log_name
 
 PIECE = 256 << 10

@@ -6,8 +6,8 @@ import secrets
 import stat
 from pathlib import Path
 
-from service.machine.bounded_file import read_bounded
 from storage.atomic_file import replace_file
+from storage.bounded_file import read_bounded
 
 DEFAULT_NAME = "web-token"
 #: Letters and digits that are easy to type on a phone and to tell apart: 16 of them are 78 bits.

@@ -2,8 +2,8 @@
 """Queries about the vehicle: state, overview, history, mission/current and mission/list."""
 
 from bridge.bridge import Bridge
-from service.control.mission_data import Json, strict
 from service.daemon.api import MissionJobs
+from service.daemon.mission_data import Json, strict
 from service.zenoh_link import keys
 from service.zenoh_link.history import History
 from service.zenoh_link.overview import overview_of

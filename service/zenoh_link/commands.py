@@ -7,8 +7,8 @@ from collections.abc import Callable
 from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.control.mission_data import MOST, Json, to_json
 from service.daemon.api import MissionJobs
+from service.daemon.mission_data import MOST, Json, to_json
 from service.settings.zenoh import STATE_NAME
 from service.zenoh_link import keys
 from service.zenoh_link.queries import JSON_REPLY, Answerer, QueryRefused, Question

@@ -13,7 +13,7 @@ from typing import Any
 
 import cbor2
 
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 
 SCHEMAS = Path(__file__).parent / "schemas"
 #: The schema field with a property's number.

@@ -7,8 +7,8 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
-from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
+from service.daemon.mission_data import Json
 from service.machine.threads import DiskThread
 from service.zenoh_link.logged_past import LoggedPast, read_logged_past
 from service.zenoh_link.time_range import parse_time_range

@@ -18,7 +18,7 @@ from pathlib import Path
 from protocols.mavlink.codec import MavlinkDecoder
 from protocols.mavlink.dialect import Message, messages
 from protocols.tlog import read_tlog
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.recording.tlog_folder import is_log_name
 from service.zenoh_link.time_range import TimeRange
 

@@ -20,9 +20,9 @@ from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from service.control.mission_data import Json
 from service.daemon.api import MissionJobs
 from service.daemon.daemon import Daemon
+from service.daemon.mission_data import Json
 from service.recording.recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import connect_endpoints, make_config, tls_files

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 
 #: Older values are left out: there are no ages to judge them by.
 _OLDEST_S = 10.0

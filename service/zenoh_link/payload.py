@@ -10,7 +10,7 @@ from typing import Any
 
 import zenoh
 
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link import compact
 from service.zenoh_link.keys import VERSION, ZenohKey

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import zenoh
 from zenoh import ext
 
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.machine.threads import post
 from service.zenoh_link.keys import STATE, SampleDelivery, ZenohKey
 from service.zenoh_link.payload import Payloads

@@ -9,8 +9,8 @@ from functools import partial
 import structlog
 import zenoh
 
-from service.control.client import ControlError
-from service.control.mission_data import Json, to_json
+from service.daemon.client import ControlError
+from service.daemon.mission_data import Json, to_json
 from service.machine.threads import post
 from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link.keys import UPLOAD

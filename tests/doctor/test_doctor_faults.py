@@ -19,8 +19,8 @@ from service.cli.doctor.machine import check_clock, check_database, check_disk
 from service.cli.doctor.network import check_ports, check_wifi
 from service.cli.doctor.port import check_console, check_holder, check_modem_manager, check_permission, check_port
 from service.cli.doctor.zenoh import check_zenoh
-from service.control.client import ControlError
-from service.control.mission_data import Json
+from service.daemon.client import ControlError
+from service.daemon.mission_data import Json
 from service.settings import Settings
 from service.settings.addresses import AutoFc, SerialFc, parse_gcs
 from service.settings.zenoh import ZenohSettings

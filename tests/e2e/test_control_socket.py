@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.control.client import ControlError
+from service.daemon.client import ControlError
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import Daemon, run_naze_bridge, until

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from structlog.testing import capture_logs
 
-from service.control.client import ControlError, ask_daemon
 from service.daemon import daemon as daemon_module
+from service.daemon.client import ControlError, ask_daemon
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import SerialFc, SimulatedFc

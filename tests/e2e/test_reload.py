@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from service.control.client import ask_daemon
+from service.daemon.client import ask_daemon
 from tests.support.benches import Starter
 from tests.support.plain_station import tcp_station, udp_station
 from tests.support.programs import Program, free_port, until

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-from service.control.client import ControlError, ask_daemon
+from service.daemon.client import ControlError, ask_daemon
 from tests.support.forked import Forked
 from tests.support.plan import PlanRow
 

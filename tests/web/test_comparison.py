@@ -12,7 +12,7 @@ from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from bridge.model.verdict import Result
 from protocols.mission_item import MissionItem
-from service.control.mission_data import to_json, verdict_data
+from service.daemon.mission_data import to_json, verdict_data
 from service.web.comparison import MAX_ROWS, checked_mission, difference, sent_and_stored, stored_mission
 
 RULES = HarakiriRules(capacity=146, wp_radius_cm=200)

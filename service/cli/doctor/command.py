@@ -13,8 +13,8 @@ from service.cli.daemon_client import SERVICE_STATE
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.printing import print_json
 from service.cli.sentences import say
-from service.control.client import STATUS, ControlError, ask_daemon
-from service.control.mission_data import Json
+from service.daemon.client import STATUS, ControlError, ask_daemon
+from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings import Settings, SettingsError, load_settings
 from service.settings.load import CONFIG_VARIABLE, SERVICE_CONFIG

@@ -22,7 +22,7 @@ from service.cli.doctor.port import (
     holder_of_port,
 )
 from service.cli.doctor.zenoh import check_zenoh
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.machine.host import Host
 from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress

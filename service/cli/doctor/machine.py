@@ -12,9 +12,9 @@ from importlib import metadata
 from pathlib import Path
 
 from service.cli.doctor.checked import Checked, note, ok, problem
+from service.daemon.store_worker import DATABASE_NAME
 from service.machine.host import Host
 from service.machine.package import version
-from service.recording.store_worker import DATABASE_NAME
 
 _SYNCED = "/run/systemd/timesync/synchronized"
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")

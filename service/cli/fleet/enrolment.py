@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.settings.zenoh import check_name
 
 #: zenoh's own is 1,000. Each session costs the router some 100 kB.

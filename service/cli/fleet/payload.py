@@ -6,7 +6,7 @@ from typing import Any
 import cbor2
 import zenoh
 
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.zenoh_link.payload import decoded
 
 

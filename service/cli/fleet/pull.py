@@ -11,7 +11,7 @@ from protocols.mission_item import MissionItem
 from service.cli.fleet.payload import decode, part, text, whole
 from service.cli.fleet.session import ask
 from service.cli.fleet.vehicle import BridgeState, replier
-from service.control.mission_data import mission_items
+from service.daemon.mission_data import mission_items
 from service.zenoh_link.keys import MISSION_CURRENT, full
 
 #: The bridge may have to read the mission first: some seconds at 9600 baud.

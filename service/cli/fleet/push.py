@@ -14,7 +14,7 @@ import zenoh
 from service.cli.fleet.payload import decode, part, text, whole
 from service.cli.fleet.session import AT_ONCE, NO_COMMANDS, ask, send_query
 from service.cli.fleet.vehicle import BridgeState, bridge_of, replier
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.

@@ -6,7 +6,7 @@ import zenoh
 from service.cli.fleet.payload import decode_reply
 from service.cli.fleet.session import FleetError, ask
 from service.cli.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.zenoh_link.keys import ALIVE, STATE, full
 
 #: After this a bridge without a reply is shown as not answering.

@@ -16,7 +16,7 @@ from service.cli.fleet.payload import text
 from service.cli.fleet.push import FleetPush, PushState
 from service.cli.fleet.trial import Trial
 from service.cli.fleet.vehicle import FleetVehicle
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 
 _UNKNOWN = "-"
 _ANSWERS = {

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import zenoh
 
 from service.cli.fleet.payload import flag, number, text, whole
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.settings.zenoh import ZenohSettingsError, check_name
 from service.zenoh_link.keys import ALIVE, vehicle_in
 

@@ -16,7 +16,7 @@ import zenoh
 from service.cli.fleet.payload import decode, number, part
 from service.cli.fleet.session import send_query
 from service.cli.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, replier, vehicle_of
-from service.control.mission_data import Json
+from service.daemon.mission_data import Json
 from service.zenoh_link.keys import ALIVE, OVERVIEW, STATE, full, vehicle_in
 from service.zenoh_link.overview import state_of
 

@@ -13,7 +13,7 @@ from service.cli.doctor.command import diagnose
 from service.cli.sentences import fail
 from service.cli.setup.change import Machine, SetupError, Step, is_root
 from service.cli.setup.steps import GCS_PORT, PAGE_PORT, STATE_FOLDER, SetupChoices, missing_steps
-from service.control.client import STATUS, ControlError, ask_daemon
+from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
