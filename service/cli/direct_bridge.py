@@ -5,7 +5,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.client import STATUS, ControlError, Interrupted
 from service.daemon.daemon import Daemon
 from service.daemon.mission_data import Json
@@ -31,7 +31,7 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
     """
     set_up_logging("error")
     daemon = Daemon(Settings(fc, takeoff_max_m=takeoff_limit_m()))
-    jobs = MissionJobs(daemon)
+    api = DaemonApi(daemon)
     running = asyncio.create_task(daemon.run())
     job: asyncio.Future[Json] | None = None
     try:
@@ -44,8 +44,8 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:
-            await _wait(lambda: None not in map(jobs.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
-        job = asyncio.ensure_future(jobs.do(request, lambda answer: progress(answer["progress"])))
+            await _wait(lambda: None not in map(api.status().get, _TOLD_LATER), _TELEMETRY_PATIENCE_S)
+        job = asyncio.ensure_future(api.do(request, lambda answer: progress(answer["progress"])))
         return await asyncio.shield(job)
     except asyncio.CancelledError:
         if request["do"] != "push":

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.sentences import fail
-from service.daemon.api import ControlServer
 from service.daemon.client import ControlError, socket_of_daemon
+from service.daemon.control_server import ControlServer
 from service.daemon.daemon import Daemon
 from service.daemon.lifecycle import run_until_signal
 from service.links.gcs_links import LinkError

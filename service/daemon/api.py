@@ -1,20 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's local control socket: `push`, `pull`, `status` and their like talk to a running daemon through it.
-
-A Unix socket in the state directory; one JSON object a line. A request has the key "do"; the daemon answers with
-any number of {"progress": ...} lines and one last line with "result" or "error".
-"""
+"""The requests to a running daemon: the control socket, the page and zenoh answer through them."""
 
 import asyncio
-import json
-import os
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import fields
-from pathlib import Path
 from typing import TypeVar
-
-import structlog
 
 from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.mission_log import ArrivedMission
@@ -23,29 +13,19 @@ from protocols.mission_item import MissionItem
 from protocols.mission_record import pack_records
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
-from service.daemon.mission_data import MOST, Json, mission_items, to_json, verdict_data, whole_number
+from service.daemon.mission_data import MOST, Json, mission_items, verdict_data, whole_number
 from service.daemon.store_worker import as_dicts
 from service.machine.package import version
 from storage.mission_store import MissionStore, MissionSummary, ReceivedMission, StoredMission
-from storage.store_error import StoreError
 
-#: asyncio buffers twice as much for each client; a list of 146 items has 40 kB.
-_MAX_LINE = 1 << 18
-#: Further clients are disconnected.
-_MAX_CLIENTS = 16
-#: The timeout for receiving a request, and for sending its reply.
-_REQUEST_TIMEOUT_S = 5.0
-_ANSWER_TIMEOUT_S = 10.0
 #: The source of a pushed list, as shown to every ground station.
 _MAX_SOURCE = 100
 #: Missions in one reply: a thousand are 300 kB.
 _MOST_LISTED = 1000
-_LAST_ANSWERS_S = 0.05
-_log = structlog.get_logger()
 T = TypeVar("T")
 
 
-class MissionJobs:
+class DaemonApi:
     """The requests to a daemon, as coroutines with plain data."""
 
     def __init__(self, daemon: Daemon) -> None:
@@ -195,109 +175,6 @@ def shown(store: MissionStore, number: int) -> Json:
     received = mission.received
     as_text = {"records": received.records.hex(), "checksum": _hex(received.checksum)}
     return _fields(mission) | {"received": _fields(received) | as_text}
-
-
-class ControlServer:
-    """Serves the socket."""
-
-    def __init__(self, daemon: Daemon, path: Path) -> None:
-        self._jobs = MissionJobs(daemon)
-        self._path = path
-        self._server: asyncio.Server | None = None
-        self._clients: set[asyncio.Task[None]] = set()
-
-    async def start(self) -> None:
-        """Listen; ControlError if that fails.
-
-        A socket that a killed daemon left behind is replaced: the state lock proves that it is dead.
-        """
-        try:
-            if not self._path.parent.exists():
-                self._path.parent.mkdir(0o700)
-            if self._path.parent.stat().st_uid not in (os.getuid(), 0):
-                raise PermissionError(f"{self._path.parent} belongs to another user")
-            self._path.unlink(missing_ok=True)
-            # The backlog also limits the connections that asyncio accepts in one turn of the loop.
-            self._server = await asyncio.start_unix_server(
-                self._serve, self._path, limit=_MAX_LINE, backlog=_MAX_CLIENTS
-            )
-            self._path.chmod(0o660)
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise ControlError(f"the control socket {self._path} cannot be created: {reason}") from error
-
-    async def close(self) -> None:
-        """Stop listening, and tell waiting clients that they get no reply."""
-        if self._server is not None:
-            self._server.close()
-            self._path.unlink(missing_ok=True)
-        if self._clients:
-            # Finished replies are still sent.
-            await asyncio.wait(self._clients, timeout=_LAST_ANSWERS_S)
-        for client in self._clients:
-            client.cancel()
-        await asyncio.gather(*self._clients)
-
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if len(self._clients) >= _MAX_CLIENTS:
-            _log.warning("control.too_many_clients", limit=_MAX_CLIENTS)
-            writer.transport.abort()
-            return
-        client = asyncio.current_task()
-        assert client is not None
-        self._clients.add(client)
-        try:
-            await self._answer(reader, writer)
-        finally:
-            self._clients.discard(client)
-            if writer.transport.get_write_buffer_size():
-                # Replies to a client that does not read would pile up in memory.
-                writer.transport.abort()
-            writer.close()
-
-    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        def tell(answer: Json) -> None:
-            writer.write(to_json(answer).encode() + b"\n")
-
-        try:
-            line = await asyncio.wait_for(_read_line(reader), _REQUEST_TIMEOUT_S)
-            tell({"result": await self._jobs.do(_request(line), tell)})
-            await _send_all(writer)
-        except TimeoutError:
-            tell({"error": f"no complete request within {_REQUEST_TIMEOUT_S:.0f} s"})
-        except (ControlError, StoreError) as error:
-            tell({"error": str(error)})
-        except ValueError as error:
-            tell({"error": f"request not understood: {error}"})
-        except ConnectionError:
-            pass
-        except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
-            tell({"error": "the daemon was stopped meanwhile; `pull` shows what the flight controller holds"})
-
-
-async def _send_all(writer: asyncio.StreamWriter) -> None:
-    """Wait until the client has read everything, with a timeout."""
-    writer.transport.set_write_buffer_limits(high=0)
-    with suppress(TimeoutError):
-        await asyncio.wait_for(writer.drain(), _ANSWER_TIMEOUT_S)
-
-
-async def _read_line(reader: asyncio.StreamReader) -> bytes:
-    try:
-        return await reader.readline()
-    except ValueError:
-        limit = f"a request is limited to {_MAX_LINE >> 10} kB"
-        raise ControlError(f"{limit}: no flight controller stores such a long mission") from None
-
-
-def _request(line: bytes) -> Json:
-    try:
-        request = json.loads(line)
-    except RecursionError:
-        raise ValueError("it is nested too deep") from None
-    if not isinstance(request, dict):
-        raise ValueError("it must be one JSON object on one line")
-    return request
 
 
 def _resolve(future: asyncio.Future[T], result: T) -> None:

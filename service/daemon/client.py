@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Requests to a running daemon through its control socket (service.daemon.api).
+"""Requests to a running daemon through its control socket (service.daemon.control_server).
 
 Imports no part of the daemon, so that a command starts quickly.
 """

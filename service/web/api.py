@@ -30,7 +30,7 @@ from starlette.routing import Route
 from bridge.missions.mission_service import HeldMission
 from bridge.model.mission_log import Outcome
 from protocols.mission_item import MissionItem
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
 from service.daemon.mission_data import MOST, Json, mission_items, to_json
@@ -53,18 +53,18 @@ _LISTED = 50
 
 
 class Api:
-    """Answers from MissionJobs and the bridge's report. `token` None: everything that needs it is refused."""
+    """Answers from DaemonApi and the bridge's report. `token` None: everything that needs it is refused."""
 
     def __init__(self, daemon: Daemon, settings: WebSettings, token: Token | TokenError) -> None:
         self._daemon = daemon
         self._listen = settings.listen
-        self._jobs = MissionJobs(daemon)
+        self._api = DaemonApi(daemon)
         self._token = token
         self._metrics = Metrics(daemon)
         self._kept = KeptAnswers()
         self._held_text: tuple[HeldMission, str] | None = None
         self._writer = MissionWriter()
-        self._files = MissionFiles(self._jobs, self._writer)
+        self._files = MissionFiles(self._api, self._writer)
         self._history = LinkHistory(daemon)
         state_dir = daemon.settings.state_dir
         self._logs = TelemetryLogs(None if state_dir is None else state_dir / TLOG_FOLDER)
@@ -106,7 +106,7 @@ class Api:
         now = asyncio.get_running_loop().time()
         transfer = daemon.bridge.transfer
         try:
-            listed = (await self._jobs.list_missions(1))["missions"]
+            listed = (await self._api.list_missions(1))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
             store = daemon.store_trouble
         except StoreError as error:
@@ -149,7 +149,7 @@ class Api:
         return Response(qr_code(urls[0]), media_type="image/svg+xml")
 
     async def _missions(self, _request: Request) -> Response:
-        return _json(await _told(self._jobs.list_missions(_LISTED)))
+        return _json(await _told(self._api.list_missions(_LISTED)))
 
     async def _mission(self, request: Request) -> Response:
         number = _number(request, "number")
@@ -173,7 +173,7 @@ class Api:
     async def _restore(self, request: Request) -> Response:
         check_token(request, self._token)
         number = _number(request, "number")
-        return _begun(self._writer.begin(f"mission {number}", partial(self._jobs.restore, number)))
+        return _begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
 
     async def _check_file(self, request: Request) -> Response:
         answer = await self._files.check(request)
@@ -203,7 +203,7 @@ class Api:
         return Response(self._metrics.render(), media_type=CONTENT_TYPE)
 
     async def _find(self, number: int) -> Json:
-        return await _told(self._jobs.show_mission(number))
+        return await _told(self._api.show_mission(number))
 
 
 def _number(request: Request, name: str) -> int:

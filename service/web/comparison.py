@@ -17,7 +17,7 @@ _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_
 
 
 def stored_mission(mission: Json) -> Json:
-    """A mission of the store (MissionJobs.show_mission) with rows that compare items as sent and as stored."""
+    """A mission of the store (DaemonApi.show_mission) with rows that compare items as sent and as stored."""
     received = mission["received"]
     findings = mission_findings(received["findings"])
     sent, stored = mission_items(received["items"]), mission_items(received["stored_items"])
@@ -38,7 +38,7 @@ def stored_mission(mission: Json) -> Json:
 
 
 def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
-    """The verdict on a list, with rows like those of `stored_mission`. verdict: of MissionJobs.check."""
+    """The verdict on a list, with rows like those of `stored_mission`. verdict: of DaemonApi.check."""
     findings = mission_findings(verdict["findings"])
     stored = mission_items(verdict["items"])
     return {

@@ -15,7 +15,7 @@ from starlette.requests import ClientDisconnect, Request
 
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.daemon.mission_data import Json
 from service.web.access import Refused
@@ -69,8 +69,8 @@ class MissionWriter:
 class MissionFiles:
     """The body of a request is the file; the query has its name."""
 
-    def __init__(self, jobs: MissionJobs, writer: MissionWriter) -> None:
-        self._jobs = jobs
+    def __init__(self, api: DaemonApi, writer: MissionWriter) -> None:
+        self._api = api
         self._writer = writer
         self._turn = asyncio.Lock()
 
@@ -79,7 +79,7 @@ class MissionFiles:
         async with self._turn:
             _, items = await _read(request)
             try:
-                verdict = await self._jobs.check(items)
+                verdict = await self._api.check(items)
             except ControlError as error:
                 raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
             answer = await asyncio.to_thread(checked_mission, items, verdict)
@@ -89,7 +89,7 @@ class MissionFiles:
     async def write(self, request: Request) -> str:
         """Start writing; returns the write's id. The caller has checked the token."""
         name, items = await _read(request)
-        return self._writer.begin(name, partial(self._jobs.push, items, f"{name}, from the page"))
+        return self._writer.begin(name, partial(self._api.push, items, f"{name}, from the page"))
 
 
 async def _read(request: Request) -> tuple[str, list[MissionItem]]:

@@ -2,7 +2,7 @@
 """Queries about the vehicle: state, overview, history, mission/current and mission/list."""
 
 from bridge.bridge import Bridge
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.mission_data import Json, strict
 from service.zenoh_link import keys
 from service.zenoh_link.history import History
@@ -19,12 +19,10 @@ _TIMES = ("received_at", "concluded_at")
 class Answers:
     """Replies in the encoding of the samples."""
 
-    def __init__(
-        self, data: VehicleData, bridge: Bridge, jobs: MissionJobs, payloads: Payloads, history: History
-    ) -> None:
+    def __init__(self, data: VehicleData, bridge: Bridge, api: DaemonApi, payloads: Payloads, history: History) -> None:
         self._bridge = bridge
         self._data = data
-        self._jobs = jobs
+        self._api = api
         self._payloads = payloads
         self._history = history
         self.answerers: dict[keys.ZenohKey, Answerer] = {
@@ -51,7 +49,7 @@ class Answers:
 
     async def _mission_list(self, question: Question) -> None:
         limit = _whole_number(question, "limit", _USUAL_LIMIT, _MAX_LIMIT)
-        found = (await self._jobs.list_missions(limit))["missions"]
+        found = (await self._api.list_missions(limit))["missions"]
         self._tell(question, keys.MISSION_LIST, {"missions": [_with_units(mission) for mission in found]})
 
     def _tell(self, question: Question, key: keys.ZenohKey, body: Json) -> None:

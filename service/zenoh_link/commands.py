@@ -7,7 +7,7 @@ from collections.abc import Callable
 from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.mission_data import MOST, Json, to_json
 from service.settings.zenoh import STATE_NAME
 from service.zenoh_link import keys
@@ -24,10 +24,10 @@ _RATE_NAMES = (*(group.value for group in Group), STATE_NAME)
 
 
 class CommandQueries:
-    """Handles the commands through MissionJobs, like all other interfaces."""
+    """Handles the commands through DaemonApi, like all other interfaces."""
 
-    def __init__(self, jobs: MissionJobs, rates: SampleRates) -> None:
-        self._jobs = jobs
+    def __init__(self, api: DaemonApi, rates: SampleRates) -> None:
+        self._api = api
         self._rates = rates
         self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.UPLOAD: self._upload,
@@ -42,24 +42,24 @@ class CommandQueries:
         items = await _items(question)
         progress = _teller(question, len(items))
         # A file of which nothing can be stored must not erase the missions of a fleet.
-        _end(question, await self._jobs.push(items, "zenoh upload", progress, may_erase=False))
+        _end(question, await self._api.push(items, "zenoh upload", progress, may_erase=False))
 
     async def _check(self, question: Question) -> None:
-        _tell(question, {"result": await self._jobs.check(await _items(question))})
+        _tell(question, {"result": await self._api.check(await _items(question))})
 
     async def _clear(self, question: Question) -> None:
-        _end(question, await self._jobs.push([], "zenoh clear", lambda _: None))
+        _end(question, await self._api.push([], "zenoh clear", lambda _: None))
 
     async def _restore(self, question: Question) -> None:
         number = question.parameter("number")
         if number is None or not number.isascii() or not number.isdigit() or not 0 < int(number) <= MOST:
             raise QueryRefused("add the mission's number: restore?number=3; mission/list has the numbers")
-        data = await self._jobs.show_mission(int(number))
+        data = await self._api.show_mission(int(number))
         count = len(data["received"]["items"])
-        _end(question, await self._jobs.restore(int(number), _teller(question, count)))
+        _end(question, await self._api.restore(int(number), _teller(question, count)))
 
     async def _status(self, question: Question) -> None:
-        _tell(question, {"result": self._jobs.status()})
+        _tell(question, {"result": self._api.status()})
 
     async def _raise_rates(self, question: Question) -> None:
         now = asyncio.get_running_loop().time()

@@ -7,7 +7,7 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.mission_data import Json
 from service.machine.threads import DiskThread
 from service.zenoh_link.logged_past import LoggedPast, read_logged_past
@@ -22,8 +22,8 @@ _DEFAULT_RANGE = "[now(-1h)..]"
 class History:
     """Keeps the newest events. Missions and telemetry logs (in the folder `logs`) are read on request."""
 
-    def __init__(self, jobs: MissionJobs, logs: Path | None, clock: Callable[[], float]) -> None:
-        self._jobs = jobs
+    def __init__(self, api: DaemonApi, logs: Path | None, clock: Callable[[], float]) -> None:
+        self._api = api
         self._logs = logs
         self._clock = clock
         self._disk = DiskThread("history")
@@ -36,7 +36,7 @@ class History:
     async def answer(self, time_range: str | None, max_positions: int) -> Json:
         """The events, missions and positions of a time range; StoreError, OSError, or ValueError about the range."""
         wanted = parse_time_range(time_range or _DEFAULT_RANGE, self._clock())
-        found = await self._jobs.missions_between(wanted.start_s, wanted.end_s, _MAX_MISSIONS)
+        found = await self._api.missions_between(wanted.start_s, wanted.end_s, _MAX_MISSIONS)
         kept_from_s = self._events[0]["time_s"] if self._events else inf
         logged = LoggedPast()
         if self._logs is not None and (max_positions or wanted.start_s < kept_from_s):

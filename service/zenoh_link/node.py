@@ -5,7 +5,7 @@ The path of a sample from the UART:
     Daemon.flush -> Node.telemetry -> Publisher.put -> zenoh
 Anything that may wait takes the session's thread:
     Daemon._log_event -> Node.event -> SessionThread -> zenoh
-    zenoh -> Queries -> Answers or CommandQueries -> MissionJobs -> Question -> SessionThread -> zenoh
+    zenoh -> Queries -> Answers or CommandQueries -> DaemonApi -> Question -> SessionThread -> zenoh
 """
 
 import asyncio
@@ -20,7 +20,7 @@ from bridge.missions.mission_service import DeliveryResult, HeldMission
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.daemon.mission_data import Json
 from service.recording.recorder import TLOG_FOLDER
@@ -68,13 +68,13 @@ class Node:
         self._presence = Liveliness(settings.vehicle, self._note)
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others, clock)
         self._queries = Queries(self._thread)
-        jobs = MissionJobs(daemon)
+        api = DaemonApi(daemon)
         state_dir = daemon.settings.state_dir
         self._rates = SampleRates(settings.profile, settings.rates)
-        self._history = History(jobs, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
-        self._answerers = Answers(self._data, daemon.bridge, jobs, self._payloads, self._history).answerers
+        self._history = History(api, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
+        self._answerers = Answers(self._data, daemon.bridge, api, self._payloads, self._history).answerers
         if settings.commands:
-            self._answerers |= CommandQueries(jobs, self._rates).answerers
+            self._answerers |= CommandQueries(api, self._rates).answerers
         self._held: HeldMission | None = None
         self._next_check_at = self._loop.time() + _ENDPOINT_CHECK_S
         self._diagnosis = ""

@@ -11,7 +11,7 @@ import pytest
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from service.cli.mission_source import load_mission
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc, parse_gcs
@@ -102,7 +102,7 @@ async def test_a_refused_request_gets_an_error(write: bool, command: int, payloa
     async with shared(write=write) as (daemon, program):
         (reply,) = await program.ask(command, payload)
         assert reply.direction is Direction.ERROR
-        (refusal,) = MissionJobs(daemon).status()["refused"]
+        (refusal,) = DaemonApi(daemon).status()["refused"]
         assert why in refusal
 
 
@@ -123,7 +123,7 @@ async def test_nothing_is_passed_on_while_armed(monkeypatch: pytest.MonkeyPatch)
 async def test_a_mission_transfer_is_not_disturbed() -> None:
     async with shared() as (daemon, program):
         items = load_mission(Path(__file__).parents[2] / "examples" / "long-146.waypoints")
-        pushing = asyncio.create_task(MissionJobs(daemon).push(items, "test", lambda _: None))
+        pushing = asyncio.create_task(DaemonApi(daemon).push(items, "test", lambda _: None))
         async with asyncio.timeout(PATIENCE):
             while not daemon.bridge.runner.is_busy:  # noqa: ASYNC110
                 await asyncio.sleep(0)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from service.daemon.api import MissionJobs
+from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon
 from service.links.serial_ports import USB_CHIPS, serial_ports
 from service.settings import Settings
@@ -63,11 +63,11 @@ def pi(tmp_path: Path) -> Pi:
 
 
 @asynccontextmanager
-async def running(pi: Pi, state_dir: Path) -> AsyncIterator[tuple[Daemon, MissionJobs]]:
+async def running(pi: Pi, state_dir: Path) -> AsyncIterator[tuple[Daemon, DaemonApi]]:
     daemon = Daemon(Settings(AutoFc(), state_dir=state_dir), pi)
     task = asyncio.create_task(daemon.run())
     try:
-        yield daemon, MissionJobs(daemon)
+        yield daemon, DaemonApi(daemon)
     finally:
         task.cancel()
         await asyncio.wait([task])
