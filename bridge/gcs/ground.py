@@ -70,7 +70,7 @@ class Ground:
 
     # The connected stations.
 
-    def add_default_peer(self, peer: Peer, *, until_answered: bool) -> None:
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
         """Send to `peer` before it is heard; `until_answered`: only while no peer is heard on its link (broadcast)."""
         self._default_peers[peer] = until_answered
         self._everyone = None

@@ -36,11 +36,11 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
     job: asyncio.Future[Json] | None = None
     try:
         patience_s = _SEARCH_PATIENCE_S * (_PORTS_SEARCHED if isinstance(fc, AutoFc) else 1)
-        await _wait(lambda: bool(daemon.fc_trouble or daemon.bridge.session.state.controller), patience_s)
-        if daemon.fc_trouble:
-            raise ControlError(daemon.fc_trouble)
+        await _wait(lambda: bool(daemon.fc.trouble or daemon.bridge.session.state.controller), patience_s)
+        if daemon.fc.trouble:
+            raise ControlError(daemon.fc.trouble)
         if daemon.bridge.session.state.controller is None:
-            where = daemon.fc_where
+            where = daemon.fc.where
             raise ControlError(f"no flight controller answers on {where}: check its power, the wiring and the speed")
         # The controller is identified before its telemetry arrives, and some never send all of it.
         if request == STATUS:

@@ -15,8 +15,7 @@ from service.daemon.lifecycle import run_until_signal
 from service.links.gcs_links import LinkError
 from service.machine.log_setup import set_up_logging
 from service.machine.notify import Notifier
-from service.recording.uart_recorder import UartFileError
-from service.settings import Settings
+from service.settings import Settings, SettingsError
 from service.settings.web import WebSettings
 from service.settings.zenoh import ZenohSettings, ZenohSettingsError
 from storage.state_lock import StateLock, StateUnusableError
@@ -32,7 +31,7 @@ def serve(settings: Settings, load: Callable[[], Settings]) -> None:
     set_up_logging(settings.log_level)
     try:
         _serve(settings, load)
-    except (ControlError, LinkError, StoreError, UartFileError, ZenohSettingsError) as error:
+    except (ControlError, LinkError, StoreError, SettingsError, ZenohSettingsError) as error:
         fail(str(error))
 
 

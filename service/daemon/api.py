@@ -97,9 +97,9 @@ class DaemonApi:
         return {
             "version": version(),
             "uptime_s": round(self._loop.time() - daemon.started_at, 1),
-            "where": daemon.fc_where,
-            "trouble": daemon.fc_trouble,
-            "found_s": None if daemon.found_at is None else round(self._loop.time() - daemon.found_at, 1),
+            "where": daemon.fc.where,
+            "trouble": daemon.fc.trouble,
+            "found_s": None if daemon.fc.found_at is None else round(self._loop.time() - daemon.fc.found_at, 1),
             "links": [str(address) for address in daemon.settings.gcs],
             "page": None if web is None else str(web.listen),
             "mode": report.status.mode,
@@ -123,6 +123,7 @@ class DaemonApi:
             "round_trip_ms": link.round_trip_ms,
             "requests_lost": link.requests_lost,
             "bad_checksums": link.bad_checksums,
+            **daemon.fc.ports(),
             **daemon.followers_status(),
         }
 

@@ -92,10 +92,10 @@ def link_line(daemon: Daemon) -> str:
     """The flight controller and the ground stations in one line."""
     bridge = daemon.bridge
     state = bridge.session.state
-    if daemon.fc_trouble:
-        where = daemon.fc_trouble
+    if daemon.fc.trouble:
+        where = daemon.fc.trouble
     elif state.controller is None:
-        where = f"looking for a flight controller on {daemon.fc_where}"
+        where = f"looking for a flight controller on {daemon.fc.where}"
     else:
         speed = "" if state.speed is None else f", {state.speed} baud"
         armed = {None: "", True: ", armed", False: ", disarmed"}[bridge.session.vehicle.armed]

@@ -7,7 +7,7 @@ not opened, and one that turned out to be a GPS receiver or a radio is not opene
 
 import asyncio
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,6 @@ import serial
 import structlog
 
 from bridge.fc.port_listener import OtherDeviceWatch, PortListener
-from bridge.missions.mission_service import DeliveryResult
-from bridge.model.events import Level
-from bridge.model.mission_log import ArrivedMission
-from bridge.model.vehicle_groups import Group
 from service.links.fc_device import PortError, open_serial
 from service.links.port_holder import find_user
 from service.links.port_memory import PortMemory
@@ -88,9 +84,7 @@ class PortFinder:
         """Stop all timers."""
         self._leave()
 
-    # The methods of service.daemon.daemon.Follower.
-
-    def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
+    def event(self, event: str) -> None:
         """Remember the port on which a flight controller was found; wait for a lost one to come back."""
         if self._present is None:
             return
@@ -102,12 +96,6 @@ class PortFinder:
         elif event == "fc.lost":
             self._watch = OtherDeviceWatch()
             self._wait(_RETURN_S)
-
-    def telemetry(self, groups: frozenset[Group]) -> None:
-        """Not used."""
-
-    def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
-        """Not used."""
 
     def status(self) -> dict[str, Any]:
         """The port in use, and the skipped ones with the reasons."""

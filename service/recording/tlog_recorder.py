@@ -11,6 +11,8 @@ from service.recording.disk_writer import DiskWriter
 from service.recording.tlog_folder import TlogFolder
 from service.settings import TlogLimits
 
+#: Within the state directory.
+TLOG_FOLDER = "logs"
 #: A larger jump means that the clock was set: a Pi gets the time only from the network.
 _CLOCK_STEP_US = 10_000_000
 #: When frames were sent or received, monotonic nanoseconds; True if they belong to a flight; and the frames.
@@ -45,7 +47,7 @@ class TlogRecorder:
     def describe(self) -> str:
         """The file in use, or the reason why there is none, for the status."""
         dropped = f", {self._writer.dropped} bytes dropped" if self._writer.dropped else ""
-        return self._folder.describe() + dropped
+        return f"telemetry log: {self._folder.describe()}{dropped}"
 
     def close(self) -> None:
         """Write the unsaved frames."""

@@ -3,16 +3,14 @@
 
 import os
 import time
-from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
 import structlog
 
 from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, is_capture
-from service.links.fc_device import Device
-from service.links.fc_port import FcPort
 from service.recording.disk_writer import DiskWriter
+from service.settings import SettingsError
 
 #: Bytes per file: hours of telemetry, or 45 minutes of a full line at 115200 baud.
 _MAX_SIZE = 64 << 20
@@ -20,12 +18,8 @@ _MAX_SIZE = 64 << 20
 _log = structlog.get_logger()
 
 
-class UartFileError(Exception):
-    """The file cannot be used; the text is one sentence for the user."""
-
-
 class UartRecorder:
-    """Appends to a capture file up to a maximum size. It holds only the port's traffic."""
+    """Appends to a capture file up to a maximum size. SettingsError if the file cannot be used."""
 
     def __init__(self, path: Path, max_size: int = _MAX_SIZE) -> None:
         self._path = path
@@ -46,7 +40,7 @@ class UartRecorder:
         """The file in use, or the reason why recording stopped, for the status."""
         ended = f", ended: {self._over_because}" if self._over_because else ""
         dropped = f", {self._writer.dropped} bytes dropped" if self._writer.dropped else ""
-        return f"{self._path}, {self._size / 1e6:.1f} of {self._max_size / 1e6:.0f} MB{dropped}{ended}"
+        return f"UART capture: {self._path}, {self._size / 1e6:.1f} of {self._max_size / 1e6:.0f} MB{dropped}{ended}"
 
     def close(self) -> None:
         """Write the unsaved events."""
@@ -77,57 +71,19 @@ class UartRecorder:
         _log.warning("uart.recording_ended", file=str(self._path), why=why)
 
 
-class RecordedPort(FcPort):
-    """The flight controller's port, with every event recorded."""
-
-    def __init__(
-        self,
-        open_device: Callable[[], Awaitable[Device]],
-        on_open: Callable[[], None],
-        on_data: Callable[[bytes], None],
-        on_close: Callable[[str], None],
-        recorder: UartRecorder,
-    ) -> None:
-        def opened() -> None:
-            recorder.note(UartDeed.OPEN, self._recorded_speed)
-            on_open()
-
-        def received(data: bytes) -> None:
-            recorder.note(UartDeed.READ, self._recorded_speed, data)
-            on_data(data)
-
-        def closed(why: str) -> None:
-            recorder.note(UartDeed.CLOSE, self._recorded_speed, text=why)
-            on_close(why)
-
-        super().__init__(open_device, opened, received, closed)
-        self._recorder = recorder
-        self._recorded_speed: int | None = None
-
-    def set_speed(self, baud: int | None) -> None:
-        """Change the speed, baud."""
-        self._recorded_speed = baud
-        super().set_speed(baud)
-
-    def write(self, data: bytes) -> None:
-        """Write to the port, and record it."""
-        self._recorder.note(UartDeed.WRITE, self._recorded_speed, data)
-        super().write(data)
-
-
 def _open(path: Path) -> tuple[int, int]:
     """Open a new capture, or an earlier one to append to. Answer: its descriptor and size."""
     try:
         if path.exists() and not path.is_file():
             # Never write to a device: a serial port may lead to an aircraft.
-            raise UartFileError(f"{path} is not a file: name a new file for --record-uart")
+            raise SettingsError(f"{path} is not a file: name a new file for --record-uart")
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
     except OSError as error:
-        raise UartFileError(f"cannot record into {path}: {error.strerror}") from error
+        raise SettingsError(f"cannot record into {path}: {error.strerror}") from error
     size = os.fstat(descriptor).st_size
     if size and not is_capture(os.pread(descriptor, 64, 0)):
         os.close(descriptor)
-        raise UartFileError(f"{path} is not a UART capture: name a new file for --record-uart")
+        raise SettingsError(f"{path} is not a UART capture: name a new file for --record-uart")
     if size and os.pread(descriptor, 1, size - 1) != b"\n":
         # The daemon was killed in the middle of a line: keep the next one apart.
         os.write(descriptor, b"\n")

@@ -36,7 +36,7 @@ from service.daemon.daemon import Daemon
 from service.daemon.mission_data import MOST, Json, mission_items, to_json
 from service.machine.host import Host
 from service.machine.package import version
-from service.recording.recorder import TLOG_FOLDER
+from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, Refused, check_token, guarded
 from service.web.comparison import difference, shown, stored_mission
@@ -116,12 +116,12 @@ class Api:
                 "version": version(),
                 **asdict(daemon.bridge.report.whole()),
                 "traffic": {name: asdict(traffic) for name, traffic in daemon.traffic.items()},
-                "port": {"address": daemon.fc_where, "trouble": daemon.fc_trouble},
+                "port": {"address": daemon.fc.where, "trouble": daemon.fc.trouble},
                 "refused": [f"{count} x {why} ({link})" for (link, why), count in daemon.bridge.guard.refused.items()],
                 "recording": daemon.recording,
                 "newest_mission": newest,
                 "store_trouble": store,
-                "lost_s": None if daemon.lost_at is None else round(now - daemon.lost_at, 1),
+                "lost_s": None if daemon.fc.lost_at is None else round(now - daemon.fc.lost_at, 1),
                 "transfer": None if transfer is None else asdict(transfer) | {"step": transfer.step.value},
                 "write": self._writer.state,
             }

@@ -17,9 +17,7 @@ from bridge.line.msp_link import BOUNDS_S, RoundTrips
 from bridge.missions.mission_service import DeliveryResult
 from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
-from bridge.model.vehicle_groups import Group
-from service.daemon.daemon import Daemon
-from service.daemon.mission_data import Json
+from service.daemon.daemon import Daemon, Follower
 from service.machine.package import version
 from service.settings.zenoh import host_name
 
@@ -35,8 +33,8 @@ _BEGINS = {"mission.upload_started", "mission.push_started"}
 _ENDS = {"mission.upload_ended", "mission.refused", "mission.push_ended"}
 
 
-class Metrics:
-    """Collects from a daemon. Implements service.daemon.daemon.Follower."""
+class Metrics(Follower):
+    """Collects from a daemon."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._registry = CollectorRegistry()
@@ -62,9 +60,6 @@ class Metrics:
         """The metrics as text."""
         return generate_latest(self._labelled)
 
-    def telemetry(self, groups: frozenset[Group]) -> None:
-        """Not used: telemetry is read at the scrape."""
-
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
         """Count an event."""
         self._events.labels(event, level).inc()
@@ -80,10 +75,6 @@ class Metrics:
         self._missions.labels(delivery.ack.name).inc()
         for finding in mission.verdict.findings:
             self._findings.labels(finding.field).inc()
-
-    def status(self) -> Json:
-        """Adds nothing to the status."""
-        return {}
 
     def _counter(self, name: str, meaning: str, *labels: str) -> Counter:
         return Counter(_PREFIX + name, meaning, labels, registry=self._registry)
@@ -161,7 +152,7 @@ class _State(Collector):
         for each in TRANSITIONS:
             states.add_metric([each.name], float(type(state) is each))
         yield states
-        dropped = self._daemon.fc_dropped_bytes
+        dropped = self._daemon.fc.dropped_bytes
         yield _counted("fc_dropped_bytes", "Bytes for the flight controller that its line was too slow for.", dropped)
         # These restart at 0 with each flight controller found, which Prometheus permits for counters.
         damaged = state.bad_checksums or 0

@@ -6,7 +6,7 @@ import asyncio
 import zenoh
 
 from bridge.gcs.station import Peer
-from service.links.gcs_events import GcsEvents
+from service.daemon.gcs_connections import GcsConnections
 from service.machine.threads import post
 from service.zenoh_link.keys import MAVLINK_OUT
 from service.zenoh_link.publisher import Publisher
@@ -24,7 +24,7 @@ class MavlinkLink:
 
     name = "zenoh"
 
-    def __init__(self, publisher: Publisher, events: GcsEvents) -> None:
+    def __init__(self, publisher: Publisher, events: GcsConnections) -> None:
         self._publisher = publisher
         self._events = events
         self._loop = asyncio.get_running_loop()

@@ -21,9 +21,9 @@ from bridge.model.events import Level
 from bridge.model.mission_log import ArrivedMission
 from bridge.model.vehicle_groups import Group
 from service.daemon.api import DaemonApi
-from service.daemon.daemon import Daemon
+from service.daemon.daemon import Daemon, Follower
 from service.daemon.mission_data import Json
-from service.recording.recorder import TLOG_FOLDER
+from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import connect_endpoints, make_config, tls_files
 from service.zenoh_link import keys, vehicle_data
@@ -51,8 +51,8 @@ _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
 _log = structlog.get_logger()
 
 
-class Node:
-    """Implements service.daemon.daemon.Follower. Must be made on the daemon's event loop; ZenohSettingsError."""
+class Node(Follower):
+    """Must be made on the daemon's event loop; ZenohSettingsError."""
 
     def __init__(self, settings: ZenohSettings, daemon: Daemon) -> None:
         self._settings = settings
@@ -64,7 +64,7 @@ class Node:
         clock = SampleClock(self._loop.time)
         self._payloads = Payloads(settings.encoding, clock.unix_s)
         self._publisher = Publisher(self._payloads, self._readers_changed)
-        self._mavlink = MavlinkLink(self._publisher, daemon)
+        self._mavlink = MavlinkLink(self._publisher, daemon.gcs)
         self._presence = Liveliness(settings.vehicle, self._note)
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others, clock)
         self._queries = Queries(self._thread)
@@ -83,7 +83,7 @@ class Node:
 
     def start(self) -> None:
         """Join as soon as there is a session to join."""
-        self._daemon.add_link(self._mavlink)
+        self._daemon.gcs.add(self._mavlink)
         self._daemon.add_follower(self)
         self._thread.start()
         self._every_second()

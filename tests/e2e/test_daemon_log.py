@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from structlog.testing import capture_logs
 
-from service.daemon import daemon as daemon_module
+from service.daemon import fc_connection
 from service.daemon.client import ControlError, ask_daemon
 from service.daemon.daemon import Daemon
 from service.settings import Settings
@@ -74,7 +74,7 @@ def test_an_unread_log_does_not_stop_the_daemon(tmp_path: Path) -> None:
 
 
 async def test_a_search_without_result_is_reported_repeatedly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(daemon_module, "_SEARCH_REPORT_S", 0.01)
+    monkeypatch.setattr(fc_connection, "_SEARCH_REPORT_S", 0.01)
     near, far = os.openpty()
     tty.setraw(far)
     with capture_logs() as events:

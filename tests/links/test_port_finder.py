@@ -138,9 +138,9 @@ async def test_a_port_used_by_another_program_is_not_opened(pi: Pi, tmp_path: Pa
     pi.runs(77, "/usr/sbin/gpsd", "-n", "/dev/serial0")
     pi.runs(78, "/usr/bin/mavproxy.py", "--master=/dev/ttyUSB0,57600")
     async with running(pi, tmp_path) as (daemon, jobs):
-        await until_async(lambda: daemon.fc_trouble, "the reason")
-        assert "gpsd (pid 77) uses it" in daemon.fc_trouble
-        assert "mavproxy.py (pid 78) uses it" in daemon.fc_trouble
+        await until_async(lambda: daemon.fc.trouble, "the reason")
+        assert "gpsd (pid 77) uses it" in daemon.fc.trouble
+        assert "mavproxy.py (pid 78) uses it" in daemon.fc.trouble
         assert jobs.status()["port"] is None
 
 

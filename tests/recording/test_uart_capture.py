@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from structlog.testing import capture_logs
 
 from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, read_capture
-from service.recording.uart_recorder import UartFileError, UartRecorder
+from service.recording.uart_recorder import UartRecorder
+from service.settings import SettingsError
 
 HEADER = capture_header("2026-11-21T06:33:06Z")
 SPEEDS = st.sampled_from([None, 1200, 57600, 115200])
@@ -137,12 +138,12 @@ def test_a_captures_total_size_is_limited(tmp_path: Path) -> None:
 def test_other_files_are_not_appended_to(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("mine")
-    with pytest.raises(UartFileError, match=r"notes\.txt is not a UART capture"):
+    with pytest.raises(SettingsError, match=r"notes\.txt is not a UART capture"):
         UartRecorder(path)
     assert path.read_text() == "mine"
     near, far = os.openpty()
     for no_file in (tmp_path, Path(os.ttyname(far))):
-        with pytest.raises(UartFileError, match="is not a file: name a new file"):
+        with pytest.raises(SettingsError, match="is not a file: name a new file"):
             UartRecorder(no_file)
     os.set_blocking(near, False)
     with pytest.raises(BlockingIOError):

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bridge's connection to the flight controller: its port is found, opened, counted and, on request, recorded."""
+
+import asyncio
+from collections.abc import Callable
+
+import structlog
+
+from bridge.bridge import Bridge
+from protocols.uart_capture import UartDeed
+from service.links.fc_device import device_opener
+from service.links.fc_port import MOVED_ON, STOPPED, FcPort
+from service.links.port_finder import PortFinder
+from service.links.traffic import Traffic
+from service.machine.host import Host
+from service.recording.uart_recorder import UartRecorder
+from service.settings import Settings
+from service.settings.addresses import AutoFc
+
+#: The interval of messages about an unsuccessful search: a silent log looks like a hang.
+_SEARCH_REPORT_S = 60.0
+
+_log = structlog.get_logger()
+
+
+class FcConnection:
+    """Feeds the port's bytes to the bridge. SettingsError if it cannot be recorded.
+
+    `flush` carries out the bridge's outputs; `forward` only those of pass-through, which is quicker.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        host: Host,
+        bridge: Bridge,
+        traffic: Traffic,
+        flush: Callable[[], None],
+        forward: Callable[[], None],
+    ) -> None:
+        self._address = settings.fc
+        self._bridge = bridge
+        self._traffic = traffic
+        self._flush = flush
+        self._forward = forward
+        self._loop = asyncio.get_running_loop()
+        self.capture = None if settings.record_uart is None else UartRecorder(settings.record_uart)
+        self._finder: PortFinder | None = None
+        if isinstance(self._address, AutoFc):
+            self._finder = PortFinder(host, settings.state_dir)
+        open_device = device_opener(self._address) if self._finder is None else self._finder.open
+        self._port = FcPort(open_device, self._opened, self._received, self._closed)
+        if self._finder is not None:
+            self._finder.move_on = self._port.move_on
+        self._speed: int | None = None
+        self._search_report: asyncio.TimerHandle | None = None
+        #: On the loop's clock; `found_at` None: no flight controller; `lost_at` None: none was lost since.
+        self.found_at: float | None = None
+        self.lost_at: float | None = None
+
+    @property
+    def trouble(self) -> str:
+        """Why the flight controller cannot be used: its port, or its state; empty if it can be."""
+        return self._port.trouble or self._bridge.session.state.trouble
+
+    @property
+    def where(self) -> str:
+        """The port or address; while no port is open, the kinds of port searched."""
+        return str(self._address) if self._finder is None else self._finder.where
+
+    @property
+    def dropped_bytes(self) -> int:
+        """Bytes that the line was too slow for."""
+        return self._port.dropped_bytes
+
+    def ports(self) -> dict[str, object]:
+        """With `fc = "auto"`, for the status: the port in use, and the skipped ones with the reasons."""
+        return {} if self._finder is None else self._finder.status()
+
+    async def run(self) -> None:
+        """Keep the port open; cancel to end."""
+        await self._port.run()
+
+    def close(self) -> None:
+        """Stop the timers, and write the rest of the recording. The port closes with `run`."""
+        if self._search_report is not None:
+            self._search_report.cancel()
+        if self._finder is not None:
+            self._finder.close()
+        if self.capture is not None:
+            self.capture.close()
+
+    def carry_out(self) -> None:
+        """Write the bridge's output for the flight controller."""
+        bridge = self._bridge
+        self._speed = bridge.session.state.speed
+        self._port.set_speed(self._speed)
+        self._port.may_gather = bridge.is_passing_through
+        if output := bridge.take_fc_output():
+            data = b"".join(output)
+            if self.capture is not None:
+                self.capture.note(UartDeed.WRITE, self._speed, data)
+            self._port.write(data)
+            self._traffic.sent(data)
+
+    def event(self, event: str) -> None:
+        """The bridge logged an event."""
+        if self._finder is not None:
+            self._finder.event(event)
+        if event == "fc.found":
+            self.found_at, self.lost_at = self._loop.time(), None
+        elif event in ("fc.lost", "fc.port_lost", "fc.in_command_line") and self.found_at is not None:
+            self.found_at, self.lost_at = None, self._loop.time()
+
+    def _opened(self) -> None:
+        if self.capture is not None:
+            self.capture.note(UartDeed.OPEN, self._speed)
+        self._bridge.session.opened(self._loop.time())
+        self._flush()
+        self._report_search()
+
+    def _received(self, data: bytes) -> None:
+        if self.capture is not None:
+            self.capture.note(UartDeed.READ, self._speed, data)
+        self._traffic.received(data)
+        bridge = self._bridge
+        if self._finder is not None:
+            self._finder.received(data)
+        bridge.fc_received(data, self._loop.time())
+        if bridge.is_passing_through:
+            self._forward()
+        else:
+            self._flush()
+
+    def _closed(self, why: str) -> None:
+        if self.capture is not None:
+            self.capture.note(UartDeed.CLOSE, self._speed, text=why)
+        self._bridge.session.closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
+        self._flush()
+
+    def _report_search(self) -> None:
+        if self._search_report is not None:
+            self._search_report.cancel()
+        if self._bridge.session.state.is_searching:
+            _log.info("fc.searching", fc=self.where)
+        self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)
