@@ -83,6 +83,7 @@ class PortFinder:
     def close(self) -> None:
         """Stop all timers."""
         self._leave()
+        self._memory.close()
 
     def event(self, event: str) -> None:
         """Remember the port on which a flight controller was found; wait for a lost one to come back."""

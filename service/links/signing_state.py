@@ -8,28 +8,23 @@ unknown, but all are below the file's: until that time is reached, nothing is ac
 """
 
 import asyncio
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
-
-import structlog
+from typing import Any
 
 from bridge.gcs.guard import LinkAccess
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Signing, Timestamps
-from service.machine.threads import DiskThread
+from service.machine.state_file import StateFile
 from service.settings.addresses import GcsAddress
 from service.settings.write_access import WriteAccess
-from storage.atomic_file import replace_file
 
 FILE_NAME = "signing.json"
+#: The timestamp in the file, the streams' by link, and True after a clean stop.
+_Kept = tuple[int, Mapping[str, list[list[int]]], bool]
 #: The file's lead, and so how long after a power cut signatures are refused. A shorter one wears out the SD card.
 _AHEAD = 10 * TICKS_PER_S
 _LOOK_S = 1.0
-_CLOSE_TIMEOUT_S = 1.0
-
-_log = structlog.get_logger()
 
 
 class SigningState:
@@ -42,13 +37,13 @@ class SigningState:
         access_by_link: Mapping[str, WriteAccess],
         clock: Callable[[], float] = time.time,
     ) -> None:
-        self._path = None if state_dir is None else state_dir / FILE_NAME
         keys = {name: access.key for name, access in access_by_link.items() if access.key is not None}
-        self._stored = 0
-        streams: Mapping[str, list[list[int]]] = {}
-        was_ended = True
-        if keys and self._path is not None:
-            self._stored, streams, was_ended = _load(self._path)
+        self._file: StateFile | None = None
+        kept: _Kept | None = None
+        if keys and state_dir is not None:
+            self._file = StateFile(state_dir / FILE_NAME, "timestamps begin with the clock")
+            kept = self._file.load(_read)
+        self._stored, streams, was_ended = kept or (0, {}, True)
         self._timestamps = Timestamps(clock, self._stored)
         refused_until = -1 if was_ended else self._stored + int(_LOOK_S * TICKS_PER_S)
         by_key = {key: Signing(key, self._timestamps, refused_until) for key in keys.values()}
@@ -66,59 +61,42 @@ class SigningState:
             for number, address in enumerate(gcs)
             if (access := access_by_link.get(str(address))) is not None
         }
-        self._thread = DiskThread("signing")
         self._timer: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
         """Keep the file ahead of the signed timestamps. Must be called on a running event loop."""
-        if self._signings and self._path is not None:
-            self._look(asyncio.get_running_loop(), self._path)
+        if self._file is not None:
+            self._look(asyncio.get_running_loop(), self._file)
 
     def close(self) -> None:
         """Write the true timestamp."""
-        if self._timer is not None and self._path is not None:
+        if self._file is None:
+            return
+        if self._timer is not None:
             self._timer.cancel()
-            self._thread.submit(partial(_save, self._path, self._state(self._timestamps.now(), is_end=True)))
-        self._thread.close(_CLOSE_TIMEOUT_S)
+            self._file.save(self._state(self._timestamps.now(), is_end=True))
+        self._file.close()
 
-    def _look(self, loop: asyncio.AbstractEventLoop, path: Path) -> None:
+    def _look(self, loop: asyncio.AbstractEventLoop, file: StateFile) -> None:
         """Write once the stored time is reached, by our clock or by a peer's that is far ahead."""
         if self._timestamps.last >= self._stored:
             self._stored = self._timestamps.now() + _AHEAD
-            self._thread.submit(partial(_save, path, self._state(self._stored, is_end=False)))
-        self._timer = loop.call_later(_LOOK_S, self._look, loop, path)
+            file.save(self._state(self._stored, is_end=False))
+        self._timer = loop.call_later(_LOOK_S, self._look, loop, file)
 
-    def _state(self, timestamp: int, *, is_end: bool) -> bytes:
+    def _state(self, timestamp: int, *, is_end: bool) -> dict[str, object]:
         """The contents for the next run. Streams that it would reject as too old anyway are left out."""
         late = timestamp - TOLERANCE
         streams = {
             name: [[*stream, last] for stream, last in signing.streams.items() if last >= late]
             for name, signing in self._signings.items()
         }
-        return json.dumps({"timestamp": timestamp, "is_end": is_end, "streams": streams}).encode()
+        return {"timestamp": timestamp, "is_end": is_end, "streams": streams}
 
 
-def _load(path: Path) -> tuple[int, Mapping[str, list[list[int]]], bool]:
-    try:
-        state = json.loads(path.read_bytes())
-        timestamp = int(state["timestamp"])
-        was_ended = bool(state.get("is_end", True))
-        streams = {
-            str(name): [
-                [int(number) for number in (sysid, compid, link_id, last)] for sysid, compid, link_id, last in all_
-            ]
-            for name, all_ in state["streams"].items()
-        }
-    except FileNotFoundError:
-        return 0, {}, True
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
-        _log.warning("signing.state_lost", file=str(path), why=str(error), what="timestamps begin with the clock")
-        return 0, {}, True
-    return timestamp, streams, was_ended
-
-
-def _save(path: Path, state: bytes) -> None:
-    try:
-        replace_file(path, state)
-    except OSError as error:
-        _log.warning("signing.state_not_stored", file=str(path), why=error.strerror)
+def _read(state: Any) -> _Kept:
+    streams = {
+        str(name): [[int(number) for number in (sysid, compid, link_id, last)] for sysid, compid, link_id, last in all_]
+        for name, all_ in state["streams"].items()
+    }
+    return int(state["timestamp"]), streams, bool(state.get("is_end", True))

@@ -184,7 +184,7 @@ async def test_a_damaged_file_is_reported_and_replaced(tmp_path: Path, content: 
         assert signing(state).check(frame(ticks(NOON))) is Check.VALID
         state.close()
     assert pi.stored()["timestamp"] == ticks(NOON)
-    assert [entry["event"] for entry in told] == ["signing.state_lost"]
+    assert [entry["event"] for entry in told] == ["state.lost"]
 
 
 async def test_an_unwritable_disk_does_not_stop_signing(tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ async def test_an_unwritable_disk_does_not_stop_signing(tmp_path: Path) -> None:
         state = pi.boot()
         assert signing(state).check(frame(ticks(NOON))) is Check.VALID
         state.close()
-    assert "signing.state_not_stored" in [entry["event"] for entry in told]
+    assert "state.not_stored" in [entry["event"] for entry in told]
 
 
 async def test_the_file_is_private_and_holds_no_key(tmp_path: Path) -> None:

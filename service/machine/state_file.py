@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small JSON file that survives restarts and power cuts."""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import structlog
+
+from service.machine.threads import DiskThread
+from storage.atomic_file import replace_file
+from storage.bounded_file import read_bounded
+
+_MAX_BYTES = 1 << 20
+_CLOSE_TIMEOUT_S = 1.0
+
+T = TypeVar("T")
+_log = structlog.get_logger()
+
+
+class StateFile:
+    """Written in order by a thread of its own: an SD card may take a second. `without`: the effect of losing it."""
+
+    def __init__(self, path: Path, without: str) -> None:
+        self._path = path
+        self._without = without
+        self._latest = b""
+        self._thread = DiskThread(path.name)
+
+    def load(self, read: Callable[[Any], T]) -> T | None:
+        """The contents, converted by `read`; None if there are none, or they are damaged, which is logged."""
+        try:
+            return read(json.loads(read_bounded(self._path, _MAX_BYTES)))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+            _log.warning("state.lost", file=str(self._path), why=str(error), what=self._without)
+            return None
+
+    def save(self, contents: object) -> None:
+        """Replace the contents. A failure is logged."""
+        self._latest = json.dumps(contents).encode()
+        self._thread.submit(partial(self._write, self._latest))
+
+    def close(self) -> None:
+        """Finish writing, unless the disk hangs."""
+        self._thread.close(_CLOSE_TIMEOUT_S)
+
+    def _write(self, data: bytes) -> None:
+        if data is not self._latest:
+            return  # newer contents wait already
+        try:
+            replace_file(self._path, data)
+        except OSError as error:
+            _log.warning("state.not_stored", file=str(self._path), why=error.strerror)
