@@ -251,9 +251,13 @@ class MissionUploads:
         if refusal is not None:
             self._handle(upload, Ended(refusal), now)
         elif len(self._uploads) > _MOST_UPLOADS:
-            slowest = min(self._undelivered(), key=lambda upload: upload.state.since)
-            self._end([slowest], _cancelled("ended: too many at once"), now)
+            self._end([min(self._undelivered(), key=self._worth)], _cancelled("ended: too many at once"), now)
         self._begin_next(now)
+
+    def _worth(self, upload: _Upload) -> tuple[bool, bool, float]:
+        """The order in which uploads end if there are too many: strangers' first, then those without any item."""
+        state = upload.state
+        return self._ground.has_standing(upload.station.peer), bool(state.received), state.since
 
     def _begin_next(self, now: float) -> None:
         """Continue the uploads whose turn has come: first that of the host that has written least."""

@@ -108,6 +108,20 @@ def test_a_pilot_who_arrives_later_can_write(addresses: Callable[[random.Random]
     assert longest_gap_s(pilot, came_at) <= 1.1
 
 
+def test_a_pilot_on_a_slow_radio_can_write_during_a_flood() -> None:
+    """Between two of the pilot's items a hundred lists are announced, more than are received at once."""
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    pilot = GroundStation(world, "pilot", air=Air(delay_s=0.7))
+    for beat in range(4):
+        world.after(beat, lambda: pilot.send(HELLO))
+    world.run(4)
+    attack(world, [HELLO, count_message(9)], many_hosts(random.Random(7)), 200, 4.0)
+    world.run(1)
+    assert Upload(pilot, waypoints(3), repeat_s=1.5).run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(waypoints(3))
+
+
 def test_a_sender_over_its_limit_is_not_read() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()

@@ -110,7 +110,8 @@ class Watch:
 def assert_uploads(pilot: PlainStation, board: Board, plan: Sequence[PlanRow]) -> None:
     """The pilot's list is accepted and stored on the board."""
     result = pilot.upload(plan)
-    assert result is MissionResult.ACCEPTED, result.name
+    texts = [message.text for message in pilot.heard if message.get_type() == "STATUSTEXT"]
+    assert result is MissionResult.ACCEPTED, (result.name, texts)
     assert board.records() == records_of(judge(plan))
 
 
