@@ -27,6 +27,8 @@ class Cost(IntEnum):  # its hash is an int's, in C: it is made for each datagram
     UPLOAD: a list that is announced, which costs log entries.
     BOARD: a request to the flight controller, which has a few hundred bytes a second to spare.
     PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.
+    COPIED: a copy of a station's frame for another station, alongside such an autopilot.
+    FOLLOWED: such an autopilot's telemetry for one station; its heartbeats are not counted.
     STORED: a list in the store that did not reach the flight controller.
     RECORDED: a ground station's frame in the telemetry log, whose space is mostly for the flight itself.
     """
@@ -39,6 +41,8 @@ class Cost(IntEnum):  # its hash is an int's, in C: it is made for each datagram
     UPLOAD = auto()
     BOARD = auto()
     PASSED = auto()
+    COPIED = auto()
+    FOLLOWED = auto()
     STORED = auto()
     RECORDED = auto()
 
@@ -63,6 +67,8 @@ LIMITS = {
     Cost.UPLOAD: Limit(Rate(4, 20), Rate(10, 400)),
     Cost.BOARD: Limit(Rate(4, 20), Rate(10, 40)),
     Cost.PASSED: Limit(Rate(200, 600), Rate(200, 600)),
+    Cost.COPIED: Limit(Rate(150, 300), Rate(150, 300)),
+    Cost.FOLLOWED: Limit(Rate(1000, 1000), Rate(1200, 1200)),
     Cost.STORED: Limit(Rate(1 / 10, 20), Rate(1 / 5, 40)),
     Cost.RECORDED: Limit(Rate(50, 400), Rate(100, 800)),
 }

@@ -59,7 +59,8 @@ class Ground:
         self._datagrams: list[tuple[Peer, bytes]] = []
         self._texts = RecentTexts()
         self._text_id = 0
-        self._now = 0.0
+        #: The time of the last input.
+        self.now = 0.0
         #: A text for each newcomer, about a problem that began before it connected.
         self.notice = ""
         #: Frames from ground stations whose checksum was wrong.
@@ -129,7 +130,7 @@ class Ground:
 
     def expire(self, now: float) -> list[Peer]:
         """Forget silent peers, and return them."""
-        self._now = now
+        self.now = now
         silent = self._stations.expire(now)
         for peer in silent:
             self._forget(peer)
@@ -152,7 +153,7 @@ class Ground:
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> list[MavlinkFrame]:
         """Parse bytes from a peer into frames. A datagram holds whole frames only."""
-        self._now = now
+        self.now = now
         splitter = self._splitters.get(peer)
         if splitter is None:
             splitter = MavlinkSplitter()
@@ -229,7 +230,7 @@ class Ground:
 
     def allows(self, station: Station, cost: Cost) -> bool:
         """Count work that a ground station causes; False if that exceeds its limit."""
-        return self.budgets.allows(cost, station.peer, self._now)
+        return self.budgets.allows(cost, station.peer, self.now)
 
     def to_as(self, sysid: int, compid: int, station: Station, message: Message) -> None:
         """Send a message to one ground station under the ids that it addressed."""
@@ -296,7 +297,7 @@ class Ground:
         """Send a text in pieces that fit STATUSTEXT; a refusal only once per attempt."""
         self._log_event("debug", "gcs.text", text=text)
         if severity is Severity.ERROR:
-            peers = self._texts.new_to(peers, text, self._now)
+            peers = self._texts.new_to(peers, text, self.now)
         if peers and self.is_recording and RECORDER not in peers:
             peers = [*peers, RECORDER]  # a text for one station is part of the flight's log, too
         pieces = split_text(text)

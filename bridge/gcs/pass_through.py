@@ -6,10 +6,13 @@ but its sender; one with a target only to where that system (and component) was 
 not heard yet go to the autopilot.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import takewhile
 
+from bridge.gcs.cost import Cost
 from bridge.gcs.ground import Ground
-from bridge.gcs.station import Peer
+from bridge.gcs.station import Peer, Station
+from bridge.gcs.stations import PRECEDENCE
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame
 from protocols.mavlink.target import has_target_field, target_of
@@ -22,6 +25,7 @@ _MAX_SPEAKERS = 64
 _MAX_KINDS = 1024
 #: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
+_HEARTBEAT = messages.MAVLINK_MSG_ID_HEARTBEAT
 
 
 class PassThrough:
@@ -57,7 +61,7 @@ class PassThrough:
         """The system on the autopilot's side that a frame for `system` is meant for (0: any); None: none."""
         return next((sysid for sysid, _ in self._aboard if system in (0, sysid)), None)
 
-    def from_station(self, peer: Peer, frame: MavlinkFrame, *, to_stations: bool = True) -> bool:
+    def from_station(self, station: Station, frame: MavlinkFrame, *, to_stations: bool = True) -> bool:
         """Send a frame that the guard accepted on to other stations; True if it is for the autopilot, too.
 
         `to_stations` False: its sender may only read, and reaches no other station.
@@ -68,20 +72,24 @@ class PassThrough:
             return False
         if not to_stations:
             return target_of(frame)[0] == 0 or self.is_aboard(target_of(frame)[0])
-        behind = self._heard.setdefault(peer, set())
+        behind = self._heard.setdefault(station.peer, set())
         if len(behind) < _MAX_SPEAKERS:
             behind.add(speaker)
         system, component = target_of(frame)
         if system == 0:
-            self._ground.forward([frame.raw], [other for other in self._ground.everyone() if other != peer])
+            self._copy(frame, station, self._ground.everyone())
             return True
-        others = [other for other in self._peers_of(system, component) if other != peer]
-        self._ground.forward([frame.raw], others)
+        others = [other for other in self._peers_of(system, component) if other != station.peer]
+        self._copy(frame, station, others)
         return self.is_aboard(system) or not others
 
     def forget(self, peer: Peer) -> None:
         """A ground station is gone."""
         self._heard.pop(peer, None)
+
+    def _copy(self, frame: MavlinkFrame, station: Station, peers: Iterable[Peer]) -> None:
+        others = (peer for peer in peers if peer != station.peer)
+        self._ground.forward([frame.raw], takewhile(lambda _: self._ground.allows(station, Cost.COPIED), others))
 
     def _peers_of(self, system: int, component: int) -> list[Peer]:
         def is_there(peer: Peer) -> bool:
@@ -112,7 +120,10 @@ class PassThrough:
 
     def _send(self, frames: list[bytes]) -> None:
         self._ground.on_frames(frames)
-        self._ground.forward(in_datagrams(frames), self._ground.everyone())
+        peers = self._ground.everyone()
+        if len(peers) > PRECEDENCE and _HEARTBEAT not in (MavlinkFrame(raw).msgid for raw in frames):
+            peers = [peer for peer in peers if self._ground.budgets.allows(Cost.FOLLOWED, peer, self._ground.now)]
+        self._ground.forward(in_datagrams(frames), peers)
 
 
 def in_datagrams(frames: Sequence[bytes]) -> list[bytes]:

@@ -217,7 +217,7 @@ class Incoming:
         if not self._ground.budgets.allows(Cost.PASSED, peer, now):
             return
         may_speak_to_others = self._guard.standing(peer) is not Standing.LISTENER
-        if not routes.from_station(peer, frame, to_stations=may_speak_to_others):
+        if not routes.from_station(station, frame, to_stations=may_speak_to_others):
             self._ground.record(peer, frame, now)
             return
         refused = self._guard.command_refusal(peer, frame)
