@@ -12,7 +12,7 @@ from bridge.gcs.pass_through import PassThrough
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.mission_download import MissionDownloads
-from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION, MissionUploads
+from bridge.vehicle.mission_upload import MissionUploads
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.parameters import Parameters
 from protocols.mavlink.codec import MavlinkDecoder
@@ -66,13 +66,9 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_MISSION_ACK: self._mission_ack,
             m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.partial_list(s, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, msg, now: downloads.request_list(s, msg.mission_type, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(
-                s, msg.seq, msg.mission_type, now, as_int=False
-            ),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(
-                s, msg.seq, msg.mission_type, now, as_int=True
-            ),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
             m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
                 s,
@@ -103,8 +99,20 @@ class MessageRouter:
     def take(self, station: Station, message: Message, now: float) -> None:
         """Handle a message for which `understands` is True, unless its sender exceeds its limit."""
         msgid = message.get_msgId()
-        if self._ground.allows(station, Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
+        if not self._ground.allows(station, Cost.TRANSFER if msgid in _OF_A_TRANSFER else Cost.ANSWER):
+            return
+        mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
+        clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
+        if mission_type == m.MAV_MISSION_TYPE_MISSION or clears_all:
             self._handlers[msgid](station, message, now)
+        elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
+            self._refuse_mission_type(station, msgid, mission_type)
+
+    def _refuse_mission_type(self, station: Station, msgid: int, mission_type: int) -> None:
+        if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
+            self._ground.say(Severity.ERROR, "No fences or rally points: only missions are stored", station)
+        ack = m.MAVLink_mission_ack_message(station.sysid, station.compid, MissionResult.UNSUPPORTED, mission_type)
+        self._ground.to(station, ack)
 
     def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):
@@ -113,20 +121,19 @@ class MessageRouter:
                 station, m.MAVLink_mission_ack_message(station.sysid, station.compid, MissionResult.DENIED, 0)
             )
             return
-        self._uploads.item(station, item, message.mission_type, now)
+        self._uploads.item(station, item, now)
 
     def _mission_count(self, station: Station, message: Message, now: float) -> None:
         self._downloads.forget(station)
-        self._uploads.count(station, message.count, message.mission_type, now)
+        self._uploads.count(station, message.count, now)
 
     def _mission_clear(self, station: Station, message: Message, now: float) -> None:
         self._downloads.forget(station)
-        self._uploads.clear_all(station, message.mission_type, now)
+        self._uploads.clear_all(station, now)
 
     def _mission_ack(self, station: Station, message: Message, now: float) -> None:
-        if message.mission_type == MISSION_TYPE_MISSION:
-            self._downloads.forget(station)
-            self._uploads.ack(station, message.type, now)
+        self._downloads.forget(station)
+        self._uploads.ack(station, message.type, now)
 
     def _set_current(self, station: Station, _message: Message, _now: float) -> None:
         self._ground.say(Severity.ERROR, "The current waypoint cannot be set", station)

@@ -10,7 +10,6 @@ from bridge.missions.mission_service import HeldMission
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Home
 from bridge.vehicle.mission_context import MissionContext
-from bridge.vehicle.mission_upload import MISSION_TYPE_MISSION
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.mission_messages import item_message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
@@ -57,20 +56,15 @@ class MissionDownloads:
         self._is_reading = False
         self._homeless_since = inf
 
-    def request_list(self, station: Station, mission_type: int, now: float) -> None:
+    def request_list(self, station: Station, now: float) -> None:
         """MISSION_REQUEST_LIST."""
-        if mission_type != MISSION_TYPE_MISSION:
-            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
-        elif self._vehicle.armed:
+        if self._vehicle.armed:
             self._refuse(station, _ARMED)
         else:
             self._ask(_Question(station, None, as_int=True), now)
 
-    def request(self, station: Station, seq: int, mission_type: int, now: float, *, as_int: bool) -> None:
+    def request(self, station: Station, seq: int, now: float, *, as_int: bool) -> None:
         """MISSION_REQUEST or MISSION_REQUEST_INT; item 0 is served at any time (Mission Planner asks on arming)."""
-        if mission_type != MISSION_TYPE_MISSION:
-            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
-            return
         question = _Question(station, seq, as_int)
         snapshot = self._snapshots.get(station)
         if self._vehicle.armed:
@@ -137,9 +131,7 @@ class MissionDownloads:
             self._ack(question.station, MissionResult.INVALID_SEQUENCE)
 
     def _send_count(self, station: Station, count: int) -> None:
-        self._ground.to(
-            station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count, MISSION_TYPE_MISSION)
-        )
+        self._ground.to(station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count))
 
     def _send_item(self, station: Station, item: MissionItem, *, as_int: bool) -> None:
         self._ground.to(station, item_message(item, station.sysid, station.compid, as_int=as_int))
@@ -171,8 +163,5 @@ class MissionDownloads:
         self._ground.say(Severity.ERROR, refusal.text, station)
         self._ack(station, refusal.ack)
 
-    def _ack(self, station: Station, result: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
-        self._ground.to(
-            station,
-            messages.MAVLink_mission_ack_message(station.sysid, station.compid, result, mission_type),
-        )
+    def _ack(self, station: Station, result: MissionResult) -> None:
+        self._ground.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, result))

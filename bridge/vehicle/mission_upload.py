@@ -45,8 +45,6 @@ from bridge.vehicle.upload_states import (
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
-MISSION_TYPE_MISSION = 0
-MISSION_TYPE_ALL = 255
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 #: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
@@ -71,6 +69,8 @@ class _Upload:
     state: UploadState
     #: Its ground station has announced another list while this one was written.
     is_superseded: bool = False
+    #: Its ground station has sent a MISSION_COUNT of 0.
+    is_cancelled: bool = False
 
 
 class MissionUploads:
@@ -110,21 +110,19 @@ class MissionUploads:
 
     # From ground stations.
 
-    def count(self, station: Station, count: int, mission_type: int, now: float) -> None:
+    def count(self, station: Station, count: int, now: float) -> None:
         """MISSION_COUNT: an upload is announced."""
-        if mission_type != MISSION_TYPE_MISSION:
-            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
-            return
         self._follow(station, now)
         present = self._of(station)
-        if present is None or not self._is_for(present, count, now):
+        answer = self._answers.to(station, now)
+        if present is None and not count and answer is not None and now < answer.cancelled_until:
+            # A repeated Cancel, whose answer was lost: it must not clear the mission on the craft.
+            self._ack(station, answer.ack)
+        elif present is None or not self._is_for(present, count, now):
             self._begin(station, count, now)
 
-    def clear_all(self, station: Station, mission_type: int, now: float) -> None:
+    def clear_all(self, station: Station, now: float) -> None:
         """MISSION_CLEAR_ALL."""
-        if mission_type not in (MISSION_TYPE_MISSION, MISSION_TYPE_ALL):
-            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
-            return
         self._follow(station, now)
         present = self._of(station)
         if present is not None and not isinstance(present.state, Delivering):
@@ -133,11 +131,8 @@ class MissionUploads:
             return
         self._begin(station, 0, now)
 
-    def item(self, station: Station, item: MissionItem, mission_type: int, now: float) -> None:
+    def item(self, station: Station, item: MissionItem, now: float) -> None:
         """MISSION_ITEM or MISSION_ITEM_INT."""
-        if mission_type != MISSION_TYPE_MISSION:
-            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
-            return
         self._follow(station, now)
         upload = self._of(station)
         if upload is None:
@@ -326,13 +321,15 @@ class MissionUploads:
     def _is_for(self, upload: _Upload, count: int, now: float) -> bool:
         """Handle a MISSION_COUNT of a station whose upload runs; False if it announces a new one."""
         state = upload.state
-        if isinstance(state, Delivering):
-            # The previous list is being written. A cancel comes too late, a new list waits for its turn.
-            return count == 0
         if count == 0:
-            # Mission Planner's Cancel button, not a request to clear the mission on the craft.
-            self._end([upload], _cancelled("cancelled"), now)
+            # Mission Planner's Cancel button, or a clear again. A list that is being written cannot be cancelled.
+            upload.is_cancelled = upload.count > 0
+            if upload.is_cancelled and not isinstance(state, Delivering):
+                self._end([upload], _cancelled("cancelled"), now)
             return True
+        if isinstance(state, Delivering):
+            # The previous list is being written, the new one waits for its turn.
+            return False
         if isinstance(state, Waiting):
             upload.count = count
             return True
@@ -371,9 +368,7 @@ class MissionUploads:
         assert isinstance(state, Receiving)
         state.request.asked(state.wanted, now)
         station = upload.station
-        request = messages.MAVLink_mission_request_message(
-            station.sysid, station.compid, state.wanted, MISSION_TYPE_MISSION
-        )
+        request = messages.MAVLink_mission_request_message(station.sysid, station.compid, state.wanted)
         self._ground.to(station, request)
         if state.request.is_repeated:
             for elsewhere in self._elsewhere(upload, now):
@@ -489,14 +484,11 @@ class MissionUploads:
 
     def _answer(self, upload: _Upload, ack: MissionResult, now: float) -> None:
         for where in (upload.station, *self._elsewhere(upload, now)):
-            self._answers.note(where, ack, upload.count, now)
+            self._answers.note(where, ack, upload.count, now, is_cancelled=upload.is_cancelled)
             self._ack(where, ack)
 
-    def _ack(self, station: Station, ack: MissionResult, mission_type: int = MISSION_TYPE_MISSION) -> None:
-        self._ground.to(
-            station,
-            messages.MAVLink_mission_ack_message(station.sysid, station.compid, ack, mission_type),
-        )
+    def _ack(self, station: Station, ack: MissionResult) -> None:
+        self._ground.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, ack))
 
     def _note(self, event: str, upload: _Upload, level: Level = "info", **facts: object) -> None:
         self._context.log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)

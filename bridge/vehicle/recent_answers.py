@@ -7,19 +7,21 @@ from dataclasses import dataclass
 from bridge.gcs.station import Station
 from protocols.mission_item import MissionResult
 
-#: Mission Planner sends its last item for 5 s.
+#: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
 _MEMORY_S = 10.0
+_CANCEL_S = 3.0
 #: More than there are ground stations; made-up ids replace the oldest entry.
 _MOST = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A MISSION_ACK that ended an upload of `count` items."""
+    """A MISSION_ACK that ended an upload of `count` items; a repeated cancel is answered until `cancelled_until`."""
 
     ack: MissionResult
     count: int
     until: float
+    cancelled_until: float
 
     @property
     def is_refusal(self) -> bool:
@@ -34,13 +36,13 @@ class RecentAnswers:
         self._has_moved = has_moved
         self._answers: dict[Station, Answer] = {}  # oldest first
 
-    def note(self, station: Station, ack: MissionResult, count: int, now: float) -> None:
-        """A final answer was sent."""
+    def note(self, station: Station, ack: MissionResult, count: int, now: float, *, is_cancelled: bool = False) -> None:
+        """A final answer was sent; `is_cancelled`: the station had cancelled the upload."""
         self._forget_old(now)
         self._answers.pop(station, None)
         if len(self._answers) >= _MOST:
             del self._answers[next(iter(self._answers))]
-        self._answers[station] = Answer(ack, count, now + _MEMORY_S)
+        self._answers[station] = Answer(ack, count, now + _MEMORY_S, now + _CANCEL_S if is_cancelled else now)
 
     def forget(self, station: Station) -> None:
         """The ground station has begun a new upload."""

@@ -62,8 +62,8 @@ def requested(station: GroundStation) -> list[int]:
     return [message.seq for message in station.said("MISSION_REQUEST")]
 
 
-def partial_list_message() -> Message:
-    return messages.MAVLink_mission_write_partial_list_message(1, 1, 0, 0, 0)
+def partial_list_message(mission_type: int = 0) -> Message:
+    return messages.MAVLink_mission_write_partial_list_message(1, 1, 0, 0, mission_type)
 
 
 def assert_refusal_stands(world: World, station: GroundStation, result: MissionResult) -> None:
@@ -104,6 +104,7 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         count_message(5, mission_type),
         item_message(0, OLD[0], mission_type=mission_type),
         item_message(0, OLD[0], mission_type=mission_type, as_int=False),
+        partial_list_message(mission_type),
     ):
         station.take()
         station.send(message)
@@ -770,10 +771,31 @@ def test_a_count_of_0_during_an_upload_cancels_it(sent: int) -> None:
     """It is Mission Planner's Cancel button; the list on board must not be erased."""
     world, station = holding()
     receiving(world, station, waypoints(8), sent)
+    # Mission Planner repeats it if the answer is lost: that is no request to clear the mission either.
+    for _ in range(4):
+        station.send(count_message(0))
+        world.run(0.7)
+        assert set(acks(station)) == {A.OPERATION_CANCELLED}
+        assert world.stored == OLD_RECORDS
+    world.run(1)
     station.send(count_message(0))
     world.run(1)
-    assert acks(station) == [A.OPERATION_CANCELLED]
-    assert world.stored == OLD_RECORDS
+    assert acks(station)[-1] is A.ACCEPTED
+    assert world.stored == ()
+
+
+def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
+    world, station = holding()
+    second = GroundStation(world, "second", sysid=254)
+    receiving(world, station, waypoints(8), 3)
+    for _ in range(3):
+        second.send(count_message(0))
+        world.run(0.3)
+    assert acks(second) == []
+    station.send(ack_message(A.ERROR))
+    world.run(1)
+    assert acks(second) == [A.ACCEPTED]
+    assert world.stored == ()
 
 
 def test_a_late_cancel_erases_nothing() -> None:
@@ -781,9 +803,10 @@ def test_a_late_cancel_erases_nothing() -> None:
     items = waypoints(30)
     receiving(world, station, items, 30)
     assert state(world) is Delivering
-    station.send(count_message(0))
-    world.run(3)
-    assert acks(station) == [A.ACCEPTED]
+    for _ in range(4):
+        station.send(count_message(0))
+        world.run(0.7)
+    assert set(acks(station)) == {A.ACCEPTED}
     assert world.stored == records_of(items)
 
 
