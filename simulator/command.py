@@ -32,11 +32,11 @@ _PATH = click.Path(path_type=Path)
 
 def _load_core(path: Path, capacity: int) -> BootMissions:
     if capacity != CORE_CAPACITY:
-        raise click.ClickException(f"The compiled core holds {CORE_CAPACITY} records: omit --capacity.")
+        raise click.ClickException(f"the compiled core holds {CORE_CAPACITY} records: omit --capacity")
     try:
         return load_core(path)
     except OSError as error:
-        raise click.ClickException(f"Cannot load the core: {error}. Make it with: make -C firmware sim") from error
+        raise click.ClickException(f"the core cannot be loaded: {error}; make it with: make -C firmware sim") from error
 
 
 #: The options that --image and --play allow: the rest depends on the firmware, or is recorded.
@@ -56,7 +56,7 @@ def _refuse_options(mode: str, is_refused: Callable[[str], bool]) -> None:
     for parameter in context.command.params:
         name = parameter.name or ""
         if is_refused(name) and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"{parameter.opts[0]} has no effect with {mode}: omit it.")
+            raise click.UsageError(f"{parameter.opts[0]} has no effect with {mode}: omit it")
 
 
 def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[str, int] | None:
@@ -64,7 +64,7 @@ def _address(_: click.Context, __: click.Parameter, value: str | None) -> tuple[
         return None
     host, _colon, port = value.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise click.BadParameter(f"{value!r} is not HOST:PORT, for instance 127.0.0.1:5760.")
+        raise click.BadParameter(f"{value!r} is not HOST:PORT, for instance 127.0.0.1:5760")
     return host, int(port)
 
 
@@ -148,7 +148,7 @@ def sim(
 ) -> None:
     """Simulate a Naze with Harakiri, or another flight controller, until Ctrl-C."""
     if (link is None) == (tcp is None):
-        raise click.UsageError("Specify the connection: --link PATH or --tcp HOST:PORT.")
+        raise click.UsageError("specify the connection: --link PATH or --tcp HOST:PORT")
     faults = Faults(armed=armed, extension=not no_extension, bit_error_rate=bit_errors, lost_byte_rate=lost_bytes)
     running = Running(link, tcp, control, hang_after, power_cut_after)
     if image is not None:
@@ -162,7 +162,7 @@ def sim(
         return
     if play is not None:
         if link is None:
-            raise click.UsageError("--play needs --link.")
+            raise click.UsageError("--play needs --link")
         _refuse_options("--play", lambda name: name not in _WITH_PLAY)
         play_capture(play, link, speed)
         return

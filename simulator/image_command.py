@@ -22,12 +22,12 @@ def run_image(path: Path, faults: Faults, running: Running, state: Path | None, 
         from simulator.emulated_naze.board import EmulatedNaze  # Unicorn is optional
     except ImportError as error:
         raise click.ClickException(
-            "--image needs the emulator: pip install 'naze-bridge[emulator]' (or the package unicorn)."
+            "--image needs the emulator: pip install 'naze-bridge[emulator]' (or the package unicorn)"
         ) from error
     try:
         image = load_image(path)
     except (ImageError, OSError) as error:
-        raise click.ClickException(f"Cannot run the image: {error}.") from error
+        raise click.ClickException(f"the image cannot be run: {error}") from error
     blank = b"\xff" * FLASH_SIZE
     flash = open_memory(state, blank, "name another file") if state else None
     switches = EmulatedFaults(

@@ -17,7 +17,5 @@ def open_memory(path: Path, blank: bytes, hint: str) -> memoryview:
             if found == len(blank):
                 return memoryview(mmap.mmap(file.fileno(), found))
     except OSError as error:
-        raise click.ClickException(f"Cannot use the state file {path}: {error.strerror}.") from error
-    raise click.ClickException(
-        f"The state file {path} has {found} bytes, but this board's memory has {len(blank)}: {hint}."
-    )
+        raise click.ClickException(f"the state file {path} cannot be used: {error.strerror}") from error
+    raise click.ClickException(f"the state file {path} has {found} bytes, but this board's memory {len(blank)}: {hint}")

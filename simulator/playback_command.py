@@ -21,9 +21,9 @@ def _player(path: Path, tempo: float) -> CapturePlayer:
     try:
         events = read_capture(path.read_bytes())
     except OSError as error:
-        raise click.ClickException(f"Cannot read {path}: {error.strerror}.") from error
+        raise click.ClickException(f"{path} cannot be read: {error.strerror}") from error
     if not events:
-        raise click.ClickException(f"{path} is not a UART capture; make one with naze-bridge run --record-uart FILE.")
+        raise click.ClickException(f"{path} is not a UART capture; make one with naze-bridge run --record-uart FILE")
     return CapturePlayer(events, tempo)
 
 
@@ -44,6 +44,6 @@ async def _play(player: CapturePlayer, path: Path, link: Path) -> None:
         click.echo(f"Playing {path} at {link} for {player.duration_s:.0f} s. Ctrl-C ends it.")
         await stop.wait()
     except PlugError as error:
-        raise click.ClickException(f"{error}.") from error
+        raise click.ClickException(str(error)) from error
     finally:
         port.unplug()

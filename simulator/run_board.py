@@ -56,9 +56,9 @@ async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive
         click.echo(f"Simulated {name} at {place}. Ctrl-C ends it.")
         await stop.wait()
     except PlugError as error:
-        raise click.ClickException(f"{error}.") from error
+        raise click.ClickException(str(error)) from error
     except OSError as error:
-        raise click.ClickException(f"Cannot create {running.control}: {error.strerror}.") from error
+        raise click.ClickException(f"{running.control} cannot be created: {error.strerror}") from error
     finally:
         plug.unplug()
         obedience.close()

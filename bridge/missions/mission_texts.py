@@ -19,11 +19,12 @@ def summary(sent: int, verdict: Verdict[Any]) -> str | None:
         return None
     if not verdict.items:
         return warnings[-1].text()
-    dropped = sum(finding.becomes == DROPPED for finding in warnings)
-    relative = sum(finding.field == "frame" and finding.seq != 0 for finding in warnings)
-    raised = sum(finding.field == "alt_m" and finding.becomes not in (DROPPED, finding.was) for finding in warnings)
-    home = sum(finding.seq == 0 for finding in warnings)
-    differing = len(warnings) - dropped - relative - raised - home
+    dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)
+    kept = [finding for finding in warnings if finding.becomes != DROPPED]
+    relative = sum(finding.field == "frame" and finding.seq != 0 for finding in kept)
+    raised = sum(finding.field == "alt_m" and finding.becomes != finding.was for finding in kept)
+    home = sum(finding.seq == 0 for finding in kept)
+    differing = len(kept) - relative - raised - home
     counts = {"dropped": dropped, "heights relative": relative, "raised from 0": raised, "flown differently": differing}
     news = [f"{count} {what}" for what, count in counts.items() if count]
     return f"{len(verdict.items)} of {sent} stored: {', '.join(news) or 'check home'}"

@@ -71,7 +71,8 @@ def ask_with_progress(state_dir: Path | None, fc: str | None, request: Json, tot
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (TextColumn("[progress.description]{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("Flight controller", total=total)
         with nullcontext() if fc is not None else _first_interrupt(lambda: bar.console.out(f"naze-bridge: {_GOES_ON}")):
             return ask(state_dir, fc, request, lambda records: bar.update(task, completed=records))

@@ -51,7 +51,9 @@ def demo(file: Path, once: bool, port: int) -> None:
                     _stay(address, process, state_dir, console)
         finally:
             shutil.rmtree(state_dir, ignore_errors=True)
-    except (MissionFileError, ClientError, ControlError) as error:
+    except MissionFileError as error:
+        raise click.UsageError(str(error)) from error
+    except (ClientError, ControlError) as error:
         fail(str(error))
 
 

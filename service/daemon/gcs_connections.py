@@ -13,7 +13,7 @@ from service.links.traffic import Traffic
 from service.machine.package import page
 from service.settings.addresses import GcsAddress
 
-_WHO_MAY_WRITE = f"anyone who reaches it may write missions and parameters; to restrict it: {page('docs/signing.md')}"
+_WHO_MAY_WRITE = f"anyone on this network can change missions and parameters; to restrict it: {page('docs/signing.md')}"
 
 _log = structlog.get_logger()
 

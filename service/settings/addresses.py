@@ -83,7 +83,7 @@ _FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT or sim"
 _GCS_FORMS = "use udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT or tcpin:HOST:PORT"
 _PORT_NAMES = ("tty", "serial", "rfcomm", "naze")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
-_NEXT_LINK = re.compile(r",\s*(?=[A-Za-z]+:)")
+_NEXT_LINK = re.compile(r"[,\s]\s*(?=[A-Za-z]+:)")
 
 
 def parse_fc(text: str) -> FcAddress:

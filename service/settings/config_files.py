@@ -71,7 +71,7 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
         problems.append(Problem(str(path), f"this cannot be read: {error.strerror}"))
         return {}
     except (ValueError, RecursionError) as error:
-        problems.append(Problem(str(path), f"this is not valid TOML: {error}"))
+        problems.append(Problem(str(path), f"this is not valid TOML (text needs quotes, a list brackets): {error}"))
         return {}
     lines = key_lines(text)
     found: dict[str, Given] = {}
@@ -87,7 +87,7 @@ def _read_file(path: Path, problems: list[Problem]) -> dict[str, Given]:
         else:
             unknown.append((where, name))
     for where, name in unknown[:_MOST_UNKNOWN]:
-        problems.append(Problem(where, f"{short(name)} is not a setting; {nearest(name, _NAMES)}"))
+        problems.append(Problem(where, f"{short(name)} is not a setting; {nearest(name, (*_NAMES, *TABLES))}"))
     if len(unknown) > _MOST_UNKNOWN:
         text = f"{len(unknown) - _MOST_UNKNOWN} more are not settings: is this naze-bridge's file?"
         problems.append(Problem(str(path), text))

@@ -33,4 +33,4 @@ class WebSettings:
 
 def parse_listen(text: str) -> ListenAddress:
     """Read "HOST:PORT"; AddressError gives the reason."""
-    return ListenAddress(*parse_host_port(f"web.listen {text}", text, _FORMS))
+    return ListenAddress(*parse_host_port(text, text, _FORMS))

@@ -43,6 +43,8 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
         return f"the host name {host!r} is unknown"
     except TimeoutError:
         return "no answer"
+    except ConnectionRefusedError:
+        return "no router is running there (connection refused)"
     except OverflowError:
         return "a port is at most 65535"
     except OSError as error:

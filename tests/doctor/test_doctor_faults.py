@@ -210,7 +210,7 @@ def test_a_flight_controller_in_its_command_line() -> None:
 
 def test_a_daemon_is_asked_and_the_port_left_alone() -> None:
     (daemon, found) = check_flight_controller(PORT, lambda: STATUS, no_answer)
-    assert_ok(daemon, "runs, and was asked")
+    assert_ok(daemon, "running")
     assert_ok(found, "Harakiri, MSP at 115200 baud, disarmed")
 
 
@@ -253,7 +253,7 @@ def test_zenoh(tmp_path: Path) -> None:
     assert_ok(check_zenoh(None), "off")
     assert_ok(check_zenoh(ZenohSettings(vehicle="naze-1")), "fleet/naze-1, opens no connections")
     nowhere = ZenohSettings(vehicle="naze-1", connect=("tcp/127.0.0.1:9",))
-    assert_note(check_zenoh(nowhere), "tcp/127.0.0.1:9: connection refused")
+    assert_note(check_zenoh(nowhere), "tcp/127.0.0.1:9: no router is running there")
     (tmp_path / "zenoh.json5").write_text("{mode: ")
     broken = ZenohSettings(vehicle="naze-1", config_file=tmp_path / "zenoh.json5")
     assert_problem(check_zenoh(broken), "zenoh.json5", "config_file")

@@ -125,7 +125,7 @@ def test_a_library_that_is_not_the_core(tmp_path: Path) -> None:
     wrong = tmp_path / "core.so"
     wrong.write_text("not a library")
     for options, said in [
-        (("--core", str(wrong)), "Cannot load the core"),
+        (("--core", str(wrong)), "the core cannot be loaded"),
         (("--core", str(tmp_path / "none.so")), "does not exist"),
         (("--core", str(library()), "--capacity", "20"), "holds 146 records: omit --capacity"),
     ]:

@@ -29,7 +29,7 @@ def test_a_running_daemon_is_asked_and_not_disturbed(start: Starter) -> None:
     asked = until(lambda: bench.daemon.status(), "a daemon")
     ended = run_naze_bridge("doctor", "--config", config, "--state-dir", bench.daemon.state_dir, "--json")
     found = {line["check"]: line for line in map(json.loads, ended.stdout.splitlines())}
-    assert found["daemon"]["found"] == "runs, and was asked"
+    assert found["daemon"]["found"] == "running"
     assert asked["flight_controller"] in found["flight controller"]["found"]
     assert found["missions"]["grade"] == "ok"
     assert found["port for ground stations"]["found"].startswith(f"UDP port {bench.daemon.port} is ")
@@ -45,7 +45,7 @@ def test_the_running_service_is_asked(start: Starter, monkeypatch: pytest.Monkey
     start.daemon("sim:")
     monkeypatch.setenv("XDG_STATE_HOME", str(start.directory / "a home without a daemon"))
     until(lambda: run_naze_bridge("status").returncode == 0, "a reply of the service")
-    assert "daemon: runs, and was asked" in run_naze_bridge("doctor", "--fc", "sim:").stdout
+    assert "daemon: running" in run_naze_bridge("doctor", "--fc", "sim:").stdout
 
 
 def test_without_problems_the_exit_status_is_0(tmp_path: Path) -> None:

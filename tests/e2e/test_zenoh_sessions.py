@@ -212,4 +212,4 @@ def test_a_failed_connection_is_reported_with_its_reason(start: Starter) -> None
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a log entry about it")
-    assert alone["why"] == f"{where}: connection refused"
+    assert alone["why"] == f"{where}: no router is running there (connection refused)"

@@ -50,8 +50,8 @@ def test_the_endpoint_comes_from_the_daemons_configuration(router: Router, tmp_p
 
 def test_no_router() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-    sentence = sentence_of("list", "--connect", endpoint)
-    assert sentence == f"naze-bridge: cannot join the fleet: {endpoint}: connection refused"
+    reason = f"{endpoint}: no router is running there (connection refused)"
+    assert sentence_of("list", "--connect", endpoint) == f"naze-bridge: cannot join the fleet: {reason}"
 
 
 def test_another_program_on_the_routers_port() -> None:

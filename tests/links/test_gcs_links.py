@@ -289,7 +289,7 @@ def test_other_programs_notations_of_flight_controllers(text: str, meant: str) -
 
 
 def test_several_links_in_one_value() -> None:
-    assert split_gcs("udpin:14550,tcpin:5760, udpout:pc,14551") == ["udpin:14550", "tcpin:5760", "udpout:pc,14551"]
+    assert split_gcs("udpin:14550,tcpin:5760 udpout:pc,14551") == ["udpin:14550", "tcpin:5760", "udpout:pc,14551"]
 
 
 def test_ipv6_without_brackets_is_explained() -> None:

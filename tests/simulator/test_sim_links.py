@@ -192,12 +192,12 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--link", "{}/none/naze"], "Error: {}/none/naze cannot be created: No such file or directory.\n"),
-        (["--link", "{}/file"], "Error: {}/file already exists: use another --link, or remove it.\n"),
-        (["--link", "{}/link"], "Error: {}/link already exists: use another --link, or remove it.\n"),
-        (["--link", "{}/naze", "--control", "{}/none/socket"], "Error: Cannot create {}/none/socket: No such file or"),
-        (["--link", "{}/naze", "--state", "{}/none/flash"], "Error: Cannot use the state file {}/none/flash: "),
-        (["--link", "{}/naze", "--state", "{}/file"], "Error: The state file {}/file has 4 bytes, but this board's"),
+        (["--link", "{}/none/naze"], "Error: {}/none/naze cannot be created: No such file or directory\n"),
+        (["--link", "{}/file"], "Error: {}/file already exists: use another --link, or remove it\n"),
+        (["--link", "{}/link"], "Error: {}/link already exists: use another --link, or remove it\n"),
+        (["--link", "{}/naze", "--control", "{}/none/socket"], "Error: {}/none/socket cannot be created: "),
+        (["--link", "{}/naze", "--state", "{}/none/flash"], "Error: the state file {}/none/flash cannot be used: "),
+        (["--link", "{}/naze", "--state", "{}/file"], "Error: the state file {}/file has 4 bytes, but this board's"),
     ],
 )
 def test_obstacles_at_start_are_reported(tmp_path: Path, options: list[str], complaint: str) -> None:

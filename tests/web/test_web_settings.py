@@ -35,7 +35,7 @@ def test_the_environment_variable_is_enough(tmp_path: Path, monkeypatch: pytest.
         ("web = true", ["web", "a table"]),
         ("[web]\nlisen = 'x'", ["web.lisen", "web.listen"]),
         ("[web]\nlisten = 8080", ["web.listen is 8080", '"HOST:PORT"']),
-        ("[web]\nlisten = '8080'", ["web.listen 8080", "needs a host and a port", "0.0.0.0:8080"]),
+        ("[web]\nlisten = '8080'", ["'8080' needs a host and a port", "0.0.0.0:8080"]),
         ("[web]\nlisten = ':::80'", ["brackets"]),
         ("[web]\nlisten = '0.0.0.0:99999'", ["99999", "not a port number"]),
         ("[web]\nhosts = ['naze.example:8080']", ["web.hosts holds 'naze.example:8080'", "not a host name"]),

@@ -24,7 +24,7 @@ def check_flight_controller(
     except ControlError:
         pass
     else:
-        return [ok("daemon", "runs, and was asked"), _who(fc, status)]
+        return [ok("daemon", "running"), _who(fc, status)]
     if ask_port is None:
         return [
             note(

@@ -106,7 +106,7 @@ def _look_into(path: Path) -> Checked:
     except sqlite3.Error as error:
         finding = str(error)
     if finding == "ok":
-        return ok("missions", f"{count} stored in {path}, whole")
+        return ok("missions", f"{count} stored in {path}, intact")
     remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"
     return problem("missions", f"{path} is damaged: {finding}", remedy)
 
