@@ -31,10 +31,10 @@ T = TypeVar("T")
 
 
 @asynccontextmanager
-async def vehicle_at(port: int) -> AsyncIterator[Any]:
-    """Connect MAVSDK; return the vehicle it finds."""
+async def vehicle_at(port: int, *, listen: bool = False) -> AsyncIterator[Any]:
+    """Connect MAVSDK, or let it wait for the vehicle there (`listen`); return the vehicle it finds."""
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
-        await mavsdk.add_any_connection(f"udpout://127.0.0.1:{port}")
+        await mavsdk.add_any_connection(f"{'udpin' if listen else 'udpout'}://127.0.0.1:{port}")
         system = await mavsdk.first_autopilot(timeout_s=PATIENCE)
         assert system is not None
         yield system

@@ -1,31 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mission Planner through zenoh: `fleet mavlink`, with the daemon behind a router."""
+"""Ground stations through zenoh: `fleet mavlink`, with the daemon behind a router."""
 
+import signal
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawResult
+from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
+from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
 from tests.support.fleet_bench import I_KNOW, Fleet
 from tests.support.mission_planner import MissionPlanner
-from tests.support.plan import judge, plain_plan, records_of
+from tests.support.plan import expected_fields, judge, mixed_plan, plain_plan, records_of
 from tests.support.programs import Program, free_port, until
 
 
-class Relay(Program):
+@contextmanager
+def relay(folder: Path, fleet: Fleet, vehicle: str, gcs: str) -> Iterator[Program]:
     """The command as a process."""
-
-    def __init__(self, folder: Path, fleet: Fleet, vehicle: str, gcs: str) -> None:
-        where = ("--connect", fleet.router.endpoint)
-        super().__init__(folder / "relay.log", "fleet", "mavlink", "--vehicle", vehicle, "--gcs", gcs, *where)
+    where = ("--connect", fleet.router.endpoint)
+    program = Program(folder / "relay.log", "fleet", "mavlink", "--vehicle", vehicle, "--gcs", gcs, *where)
+    try:
+        until(lambda: f"{vehicle} is at" in program.printed or not program.is_alive, "the relay")
+        yield program
+    finally:
+        code = program.end()
+    assert "Traceback" not in program.printed
+    assert code in (0, 130, -15)
 
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
-        fleet.start("kite", commands=I_KNOW + "mavlink_in = true\n")
+        fleet.start("kite", fc=fleet.board("kite").fc, commands=I_KNOW + "mavlink_in = true\n")
         fleet.wait("kite")
         yield fleet
 
@@ -33,19 +43,52 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
 @pytest.mark.parametrize("kind", ["udpout", "udpin"])
 def test_mission_planner_writes_and_reads_a_mission(fleet: Fleet, tmp_path: Path, kind: str) -> None:
     address = ("127.0.0.1", free_port())
-    relay = Relay(tmp_path, fleet, "kite", f"{kind}:127.0.0.1:{address[1]}")
-    try:
-        until(lambda: "kite is at" in relay.printed or not relay.is_alive, "the relay")
-        with MissionPlanner(address, listen=kind == "udpout") as planner:
-            planner.be_connected()
-            plan = plain_plan(20, start=3)
-            planner.write(plan)
-            assert fleet.daemons["kite"].held()["records"] == records_of(judge(plan))
-            assert len(planner.read()) == 20
-    finally:
-        code = relay.end()
-    assert "Traceback" not in relay.printed
-    assert code in (0, 130, -15)
+    with (
+        relay(tmp_path, fleet, "kite", f"{kind}:127.0.0.1:{address[1]}"),
+        MissionPlanner(address, listen=kind == "udpout") as planner,
+    ):
+        planner.be_connected()
+        plan = plain_plan(20, start=3)
+        planner.write(plan)
+        assert fleet.daemons["kite"].held()["records"] == records_of(judge(plan))
+        assert len(planner.read()) == 20
+
+
+async def test_mavsdk_flies_through_the_fleet(fleet: Fleet, tmp_path: Path) -> None:
+    port, board = free_port(), fleet.boards["kite"]
+    with relay(tmp_path, fleet, "kite", f"udpout:127.0.0.1:{port}"):
+        async with vehicle_at(port, listen=True) as vehicle:
+            missions = MissionRawAsync(vehicle)
+            plan = mixed_plan(146)
+            await missions.upload_mission(raw_items(plan))
+            assert board.records() == records_of(judge(plan))
+            assert [fields(item) for item in await missions.download_mission()] == expected_fields(plan)
+            await missions.clear_mission()
+            until(lambda: board.records() == [], "an empty board")
+            plan = plain_plan(12, start=20)
+            await missions.upload_mission(raw_items(plan))
+            board.set("armed 1")
+            async for armed in TelemetryAsync(vehicle).subscribe_armed():
+                if armed:
+                    break
+            assert await refusal_of(missions, plain_plan(7)) == MissionRawResult.DENIED
+            assert board.records() == records_of(judge(plan))
+            board.set("armed 0")
+
+
+def test_a_vehicle_that_accepts_no_mavlink_is_reported(fleet: Fleet, tmp_path: Path) -> None:
+    owl = fleet.start("owl", commands="")
+    fleet.wait("owl")
+    with relay(tmp_path, fleet, "owl", f"udpout:127.0.0.1:{free_port()}") as program:
+        until(lambda: "owl accepts no MAVLink" in program.printed, "the reason")
+    owl.end()
+    with relay(tmp_path, fleet, "kite", f"udpout:127.0.0.1:{free_port()}") as program:
+        until(lambda: "kite is at" in program.printed, "the relay")
+        fleet.router.process.send_signal(signal.SIGKILL)
+        until(lambda: "kite accepts no MAVLink" in program.printed, "the loss")
+        fleet.router.process.wait()
+        fleet.router.start_again()
+        until(lambda: "kite accepts MAVLink again" in program.printed, "its return")
 
 
 def test_an_unknown_vehicle(fleet: Fleet) -> None:

@@ -32,6 +32,7 @@ from service.cli.printing import print_json, print_table
 from service.cli.sentences import fail
 
 _STANDARD_OUTPUT = Path("-")
+_READ_ONLY = "accepts no MAVLink: zenoh.mavlink_in is off there, the router denies access, or it is not connected"
 
 
 @click.group(cls=CommandGroup)
@@ -144,8 +145,11 @@ def mavlink(name: str, gcs: tuple[str, ...], **where: Any) -> None:
     with fleet_session(where) as (session, prefix):
         chosen(alive(session, prefix), (name,), prefix)
 
+        def told(accepts: bool) -> None:
+            click.echo(f"{name} {'accepts MAVLink again' if accepts else _READ_ONLY}", err=True)
+
         async def relay() -> None:
-            relay = GcsRelay(session, prefix, name, addresses)
+            relay = GcsRelay(session, prefix, name, addresses, told)
             click.echo(f"{name} is at {', '.join(gcs)}. Ctrl-C ends.")
             try:
                 await asyncio.Event().wait()

@@ -32,6 +32,7 @@ from service.cli.fleet.tables import (
     verify_table,
 )
 from service.cli.fleet.trial import Trial, try_mission
+from service.cli.fleet.vehicle import BridgeState
 from service.cli.mission_source import mission_bytes
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import complain
@@ -66,10 +67,9 @@ def push_mission(
     """
     mission, item_count = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):
-        bridges = alive(session, prefix)
-        meant = _meant(session, prefix, names, conditions)
+        bridges, meant = _meant(session, prefix, names, conditions)
         if dry_run:
-            _show_trials(try_mission(session, prefix, meant, mission), as_json)
+            _show_trials(try_mission(session, prefix, meant, bridges, mission), as_json)
             return
         delivery, is_stopped = FleetPush.of(meant, bridges), False
         try:
@@ -105,7 +105,8 @@ def verify_mission(
     """
     mission, _ = _read(file, names, to_all)
     with fleet_session(where) as (session, prefix):
-        trials = try_mission(session, prefix, _meant(session, prefix, names, conditions), mission)
+        bridges, meant = _meant(session, prefix, names, conditions)
+        trials = try_mission(session, prefix, meant, bridges, mission)
     held = sum(trial.is_held is True for trial in trials)
     if as_json:
         print_json({"vehicles": [asdict(each) | {"is_held": each.is_held} for each in trials]})
@@ -127,14 +128,18 @@ def _read(file: Path, names: tuple[str, ...], to_all: bool) -> tuple[bytes, int]
         raise SystemExit(_UNREADABLE) from error
 
 
-def _meant(session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]) -> list[str]:
-    found = chosen(alive(session, prefix), names, prefix)
+def _meant(
+    session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]
+) -> tuple[set[BridgeState], list[str]]:
+    """All bridges, and the names of the vehicles to serve."""
+    bridges = alive(session, prefix)
+    found = chosen(bridges, names, prefix)
     if not conditions:
-        return found
+        return bridges, found
     like = {vehicle.name for vehicle in matching(roll_call(session, prefix), conditions)}
     if not like & set(found):
         raise FleetError(f"none of {len(found)} vehicles matches")
-    return [name for name in found if name in like]
+    return bridges, [name for name in found if name in like]
 
 
 def _show_trials(trials: list[Trial], as_json: bool) -> None:

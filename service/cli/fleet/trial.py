@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each vehicle's verdict on a mission, by its own rules: `fleet push --dry-run` and `fleet verify`."""
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import zenoh
 
 from bridge.model.finding import Finding, News
 from service.cli.fleet.payload import decode, number, part, text, whole
+from service.cli.fleet.pull import pull
 from service.cli.fleet.session import NO_COMMANDS, ask_each
-from service.zenoh_link.keys import CHECK, MISSION_CURRENT
+from service.cli.fleet.vehicle import BridgeState
+from service.zenoh_link.keys import CHECK
 
 _TIMEOUT_S = 15.0
 
@@ -40,14 +42,16 @@ class Trial:
         return None if self.checksum is None else self.error is None
 
 
-def try_mission(session: zenoh.Session, prefix: str, names: Iterable[str], mission: bytes) -> list[Trial]:
+def try_mission(
+    session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeState], mission: bytes
+) -> list[Trial]:
     """Have each vehicle check the mission, and get the checksum of its own."""
     trials = {name: Trial(name) for name in names}
-    for name, reply in ask_each(session, prefix, trials, CHECK.suffix, _TIMEOUT_S, mission):
+    for name, reply in ask_each(session, prefix, names, CHECK.suffix, _TIMEOUT_S, mission):
         _take(trials[name], reply)
-    for name, reply in ask_each(session, prefix, trials, MISSION_CURRENT.suffix, _TIMEOUT_S):
-        if reply.ok is not None and (data := decode(reply.ok)) is not None:
-            trials[name].held_count, trials[name].held = whole(data, "count"), text(data, "checksum")
+    for held in pull(session, prefix, names, bridges):
+        if held.error is None:
+            trials[held.vehicle].held_count, trials[held.vehicle].held = held.count, held.checksum
     return list(trials.values())
 
 
