@@ -19,7 +19,6 @@ from math import inf, radians
 import serial
 from fastcrc.crc16 import mcrf4xx
 
-from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
@@ -81,8 +80,8 @@ def _poll(loop: asyncio.AbstractEventLoop, link: str) -> None:
     loop.add_reader(port.fileno(), lambda: os.read(port.fileno(), 4096))
     intervals: dict[int, float] = {}
     for row in TELEMETRY:
-        if (command := POLL_FOR.get(row.reading)) is not None:
-            intervals[command] = min(row.interval_s, intervals.get(command, inf))
+        if row.poll is not None:
+            intervals[row.poll] = min(row.interval_s, intervals.get(row.poll, inf))
     _ask_all(loop, port, intervals)
 
 

@@ -29,10 +29,6 @@ class MessageRates:
         #: Peers at whose end there may be no station. They get no message more than ten times a second.
         self.unwatched: Collection[Peer] = ()
 
-    def knows(self, msgid: int) -> bool:
-        """True if the vehicle has such a message."""
-        return msgid in self._defaults
-
     def request(self, peer: Peer, msgid: int, interval_s: float | None) -> None:
         """Set the interval that a ground station requests; None: the default."""
         self._due.pop((peer, msgid), None)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission progress from NAV_STATUS: the record that the craft flies to, and the last one reached."""
 
+from dataclasses import dataclass
 from enum import Enum
 
+from protocols.mission_item import MissionItem
 from protocols.msp.nav import FINISHED, LEGS, NavAction, NavMode, NavState, NavStatus
 
 #: In these states the craft is at its record's place.
@@ -16,6 +18,18 @@ class Progress(Enum):
     NOT_STARTED = 2
     ACTIVE = 3
     COMPLETE = 5
+
+
+@dataclass(frozen=True, slots=True)
+class FlownMission:
+    """The flight controller's list, home first, and the progress through it: the craft flies to item `seq`."""
+
+    items: tuple[MissionItem, ...] = ()
+    seq: int = 0
+    progress: Progress = Progress.NOT_STARTED
+
+
+NO_MISSION = FlownMission()
 
 
 class MissionProgress:

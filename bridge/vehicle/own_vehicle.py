@@ -5,8 +5,7 @@ It exists from the start and keeps its ids, so when the craft arms and switches 
 same vehicle.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
 
 from bridge.fc.msp_telemetry import POLL_FOR
@@ -16,15 +15,15 @@ from bridge.gcs.message_rates import MessageRates
 from bridge.gcs.station import Peer, Severity, Station
 from bridge.missions.mission_service import MissionService
 from bridge.model.flight_mode import FlightMode
-from bridge.model.mission_progress import MissionProgress
+from bridge.model.mission_progress import FlownMission, MissionProgress
 from bridge.model.vehicle import STALE_S, FlightState, Health, Home, MissionLeg, Readiness, Reading
-from bridge.vehicle import vehicle_messages
+from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.link_announcer import LinkAnnouncer
-from bridge.vehicle.telemetry_table import EXTENDED_STATUS, EXTRA3, NO_STREAM, TELEMETRY, Row
+from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.mode_messages import AVAILABLE_MODES, CURRENT_MODE
+from protocols.mavlink.mode_messages import AVAILABLE_MODES
 from protocols.msp.commands import Msp
 
 #: The interval of HEARTBEAT, and the clock for messages without a reading.
@@ -40,19 +39,8 @@ _SILENT_S = 3.0
 #: The shortest interval that a ground station may request.
 _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
-_TICKED_STREAMS = {
-    messages.MAVLINK_MSG_ID_MISSION_CURRENT: EXTENDED_STATUS,
-    messages.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: EXTENDED_STATUS,
-    messages.MAVLINK_MSG_ID_SYSTEM_TIME: EXTRA3,
-    CURRENT_MODE: EXTENDED_STATUS,
-}
-_STREAMS = {row.msgid: row.stream for row in TELEMETRY} | _TICKED_STREAMS
-_READINGS = {row.msgid: row.reading for row in TELEMETRY}
-(_SYS_STATUS,) = (row for row in TELEMETRY if row.msgid == messages.MAVLINK_MSG_ID_SYS_STATUS)
-_DEFAULTS = {row.msgid: row.interval_s for row in TELEMETRY} | dict.fromkeys(_TICKED_STREAMS, _TICK_S)
-
-#: The values in a heartbeat: armed, mode, failsafe.
-_ShownState = tuple[bool | None, FlightMode | str | None, bool]
+_ROWS = {row.msgid: row for row in TELEMETRY}
+_SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
 
 
 class OwnVehicle:
@@ -76,17 +64,11 @@ class OwnVehicle:
         #: The time of the next `tick`: the sooner of a second's end and of the next heartbeat for newcomers.
         self.due = self._second_ends = now
         #: Messages that any ground station wants, by the reading that they follow.
-        self._rows: dict[type[Reading], list[Row]] = {}
-        self._rates = MessageRates(_DEFAULTS)
+        self._rows: dict[type[Reading] | None, list[Row]] = {}
+        self._rates = MessageRates({row.msgid: row.interval_s for row in TELEMETRY})
         self._progress = MissionProgress()
-        #: Messages that are not triggered by a reading.
-        self._ticked: Mapping[int, Callable[[], Message | None]] = {
-            messages.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
-            messages.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._nav_controller_output,
-            messages.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
-            CURRENT_MODE: lambda: vehicle_messages.current_mode(self._moment()),
-        }
         self._announced_home: Home | None = None
+        #: True while a newcomer waits for home and the arming blockers.
         self._is_news_wanted = False
         self._repeated_at = -inf
         self._told_blockers: tuple[str, ...] = ()
@@ -97,7 +79,8 @@ class OwnVehicle:
         self._newcomers: dict[Peer, float] = {}
         self._newcomers_due = inf
         self._polls_set_at, self._polls_due = -inf, inf
-        self._announced: _ShownState | None = None
+        #: Armed, mode and failsafe as last announced.
+        self._announced: tuple[bool | None, FlightMode | str | None, bool] | None = None
 
     def newcomer(self, peer: Peer) -> None:
         """Send a new ground station faster heartbeats, so that it connects sooner, and soon home."""
@@ -105,7 +88,7 @@ class OwnVehicle:
         self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
-        self._ground.greet(peer, self._make_heartbeat())
+        self._ground.greet(peer, self._heartbeat())
         self._follow_requests()
 
     def tick(self, now: float) -> None:
@@ -125,15 +108,13 @@ class OwnVehicle:
         self._rates.keep(everyone, set(filter(self._ground.has_standing, everyone)))
         self._rates.unwatched = () if self._session.vehicle.armed else self._ground.unheard()
         self._set_polls(everyone)
-        self._ground.introduce(self._heartbeat())
-        for msgid, make in self._ticked.items():
-            peers = self._rates.take_due(msgid, everyone, now)
-            message = make() if peers else None
-            if message is not None:
-                self._ground.multicast(pack(message), peers)
+        heartbeat = self._heartbeat()
+        self._ground.broadcast(heartbeat)
+        self._ground.introduce(heartbeat)
+        self._send_due(self._rows.get(None, ()))
         if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
-            self._send(_SYS_STATUS, self._moment(), self._rates.take_due(_SYS_STATUS.msgid, everyone, now))
+            self._send_due((_SYS_STATUS,))
         if self._is_news_wanted and now >= self._repeated_at + _REPEAT_S:
             self._is_news_wanted, self._repeated_at = False, now
             self._announced_home, self._told_blockers = None, ()
@@ -144,32 +125,28 @@ class OwnVehicle:
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if self._newcomers else inf
         for peer in self._ground.everyone():
             if peer in self._newcomers:
-                self._ground.greet(peer, self._make_heartbeat())
+                self._ground.greet(peer, self._heartbeat())
 
     def heard(self, news: Collection[type[Reading]], now: float) -> None:
         """Send the messages that follow from new readings, where due."""
         self._now = now
-        everyone = self._ground.everyone()
-        at: Moment | None = None
-        for reading in news:
-            for row in self._rows.get(reading, ()):
-                peers = self._rates.take_due(row.msgid, everyone, now)
-                if peers:
-                    at = at or self._moment()
-                    self._send(row, at, peers)
+        self._send_due(row for reading in news for row in self._rows.get(reading, ()))
         if MissionLeg in news:
             self._follow_mission()
         if Readiness in news:
             self._tell_readiness()
-        if FlightState in news and self._announced != self._shown_state():
-            self._tell_failsafe()
-            self._heartbeat()
+        if FlightState in news:
+            self._follow_state()
 
-    def _send(self, row: Row, at: Moment, peers: Sequence[Peer]) -> None:
-        for make in row.makers:
-            message = make(at)
-            if message is not None:
-                self._ground.multicast(pack(message), peers)
+    def _send_due(self, rows: Iterable[Row]) -> None:
+        everyone = self._ground.everyone()
+        at: Moment | None = None
+        for row in rows:
+            peers = self._rates.take_due(row.msgid, everyone, self._now)
+            if peers:
+                at = at or self._moment()
+                for message in at.made(row.makers):
+                    self._ground.multicast(pack(message), peers)
 
     def also_want(self, readings: Mapping[type[Reading], float]) -> None:
         """Poll for consumers other than ground stations, too: seconds by reading."""
@@ -184,18 +161,23 @@ class OwnVehicle:
         `index`: of the flight mode in AVAILABLE_MODES, from 1; 0: all.
         """
         if msgid == AVAILABLE_MODES:
-            modes = vehicle_messages.available_modes(self._session.vehicle)
-            made: list[Message | None] = modes[index - 1 : index] if index else modes
+            modes = make.available_modes(self._session.vehicle)
+            made = modes[index - 1 : index] if index else modes
+            if not made:
+                return None
+        elif msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            made = [make.autopilot_version(self._session.vehicle)]
+        elif (row := _ROWS.get(msgid)) is not None:
+            made = self._moment().made(row.makers)
         else:
-            made = [make() for make in self._makers(msgid)]
-        known = [message for message in made if message is not None]
-        for message in known:
+            return None
+        for message in made:
             self._ground.to(station, message)
-        return bool(known) if made else None
+        return bool(made)
 
     def set_interval(self, peer: Peer, msgid: int, interval_s: float | None) -> bool:
         """Set the interval of a message for one ground station; None: the default. False: no such message."""
-        if not self._rates.knows(msgid):
+        if msgid not in _ROWS:
             return False
         self._rates.request(peer, msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
         self._follow_requests()
@@ -203,19 +185,17 @@ class OwnVehicle:
 
     def set_stream(self, peer: Peer, stream: int, interval_s: float) -> None:
         """Set the interval of all messages of one of ArduPilot's streams."""
-        for msgid, its_stream in _STREAMS.items():
-            if its_stream == stream or (stream == _ALL_STREAMS and its_stream != NO_STREAM):
-                self.set_interval(peer, msgid, interval_s)
+        for row in TELEMETRY:
+            if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
+                self.set_interval(peer, row.msgid, interval_s)
 
     def interval_s(self, peer: Peer, msgid: int) -> float | None:
         """The current interval of a message for a ground station; infinity: never, None: no such message."""
         if msgid == messages.MAVLINK_MSG_ID_HEARTBEAT:
             return _TICK_S
-        if not self._rates.knows(msgid):
+        if (row := _ROWS.get(msgid)) is None:
             return None
-        reading = _READINGS.get(msgid)
-        poll = None if reading is None else POLL_FOR.get(reading)
-        pace_s = _TICK_S if poll is None else self._session.polls.interval_s(poll)
+        pace_s = _TICK_S if row.poll is None else self._session.polls.interval_s(row.poll)
         return max(self._rates.interval_s(peer, msgid), pace_s or 0.0)
 
     def _follow_requests(self) -> None:
@@ -231,77 +211,43 @@ class OwnVehicle:
         self._polls_set_at, self._polls_due = self._now, inf
         wanted: dict[Msp, float] = {}
         for reading, interval_s in self._also_wanted.items():
-            _want(wanted, reading, interval_s)
+            _want(wanted, POLL_FOR.get(reading), interval_s)
         self._rows = {}
         for row in TELEMETRY:
             interval_s = self._rates.fastest_s(row.msgid, everyone)
             if interval_s < inf:
                 self._rows.setdefault(row.reading, []).append(row)
-            _want(wanted, row.reading, interval_s)
+            _want(wanted, row.poll, interval_s)
         polls = self._session.polls
         polls.want(wanted)
         self._stale_s = {} if self._session.state.link is None else _stale_ages_s(polls.line_interval_s)
 
-    def _makers(self, msgid: int) -> list[Callable[[], Message | None]]:
-        if msgid == messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-            return [partial(vehicle_messages.autopilot_version, self._session.vehicle)]
-        if msgid in self._ticked:
-            return [self._ticked[msgid]]
-        makers = (make for row in TELEMETRY if row.msgid == msgid for make in row.makers)
-        return [partial(make, self._moment()) for make in makers]
-
     def _moment(self) -> Moment:
         boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
-        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s)
+        unix_s = self._unix_time_s(self._now)
+        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s, self._flown_mission(), unix_s)
 
-    def _shown_state(self) -> _ShownState:
-        state = self._session.vehicle.last(FlightState)
-        return (None, None, False) if state is None else (state.armed, state.mode, state.is_failsafe)
-
-    def _tell_failsafe(self) -> None:
-        """Report when the failsafe takes over, and when the pilot has control again."""
-        state = self._session.vehicle.last(FlightState)
-        if state is None or state.is_failsafe == self._has_told_failsafe:
-            return
-        self._has_told_failsafe = state.is_failsafe
-        if state.is_failsafe:
-            self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
-        elif state.armed:
-            self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
-
-    def _heartbeat(self) -> Message:
-        self._announced = self._shown_state()
-        heartbeat = self._make_heartbeat()
-        self._ground.broadcast(heartbeat)
-        return heartbeat
-
-    def _make_heartbeat(self) -> Message:
-        return vehicle_messages.heartbeat(self._session.vehicle, is_lost=self._announcer.is_lost)
-
-    def _mission_current(self) -> Message:
+    def _flown_mission(self) -> FlownMission:
         held = self._missions.held
         seq = self._missions.seq_of(self._progress.number)
-        return vehicle_messages.mission_current(0 if held is None else len(held.items), seq, self._progress.progress)
+        return FlownMission(() if held is None else held.items, seq, self._progress.progress)
 
-    def _nav_controller_output(self) -> Message | None:
-        """The way to the waypoint, or home."""
-        state, held = self._session.vehicle.last(FlightState), self._missions.held
-        seq = self._missions.seq_of(self._progress.number)
-        if state is None or not state.armed:
-            return None
-        if held is not None and 0 < seq < len(held.items):
-            item = held.items[seq]
-            if item.lat_e7 and item.lon_e7:
-                target = Home(item.lat_e7, item.lon_e7)
-                return vehicle_messages.nav_controller_output(self._moment(), target, item.alt_m)
-        home = self._session.vehicle.home
-        if state.mode is not FlightMode.RTL or home is None:
-            return None
-        return vehicle_messages.nav_controller_output(self._moment(), home, None)
+    def _follow_state(self) -> None:
+        """Send a heartbeat as soon as something in it has changed; report the failsafe."""
+        state = self._session.vehicle.last(FlightState)
+        if state is None or (state.armed, state.mode, state.is_failsafe) == self._announced:
+            return
+        self._announced = state.armed, state.mode, state.is_failsafe
+        if state.is_failsafe != self._has_told_failsafe:
+            self._has_told_failsafe = state.is_failsafe
+            if state.is_failsafe:
+                self._ground.say(Severity.CRITICAL, "Failsafe: the flight controller has taken over")
+            elif state.armed:
+                self._ground.say(Severity.NOTICE, "Failsafe ended: the pilot has control")
+        self._ground.broadcast(self._heartbeat())
 
-    def _system_time(self) -> Message | None:
-        unix_s = self._unix_time_s(self._now)
-        return None if unix_s is None else vehicle_messages.system_time(self._moment(), unix_s)
+    def _heartbeat(self) -> Message:
+        return make.heartbeat(self._session.vehicle, is_lost=self._announcer.is_lost)
 
     def _follow_mission(self) -> None:
         """Report a reached waypoint and the next one at once."""
@@ -309,10 +255,10 @@ class OwnVehicle:
         before = self._progress.number, self._progress.progress
         reached = None if leg is None else self._progress.take(leg.status)
         if before != (self._progress.number, self._progress.progress):
-            self._ground.broadcast(self._mission_current())
+            self._ground.broadcast(make.mission_current(self._moment()))
         seq = self._missions.seq_of(reached or 0)
         if seq:
-            self._ground.broadcast(vehicle_messages.mission_item_reached(seq))
+            self._ground.broadcast(make.mission_item_reached(seq))
 
     def _tell_readiness(self) -> None:
         """Report the arming blockers whenever they change, except in flight."""
@@ -328,8 +274,7 @@ class OwnVehicle:
         home = self._session.vehicle.home
         if home == self._announced_home:
             return
-        message = vehicle_messages.home_position(self._moment())
-        if message is not None:
+        for message in self._moment().made((make.home_position,)):
             self._announced_home = home
             self._ground.broadcast(message)
 
@@ -340,7 +285,6 @@ def _stale_ages_s(line_interval_s: Callable[[Msp], float]) -> dict[type[Reading]
     return {reading: STALE_S * interval_s for reading, interval_s in intervals.items() if interval_s > 1.0}
 
 
-def _want(wanted: dict[Msp, float], reading: type[Reading], interval_s: float) -> None:
-    poll = POLL_FOR.get(reading)
+def _want(wanted: dict[Msp, float], poll: Msp | None, interval_s: float) -> None:
     if poll is not None:
         wanted[poll] = min(wanted.get(poll, inf), interval_s)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The table of telemetry messages: their reading, default interval and ArduPilot stream."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
+from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.model.vehicle import (
     FlightState,
     GlobalPosition,
@@ -20,11 +20,9 @@ from bridge.model.vehicle import (
     Sticks,
 )
 from bridge.vehicle import vehicle_messages as make
-from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
-
-#: Makes a message of the vehicle at a moment; None if too little is known.
-Maker = Callable[[make.Moment], Message | None]
+from protocols.mavlink.mode_messages import CURRENT_MODE
+from protocols.msp.commands import Msp
 
 NO_STREAM = -1
 #: MAV_DATA_STREAM's members, as ArduCopter fills them (GCS_Mavlink.cpp).
@@ -34,13 +32,21 @@ EXTRA1, EXTRA2, EXTRA3 = 10, 11, 12
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One message. It is sent as soon as `reading` is heard; `interval_s` infinite: only on request."""
+    """One message. It is sent as soon as `reading` is heard, or by the clock if None.
+
+    `interval_s`: the default; infinite: only on request.
+    """
 
     msgid: int
-    reading: type[Reading]
+    reading: type[Reading] | None
     interval_s: float
     stream: int
-    makers: tuple[Maker, ...]
+    makers: tuple[make.Maker, ...]
+
+    @property
+    def poll(self) -> Msp | None:
+        """The request whose reply holds the reading."""
+        return None if self.reading is None else POLL_FOR.get(self.reading)
 
 
 TELEMETRY = (
@@ -61,4 +67,8 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, Orientation, inf, NO_STREAM, (make.attitude_quaternion,)),
     Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, GlobalPosition, inf, POSITION, (make.local_position_ned,)),
     Row(m.MAVLINK_MSG_ID_RAW_IMU, ImuSample, inf, RAW_SENSORS, (make.raw_imu,)),
+    Row(m.MAVLINK_MSG_ID_MISSION_CURRENT, None, 1.0, EXTENDED_STATUS, (make.mission_current,)),
+    Row(m.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, None, 1.0, EXTENDED_STATUS, (make.nav_controller_output,)),
+    Row(m.MAVLINK_MSG_ID_SYSTEM_TIME, None, 1.0, EXTRA3, (make.system_time,)),
+    Row(CURRENT_MODE, None, 1.0, EXTENDED_STATUS, (make.current_mode,)),
 )

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The MAVLink messages of the vehicle that the bridge represents (docs/telemetry.md).
 
-An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields have no such value is not made (None).
+An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields have no such value is not made.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import NamedTuple, TypeVar
 
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FlightMode
-from bridge.model.ground_track import Place, bearing_deg, distance_m, north_east_m
-from bridge.model.mission_progress import Progress
+from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
+from bridge.model.mission_progress import NO_MISSION, FlownMission
 from bridge.model.vehicle import (
     STALE_S,
     Airspeed,
@@ -21,6 +23,7 @@ from bridge.model.vehicle import (
     GpsFix,
     Health,
     Height,
+    Home,
     ImuSample,
     Motors,
     Orientation,
@@ -37,42 +40,26 @@ from protocols.mavlink import mode_messages
 from protocols.mavlink.dialect import Message, messages
 from protocols.msp.telemetry import Sensor
 
-#: custom_mode of ArduCopter; of ArduPlane, which has no mode that only holds the altitude; and of ArduRover.
-_COPTER_MODES = {
-    FlightMode.STABILIZE: 0,
-    FlightMode.ACRO: 1,
-    FlightMode.ALT_HOLD: 2,
-    FlightMode.AUTO: 3,
-    FlightMode.LOITER: 5,
-    FlightMode.RTL: 6,
+
+class _ModeNumbers(NamedTuple):
+    """custom_mode of ArduCopter, ArduPlane and ArduRover, and MAV_STANDARD_MODE."""
+
+    copter: int
+    plane: int
+    rover: int
+    standard: int = messages.MAV_STANDARD_MODE_NON_STANDARD
+
+
+#: ArduPlane has no mode that only holds the altitude. Unless it navigates, a rover is steered by hand: MANUAL, 0.
+_MODES = {
+    FlightMode.STABILIZE: _ModeNumbers(0, 2, 0),
+    FlightMode.ACRO: _ModeNumbers(1, 4, 0),
+    FlightMode.ALT_HOLD: _ModeNumbers(2, 6, 0, messages.MAV_STANDARD_MODE_ALTITUDE_HOLD),
+    FlightMode.AUTO: _ModeNumbers(3, 10, 10, messages.MAV_STANDARD_MODE_MISSION),
+    FlightMode.LOITER: _ModeNumbers(5, 12, 5, messages.MAV_STANDARD_MODE_POSITION_HOLD),
+    FlightMode.RTL: _ModeNumbers(6, 11, 11, messages.MAV_STANDARD_MODE_SAFE_RECOVERY),
 }
-_PLANE_MODES = {
-    FlightMode.STABILIZE: 2,
-    FlightMode.ACRO: 4,
-    FlightMode.ALT_HOLD: 6,
-    FlightMode.AUTO: 10,
-    FlightMode.LOITER: 12,
-    FlightMode.RTL: 11,
-}
-#: Unless it navigates, a rover is steered by hand: MANUAL.
-_ROVER_MODES = {
-    FlightMode.STABILIZE: 0,
-    FlightMode.ACRO: 0,
-    FlightMode.ALT_HOLD: 0,
-    FlightMode.AUTO: 10,
-    FlightMode.LOITER: 5,
-    FlightMode.RTL: 11,
-}
-_MODES = {Airframe.FIXED_WING: _PLANE_MODES, Airframe.ROVER: _ROVER_MODES, Airframe.BOAT: _ROVER_MODES}
-_ROVER_NAMES = {0: "MANUAL"}
-_OTHER_NAMES = {Airframe.ROVER: _ROVER_NAMES, Airframe.BOAT: _ROVER_NAMES}
-_NON_STANDARD: int = messages.MAV_STANDARD_MODE_NON_STANDARD
-_STANDARD_MODES: Mapping[FlightMode, int] = {
-    FlightMode.ALT_HOLD: messages.MAV_STANDARD_MODE_ALTITUDE_HOLD,
-    FlightMode.AUTO: messages.MAV_STANDARD_MODE_MISSION,
-    FlightMode.LOITER: messages.MAV_STANDARD_MODE_POSITION_HOLD,
-    FlightMode.RTL: messages.MAV_STANDARD_MODE_SAFE_RECOVERY,
-}
+_ROVERS = (Airframe.ROVER, Airframe.BOAT)
 _SENSORS = {
     Sensor.ACCELEROMETER: messages.MAV_SYS_STATUS_SENSOR_3D_ACCEL,
     Sensor.BAROMETER: messages.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE,
@@ -91,7 +78,7 @@ _CAPABILITIES = (
     | messages.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | messages.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
-_NO_MISSION = 1
+_STATE_NO_MISSION = 1
 _NO_TOTAL = 0xFFFF
 #: For firmware that reports no version: below 1.0 Mission Planner hides the choice of altitude frames.
 _UNKNOWN_VERSION = (1, 0, 0)
@@ -106,19 +93,49 @@ _FLYING_M, _FLYING_M_S = 1.0, 0.5
 _THROTTLE = 2
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
 
+T = TypeVar("T")
+
+
+class Unknown(Exception):
+    """A message cannot be made: a value for which it has no "unknown" is unknown or stale."""
+
+
+def known(value: T | None) -> T:
+    """The value; Unknown for None."""
+    if value is None:
+        raise Unknown
+    return value
+
 
 @dataclass(slots=True)
 class Moment:
-    """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S."""
+    """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S.
+
+    unix_s: the Pi's clock, None if it is not set.
+    """
 
     vehicle: Vehicle
     now: float
     boot_ms: int
     stale_s: Mapping[type[Reading], float] = field(default_factory=dict)
+    mission: FlownMission = NO_MISSION
+    unix_s: float | None = None
 
     def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
         return self.vehicle.fresh(kind, self.now, self.stale_s.get(kind, STALE_S))
+
+    def need(self, kind: type[ReadingT]) -> ReadingT:
+        """The same for a reading without which the message cannot be made."""
+        return known(self.fresh(kind))
+
+    def made(self, makers: Iterable["Maker"]) -> list[Message]:
+        """The messages of these makers that are not Unknown."""
+        made = []
+        for maker in makers:
+            with suppress(Unknown):
+                made.append(maker(self))
+        return made
 
     def altitude_m(self, position: GlobalPosition) -> float | None:
         """Above mean sea level: home's altitude plus the height above it, finer than the GPS's whole metres."""
@@ -126,6 +143,10 @@ class Moment:
         if home is None or home.altitude_m is None or height is None:
             return position.altitude_m
         return home.altitude_m + height.height_m
+
+
+#: Makes a message of the vehicle at a moment; raises Unknown if too little is known.
+Maker = Callable[[Moment], Message]
 
 
 def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
@@ -146,38 +167,43 @@ def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
     else:
         status = messages.MAV_STATE_ACTIVE if vehicle.armed else messages.MAV_STATE_STANDBY
     return messages.MAVLink_heartbeat_message(
-        vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, _modes(vehicle)[mode], status, 3
+        vehicle.airframe, messages.MAV_AUTOPILOT_ARDUPILOTMEGA, base_mode, _custom_mode(vehicle, mode), status, 3
     )
 
 
-def current_mode(at: Moment) -> Message | None:
+def current_mode(at: Moment) -> Message:
     """CURRENT_MODE."""
-    state = at.fresh(FlightState)
-    if state is None or not isinstance(state.mode, FlightMode):
-        return None
-    return mode_messages.current_mode(_modes(at.vehicle)[state.mode], _standard_mode(at.vehicle, state.mode))
+    mode = at.need(FlightState).mode
+    if not isinstance(mode, FlightMode):
+        raise Unknown
+    return mode_messages.current_mode(_custom_mode(at.vehicle, mode), _standard_mode(at.vehicle, mode))
 
 
 def available_modes(vehicle: Vehicle) -> list[Message]:
     """AVAILABLE_MODES, one message per mode."""
     # A rover has one custom mode for several of ours.
-    modes = {custom_mode: mode for mode, custom_mode in _modes(vehicle).items()}
-    names = {custom_mode: mode.name for custom_mode, mode in modes.items()} | _OTHER_NAMES.get(vehicle.airframe, {})
+    modes = {_custom_mode(vehicle, mode): mode for mode in _MODES}
+    manual = {0: "MANUAL"} if vehicle.airframe in _ROVERS else {}
     return [
-        mode_messages.available_mode(index, len(modes), custom_mode, _standard_mode(vehicle, mode), names[custom_mode])
+        mode_messages.available_mode(
+            index, len(modes), custom_mode, _standard_mode(vehicle, mode), manual.get(custom_mode, mode.name)
+        )
         for index, (custom_mode, mode) in enumerate(modes.items(), 1)
     ]
 
 
-def _modes(vehicle: Vehicle) -> Mapping[FlightMode, int]:
-    return _MODES.get(vehicle.airframe, _COPTER_MODES)
+def _custom_mode(vehicle: Vehicle, mode: FlightMode) -> int:
+    numbers = _MODES[mode]
+    if vehicle.airframe is Airframe.FIXED_WING:
+        return numbers.plane
+    return numbers.rover if vehicle.airframe in _ROVERS else numbers.copter
 
 
 def _standard_mode(vehicle: Vehicle, mode: FlightMode) -> int:
     """MAV_STANDARD_MODE; only copters hold an altitude or a position."""
-    if mode not in (FlightMode.AUTO, FlightMode.RTL) and vehicle.airframe in _MODES:
-        return _NON_STANDARD
-    return _STANDARD_MODES.get(mode, _NON_STANDARD)
+    is_copter = vehicle.airframe not in (Airframe.FIXED_WING, *_ROVERS)
+    is_for_all = mode in (FlightMode.AUTO, FlightMode.RTL)
+    return _MODES[mode].standard if is_copter or is_for_all else messages.MAV_STANDARD_MODE_NON_STANDARD
 
 
 def autopilot_version(vehicle: Vehicle) -> Message:
@@ -189,11 +215,12 @@ def autopilot_version(vehicle: Vehicle) -> Message:
     )
 
 
-def mission_current(count: int, seq: int = 0, progress: Progress = Progress.NOT_STARTED) -> Message:
-    """MISSION_CURRENT: `count` items (home included), the craft flies to item `seq`."""
-    if not count:
-        return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _NO_MISSION, 0)
-    return messages.MAVLink_mission_current_message(seq, count - 1, progress.value, 0)
+def mission_current(at: Moment) -> Message:
+    """MISSION_CURRENT."""
+    mission = at.mission
+    if not mission.items:
+        return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _STATE_NO_MISSION, 0)
+    return messages.MAVLink_mission_current_message(mission.seq, len(mission.items) - 1, mission.progress.value, 0)
 
 
 def mission_item_reached(seq: int) -> Message:
@@ -201,28 +228,21 @@ def mission_item_reached(seq: int) -> Message:
     return messages.MAVLink_mission_item_reached_message(seq)
 
 
-def attitude(at: Moment) -> Message | None:
+def attitude(at: Moment) -> Message:
     """ATTITUDE: radians, radians a second."""
-    now = at.fresh(Orientation)
-    if now is None or now.roll_deg is None or now.pitch_deg is None:
-        return None
-    roll_rate, pitch_rate, yaw_rate = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
+    now = at.need(Orientation)
     return messages.MAVLink_attitude_message(
         at.boot_ms,
-        math.radians(now.roll_deg),
-        math.radians(now.pitch_deg),
+        math.radians(known(now.roll_deg)),
+        math.radians(known(now.pitch_deg)),
         math.radians((now.heading_deg + 180) % 360 - 180),
-        roll_rate,
-        pitch_rate,
-        yaw_rate,
+        *_rates(now),
     )
 
 
-def gps_raw_int(at: Moment) -> Message | None:
+def gps_raw_int(at: Moment) -> Message:
     """GPS_RAW_INT: degrees * 1e7, mm above mean sea level, cm/s, 0.01 degrees."""
-    gps = at.fresh(GpsFix)
-    if gps is None:
-        return None
+    gps = at.need(GpsFix)
     position = at.fresh(GlobalPosition) if gps.fix is not Fix.NO_FIX else None
     place = 0, 0, 0
     if position is not None and position.altitude_m is not None:
@@ -239,43 +259,38 @@ def gps_raw_int(at: Moment) -> Message | None:
     )
 
 
-def global_position_int(at: Moment) -> Message | None:
+def global_position_int(at: Moment) -> Message:
     """GLOBAL_POSITION_INT: mm, cm/s, 0.01 degrees. Position, velocity and height have no "unknown"."""
-    position, height = at.fresh(GlobalPosition), at.fresh(Height)
-    if position is None or height is None or position.north_m_s is None or position.east_m_s is None:
-        return None
-    altitude_m, orientation = at.altitude_m(position), at.fresh(Orientation)
-    if altitude_m is None:
-        return None
+    position, height, orientation = at.need(GlobalPosition), at.need(Height), at.fresh(Orientation)
     is_north_known = orientation is not None and orientation.is_north_known
     return messages.MAVLink_global_position_int_message(
         at.boot_ms,
         position.lat_e7,
         position.lon_e7,
-        _fit(round(altitude_m * 1000), 32),
+        _fit(round(known(at.altitude_m(position)) * 1000), 32),
         _fit(round(height.height_m * 1000), 32),
-        _fit(round(position.north_m_s * 100), 16),
-        _fit(round(position.east_m_s * 100), 16),
+        _fit(round(known(position.north_m_s) * 100), 16),
+        _fit(round(known(position.east_m_s) * 100), 16),
         _fit(round(-height.climb_m_s * 100), 16),
         round(orientation.heading_deg * 100) % 36000 if orientation and is_north_known else _UNKNOWN_U16,
     )
 
 
-def vfr_hud(at: Moment) -> Message | None:
+def vfr_hud(at: Moment) -> Message:
     """VFR_HUD: m/s, degrees, percent of the throttle stick, metres above mean sea level.
 
     Without a sensor a copter's airspeed is the ground speed, as with ArduCopter; a plane's is unknown. Heading and
     throttle have no "unknown", so both must be there.
     """
-    orientation, sticks = at.fresh(Orientation), at.fresh(Sticks)
-    if orientation is None or sticks is None or len(sticks.channels_us) <= _THROTTLE:
-        return None
+    orientation, channels_us = at.need(Orientation), at.need(Sticks).channels_us
+    if len(channels_us) <= _THROTTLE:
+        raise Unknown
     position, height, gps = at.fresh(GlobalPosition), at.fresh(Height), at.fresh(GpsFix)
     speed = math.nan if gps is None or gps.ground_speed_m_s is None else gps.ground_speed_m_s
     air = at.fresh(Airspeed)
     airspeed = math.nan if at.vehicle.airframe is Airframe.FIXED_WING else speed
     altitude_m = None if position is None else at.altitude_m(position)
-    throttle = (sticks.channels_us[_THROTTLE] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
+    throttle = (channels_us[_THROTTLE] - _STICK_LOW_US) * 100 // (_STICK_HIGH_US - _STICK_LOW_US)
     return messages.MAVLink_vfr_hud_message(
         airspeed if air is None else air.airspeed_m_s,
         speed,
@@ -286,11 +301,9 @@ def vfr_hud(at: Moment) -> Message | None:
     )
 
 
-def sys_status(at: Moment) -> Message | None:
+def sys_status(at: Moment) -> Message:
     """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads. A silent sensor is not healthy."""
-    health = at.vehicle.last(Health)
-    if health is None:
-        return None
+    health = known(at.vehicle.last(Health))
     sensors = _ALWAYS_THERE
     for sensor, bit in _SENSORS.items():
         if sensor & health.sensors:
@@ -305,15 +318,15 @@ def sys_status(at: Moment) -> Message | None:
     if readiness is not None:
         sensors |= messages.MAV_SYS_STATUS_PREARM_CHECK
         healthy |= 0 if readiness.blockers else messages.MAV_SYS_STATUS_PREARM_CHECK
-    power = at.fresh(Power)
+    voltage, current, remaining = _battery(at)
     return messages.MAVLink_sys_status_message(
         sensors,
         sensors,
         healthy | _NEVER_ILL,
         round((health.cpu_load or 0.0) * 1000),
-        _scaled_u16(None if power is None else power.voltage_v, 1000),
-        -1 if power is None or power.current_a is None else _fit(round(power.current_a * 100), 16),
-        -1 if power is None or power.remaining_percent is None else power.remaining_percent,
+        voltage,
+        current,
+        remaining,
         0,
         health.i2c_errors or 0,
         0,
@@ -323,118 +336,123 @@ def sys_status(at: Moment) -> Message | None:
     )
 
 
-def battery_status(at: Moment) -> Message | None:
+def battery_status(at: Moment) -> Message:
     """BATTERY_STATUS: mV (Mission Planner reads the voltage only from here), cA and mAh."""
+    drawn = at.need(Power).drawn_mah
+    voltage, current, remaining = _battery(at)
+    if voltage == _UNKNOWN_U16:
+        raise Unknown
+    voltages = [voltage, *[_UNKNOWN_U16] * 9]
+    return messages.MAVLink_battery_status_message(
+        0, 0, 0, 32767, voltages, current, -1 if drawn is None else drawn, -1, remaining
+    )
+
+
+def _battery(at: Moment) -> tuple[int, int, int]:
+    """mV, cA and percent."""
     power = at.fresh(Power)
-    if power is None or power.voltage_v is None:
-        return None
-    voltages = [_scaled_u16(power.voltage_v, 1000), *[_UNKNOWN_U16] * 9]
-    current = -1 if power.current_a is None else _fit(round(power.current_a * 100), 16)
-    drawn = -1 if power.drawn_mah is None else power.drawn_mah
-    remaining = -1 if power.remaining_percent is None else power.remaining_percent
-    return messages.MAVLink_battery_status_message(0, 0, 0, 32767, voltages, current, drawn, -1, remaining)
+    if power is None:
+        return _UNKNOWN_U16, -1, -1
+    return (
+        _scaled_u16(power.voltage_v, 1000),
+        -1 if power.current_a is None else _fit(round(power.current_a * 100), 16),
+        -1 if power.remaining_percent is None else power.remaining_percent,
+    )
 
 
-def rc_channels(at: Moment) -> Message | None:
+def rc_channels(at: Moment) -> Message:
     """RC_CHANNELS: microseconds."""
-    sticks = at.fresh(Sticks)
-    if sticks is None:
-        return None
-    channels = sticks.channels_us
-    unknown = [_UNKNOWN_U16] * (_CHANNELS - len(channels))
-    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *channels, *unknown, _rssi(at))
+    channels = at.need(Sticks).channels_us
+    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *_padded(channels, _CHANNELS), _rssi(at))
 
 
-def rc_channels_raw(at: Moment) -> Message | None:
+def rc_channels_raw(at: Moment) -> Message:
     """RC_CHANNELS_RAW: the first eight."""
-    sticks = at.fresh(Sticks)
-    if sticks is None:
-        return None
-    channels = sticks.channels_us[:_RAW_CHANNELS]
-    unknown = [_UNKNOWN_U16] * (_RAW_CHANNELS - len(channels))
-    return messages.MAVLink_rc_channels_raw_message(at.boot_ms, 0, *channels, *unknown, _rssi(at))
+    channels = _padded(at.need(Sticks).channels_us, _RAW_CHANNELS)
+    return messages.MAVLink_rc_channels_raw_message(at.boot_ms, 0, *channels, _rssi(at))
 
 
-def raw_imu(at: Moment) -> Message | None:
+def raw_imu(at: Moment) -> Message:
     """RAW_IMU: in the flight controller's own scale."""
-    imu = at.fresh(ImuSample)
-    if imu is None:
-        return None
+    imu = at.need(ImuSample)
     return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, *imu.acc, *imu.gyro, *imu.mag)
 
 
-def servo_output_raw(at: Moment) -> Message | None:
+def servo_output_raw(at: Moment) -> Message:
     """SERVO_OUTPUT_RAW: the motors, microseconds."""
-    motors = at.fresh(Motors)
-    if motors is None:
-        return None
-    outputs = (*motors.outputs_us, *[0] * _RAW_CHANNELS)[:_RAW_CHANNELS]
+    outputs = (*at.need(Motors).outputs_us, *[0] * _RAW_CHANNELS)[:_RAW_CHANNELS]
     return messages.MAVLink_servo_output_raw_message(at.boot_ms * 1000 & 0xFFFFFFFF, 0, *outputs)
 
 
-def scaled_pressure(at: Moment) -> Message | None:
+def scaled_pressure(at: Moment) -> Message:
     """SCALED_PRESSURE: hPa, 0.01 degrees Celsius."""
-    pressure = at.fresh(Pressure)
-    if pressure is None:
-        return None
+    pressure = at.need(Pressure)
     temperature = _fit(round(pressure.temperature_c * 100), 16)
     return messages.MAVLink_scaled_pressure_message(at.boot_ms, pressure.absolute_hpa, 0.0, temperature)
 
 
-def attitude_quaternion(at: Moment) -> Message | None:
+def attitude_quaternion(at: Moment) -> Message:
     """ATTITUDE_QUATERNION: w, x, y, z."""
-    now = at.fresh(Orientation)
-    if now is None or now.roll_deg is None or now.pitch_deg is None:
-        return None
-    halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
+    now = at.need(Orientation)
+    halves = [math.radians(angle) / 2 for angle in (known(now.roll_deg), known(now.pitch_deg), now.heading_deg)]
     (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
-    rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
     return messages.MAVLink_attitude_quaternion_message(
         at.boot_ms,
         cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
         sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
         cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
         cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
-        *rates,
+        *_rates(now),
     )
 
 
-def local_position_ned(at: Moment) -> Message | None:
+def local_position_ned(at: Moment) -> Message:
     """LOCAL_POSITION_NED: metres from home, m/s."""
-    position, height, home = at.fresh(GlobalPosition), at.fresh(Height), at.vehicle.home
-    if position is None or height is None or home is None or position.north_m_s is None or position.east_m_s is None:
-        return None
-    north, east = north_east_m(home, position)
+    position, height = at.need(GlobalPosition), at.need(Height)
+    north, east = north_east_m(known(at.vehicle.home), position)
     return messages.MAVLink_local_position_ned_message(
-        at.boot_ms, north, east, -height.height_m, position.north_m_s, position.east_m_s, -height.climb_m_s
+        at.boot_ms,
+        north,
+        east,
+        -height.height_m,
+        known(position.north_m_s),
+        known(position.east_m_s),
+        -height.climb_m_s,
     )
 
 
-def nav_controller_output(at: Moment, target: Place, height_m: float | None) -> Message | None:
-    """NAV_CONTROLLER_OUTPUT: direction and distance to a place, degrees and metres. The set points are unknown."""
-    position, now, height = at.fresh(GlobalPosition), at.fresh(Orientation), at.fresh(Height)
-    if position is None or now is None or now.roll_deg is None or now.pitch_deg is None:
-        return None
+def nav_controller_output(at: Moment) -> Message:
+    """NAV_CONTROLLER_OUTPUT: the way to the waypoint, or home; degrees and metres. The set points are unknown."""
+    state, height = at.vehicle.last(FlightState), at.fresh(Height)
+    position, now = at.need(GlobalPosition), at.need(Orientation)
+    if state is None or not state.armed:
+        raise Unknown
+    items, seq = at.mission.items, at.mission.seq
+    item = items[seq] if 0 < seq < len(items) else None
+    climb_m = 0.0
+    if item is not None and item.lat_e7 and item.lon_e7:
+        target = Home(item.lat_e7, item.lon_e7)
+        climb_m = 0.0 if height is None else item.alt_m - height.height_m
+    elif state.mode is FlightMode.RTL:
+        target = known(at.vehicle.home)
+    else:
+        raise Unknown
     bearing = round((bearing_deg(position, target) + 180) % 360 - 180)
     distance = min(round(distance_m(position, target)), _UNKNOWN_U16)
-    climb_m = 0.0 if height_m is None or height is None else height_m - height.height_m
     return messages.MAVLink_nav_controller_output_message(
-        now.roll_deg, now.pitch_deg, bearing, bearing, distance, climb_m, 0.0, 0.0
+        known(now.roll_deg), known(now.pitch_deg), bearing, bearing, distance, climb_m, 0.0, 0.0
     )
 
 
-def system_time(at: Moment, unix_s: float) -> Message:
+def system_time(at: Moment) -> Message:
     """SYSTEM_TIME: the Pi's clock."""
-    return messages.MAVLink_system_time_message(round(unix_s * 1e6), at.boot_ms)
+    return messages.MAVLink_system_time_message(round(known(at.unix_s) * 1e6), at.boot_ms)
 
 
-def extended_sys_state(at: Moment) -> Message | None:
+def extended_sys_state(at: Moment) -> Message:
     """EXTENDED_SYS_STATE: on the ground while disarmed; armed it depends on height, climb and speed."""
-    state = at.fresh(FlightState)
-    if state is None or state.armed is None:
-        return None
     landed = messages.MAV_LANDED_STATE_ON_GROUND
-    if state.armed:
+    if known(at.need(FlightState).armed):
         height, gps = at.fresh(Height), at.fresh(GpsFix)
         speed = None if gps is None else gps.ground_speed_m_s
         if height is None:
@@ -444,48 +462,46 @@ def extended_sys_state(at: Moment) -> Message | None:
     return messages.MAVLink_extended_sys_state_message(messages.MAV_VTOL_STATE_UNDEFINED, landed)
 
 
-def cycle_time(at: Moment) -> Message | None:
+def cycle_time(at: Moment) -> Message:
     """NAMED_VALUE_INT: the main loop's cycle time, microseconds."""
-    health = at.fresh(Health)
-    if health is None or health.cycle_time_us is None:
-        return None
-    return messages.MAVLink_named_value_int_message(at.boot_ms, b"cycle_us", health.cycle_time_us)
+    return messages.MAVLink_named_value_int_message(at.boot_ms, b"cycle_us", known(at.need(Health).cycle_time_us))
 
 
-def i2c_errors(at: Moment) -> Message | None:
+def i2c_errors(at: Moment) -> Message:
     """NAMED_VALUE_INT: failed sensor reads since boot."""
-    health = at.fresh(Health)
-    if health is None or health.i2c_errors is None:
-        return None
-    return messages.MAVLink_named_value_int_message(at.boot_ms, b"i2c_err", health.i2c_errors)
+    return messages.MAVLink_named_value_int_message(at.boot_ms, b"i2c_err", known(at.need(Health).i2c_errors))
 
 
-def home_distance(at: Moment) -> Message | None:
+def home_distance(at: Moment) -> Message:
     """NAMED_VALUE_FLOAT: distance to home, metres."""
-    position, home = at.fresh(GlobalPosition), at.vehicle.home
-    if position is None or home is None:
-        return None
-    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_m", distance_m(position, home))
+    distance = distance_m(at.need(GlobalPosition), known(at.vehicle.home))
+    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_m", distance)
 
 
-def home_direction(at: Moment) -> Message | None:
+def home_direction(at: Moment) -> Message:
     """NAMED_VALUE_FLOAT: the direction of home, degrees."""
-    position, home = at.fresh(GlobalPosition), at.vehicle.home
-    if position is None or home is None:
-        return None
-    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_deg", bearing_deg(position, home))
+    direction = bearing_deg(at.need(GlobalPosition), known(at.vehicle.home))
+    return messages.MAVLink_named_value_float_message(at.boot_ms, b"home_deg", direction)
 
 
-def home_position(at: Moment) -> Message | None:
+def home_position(at: Moment) -> Message:
     """HOME_POSITION: degrees * 1e7, mm above mean sea level; the local frame has its origin there."""
-    home = at.vehicle.home
-    if home is None or home.altitude_m is None:
-        return None
-    altitude_mm = _fit(round(home.altitude_m * 1000), 32)
+    home = known(at.vehicle.home)
+    altitude_mm = _fit(round(known(home.altitude_m) * 1000), 32)
     unknown_attitude, unknown_approach = [math.nan] * 4, [math.nan] * 3
     return messages.MAVLink_home_position_message(
         home.lat_e7, home.lon_e7, altitude_mm, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach
     )
+
+
+def _rates(now: Orientation) -> Iterable[float]:
+    """Radians a second: roll, pitch, yaw."""
+    return _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
+
+
+def _padded(channels_us: tuple[int, ...], count: int) -> tuple[int, ...]:
+    """`count` channels; missing ones are unknown."""
+    return (*channels_us, *[_UNKNOWN_U16] * count)[:count]
 
 
 def _rssi(at: Moment) -> int:

@@ -18,7 +18,7 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 _SILENCE_S = 10.1
 #: Unsolicited messages.
 TELEMETRY_TYPES = {"HEARTBEAT", "MISSION_CURRENT", "CURRENT_MODE"} | {
-    m.mavlink_map[row.msgid].msgname for row in TELEMETRY if row.interval_s < math.inf
+    m.mavlink_map[row.msgid].msgname for row in TELEMETRY if row.reading is not None and row.interval_s < math.inf
 }
 
 

@@ -32,7 +32,7 @@ from bridge.model.vehicle import (
 )
 from bridge.model.vehicle_groups import Group
 from bridge.vehicle import vehicle_messages as make
-from bridge.vehicle.telemetry_table import Maker
+from bridge.vehicle.vehicle_messages import Maker
 from bridge.vehicle.vehicle_report import VehicleReporter
 from protocols.msp.telemetry import Sensor
 from service.settings.zenoh import PayloadEncoding
@@ -120,11 +120,10 @@ class Receivers:
 
     def message(self, maker: Maker) -> Any:
         """The message as received; None if it is not sent."""
-        made = maker(make.Moment(self.vehicle, NOW, boot_ms=1))
-        if made is None:
-            return None
-        codec = m.MAVLink(None, srcSystem=1, srcComponent=1)
-        return m.MAVLink(None).decode(bytearray(made.pack(codec)))
+        for made in make.Moment(self.vehicle, NOW, boot_ms=1).made((maker,)):
+            codec = m.MAVLink(None, srcSystem=1, srcComponent=1)
+            return m.MAVLink(None).decode(bytearray(made.pack(codec)))
+        return None
 
     def is_fresh(self, group: Any) -> bool:
         """By the schemas' definition: "above 1.5 it is stale"."""
