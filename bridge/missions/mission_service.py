@@ -15,6 +15,7 @@ from bridge.missions.fc_mission_store import (
     LIST_IS_GONE,
     AnyFcMissionStore,
     PushFailure,
+    PushProgress,
     PushResult,
     StoreReport,
     StoreState,
@@ -209,7 +210,7 @@ class MissionService:
         return NO_LINK if report is None else report.rules
 
     def deliver(
-        self, arrived: ArrivedMission, progress: Callable[[int], None], *, is_kept: bool = True
+        self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True
     ) -> Conversation[DeliveryResult]:
         """Store the mission, write it to the flight controller if the rules accept it, and store the outcome.
 
@@ -220,7 +221,7 @@ class MissionService:
         return delivery
 
     def _deliver(
-        self, arrived: ArrivedMission, progress: Callable[[int], None], *, is_kept: bool
+        self, arrived: ArrivedMission, progress: PushProgress, *, is_kept: bool
     ) -> Conversation[DeliveryResult]:
         number = (yield from save(arrived)) if is_kept else None
         verdict = arrived.verdict
@@ -272,7 +273,7 @@ class MissionService:
         return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
 
     def _push(
-        self, fc_store: AnyFcMissionStore, arrived: ArrivedMission, progress: Callable[[int], None]
+        self, fc_store: AnyFcMissionStore, arrived: ArrivedMission, progress: PushProgress
     ) -> Conversation[PushResult]:
         records = arrived.verdict.records
 

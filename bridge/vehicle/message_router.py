@@ -106,22 +106,19 @@ class MessageRouter:
         if mission_type == m.MAV_MISSION_TYPE_MISSION or clears_all:
             self._handlers[msgid](station, message, now)
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
-            self._refuse_mission_type(station, msgid, mission_type)
+            if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
+                self._ground.say(Severity.ERROR, "No fences or rally points: only missions are stored", station)
+            self._ack(station, MissionResult.UNSUPPORTED, mission_type)
 
-    def _refuse_mission_type(self, station: Station, msgid: int, mission_type: int) -> None:
-        if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
-            self._ground.say(Severity.ERROR, "No fences or rally points: only missions are stored", station)
-        ack = m.MAVLink_mission_ack_message(station.sysid, station.compid, MissionResult.UNSUPPORTED, mission_type)
-        self._ground.to(station, ack)
+    def _ack(self, station: Station, result: MissionResult, mission_type: int) -> None:
+        self._ground.to(station, m.MAVLink_mission_ack_message(station.sysid, station.compid, result, mission_type))
 
     def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):
             self._ground.say(Severity.ERROR, "It is flown with the transmitter", station)
-            self._ground.to(
-                station, m.MAVLink_mission_ack_message(station.sysid, station.compid, MissionResult.DENIED, 0)
-            )
-            return
-        self._uploads.item(station, item, now)
+            self._ack(station, MissionResult.DENIED, m.MAV_MISSION_TYPE_MISSION)
+        else:
+            self._uploads.item(station, item, now)
 
     def _mission_count(self, station: Station, message: Message, now: float) -> None:
         self._downloads.forget(station)

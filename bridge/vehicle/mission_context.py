@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from bridge.gcs.ground import Ground
+from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import Conversation, LinkLost, Stopped
 from bridge.line.runner import Runner
 from bridge.missions.mission_service import NO_LINK, STOPPING, MissionService
 from bridge.model.events import EventLog, Incidents
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Vehicle
+from protocols.mavlink.dialect import messages
+from protocols.mission_item import MissionResult
 
 T = TypeVar("T")
 
@@ -38,3 +41,12 @@ class MissionContext:
             on_done(result, at)
 
         self.runner.start(conversation, done, now)
+
+    def ack(self, station: Station, result: MissionResult) -> None:
+        """Send a MISSION_ACK."""
+        self.ground.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, result))
+
+    def refuse(self, station: Station, refusal: Refusal) -> None:
+        """Send the reason as a text, and a MISSION_ACK."""
+        self.ground.say(Severity.ERROR, refusal.text, station)
+        self.ack(station, refusal.ack)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from bridge.gcs.cost import Cost
-from bridge.gcs.station import Severity, Station
+from bridge.gcs.station import Station
 from bridge.missions.mission_service import HeldMission
 from bridge.model.refusal import Refusal
 from bridge.model.vehicle import Home
@@ -59,7 +59,7 @@ class MissionDownloads:
     def request_list(self, station: Station, now: float) -> None:
         """MISSION_REQUEST_LIST."""
         if self._vehicle.armed:
-            self._refuse(station, _ARMED)
+            self._context.refuse(station, _ARMED)
         else:
             self._ask(_Question(station, None, as_int=True), now)
 
@@ -71,7 +71,7 @@ class MissionDownloads:
             if seq == 0:
                 self._send_home(question, now)
             else:
-                self._refuse(station, _ARMED)
+                self._context.refuse(station, _ARMED)
         elif snapshot is not None and now < snapshot.until:
             snapshot.until = now + _READING_S
             self._answer(question, snapshot.items)
@@ -110,7 +110,7 @@ class MissionDownloads:
                 if question.seq == 0 and (self._vehicle.armed or self._vehicle.home_or_position() is not None):
                     self._send_home(question, now)
                 elif question.seq != 0 or self._vehicle.armed is not None:
-                    self._refuse(question.station, held)
+                    self._context.refuse(question.station, held)
                 # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
                 continue
             self._snapshots.pop(question.station, None)
@@ -120,21 +120,21 @@ class MissionDownloads:
             self._answer(question, held.items)
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...]) -> None:
+        station = question.station
         if question.seq is None:
             # DroneKit takes home from a download, and waits forever without one: so an empty list has home if known.
-            self._send_count(question.station, len(items) or int(self._vehicle.home_or_position() is not None))
+            count = len(items) or int(self._vehicle.home_or_position() is not None)
+            self._ground.to(station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count))
         elif question.seq < len(items):
-            self._send_item(question.station, items[question.seq], as_int=question.as_int)
+            self._send_item(question, items[question.seq])
         elif question.seq == 0:
-            self._send_item(question.station, self._home_item(), as_int=question.as_int)
+            self._send_item(question, self._home_item())
         else:
-            self._ack(question.station, MissionResult.INVALID_SEQUENCE)
+            self._context.ack(station, MissionResult.INVALID_SEQUENCE)
 
-    def _send_count(self, station: Station, count: int) -> None:
-        self._ground.to(station, messages.MAVLink_mission_count_message(station.sysid, station.compid, count))
-
-    def _send_item(self, station: Station, item: MissionItem, *, as_int: bool) -> None:
-        self._ground.to(station, item_message(item, station.sysid, station.compid, as_int=as_int))
+    def _send_item(self, question: _Question, item: MissionItem) -> None:
+        station = question.station
+        self._ground.to(station, item_message(item, station.sysid, station.compid, as_int=question.as_int))
 
     def _send_home(self, question: _Question, now: float) -> None:
         """Item 0 while armed. Until a position is heard the first request waits for its repetition."""
@@ -142,7 +142,7 @@ class MissionDownloads:
             self._homeless_since = min(self._homeless_since, now)
             if now < self._homeless_since + _POSITION_WAIT_S:
                 return
-        self._send_item(question.station, self._present_home(), as_int=question.as_int)
+        self._send_item(question, self._present_home())
 
     def _present_home(self) -> MissionItem:
         """Item 0 as last read, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
@@ -158,10 +158,3 @@ class MissionDownloads:
         return MissionItem(
             0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, home.lat_e7, home.lon_e7, home.altitude_m or 0.0
         )
-
-    def _refuse(self, station: Station, refusal: Refusal) -> None:
-        self._ground.say(Severity.ERROR, refusal.text, station)
-        self._ack(station, refusal.ack)
-
-    def _ack(self, station: Station, result: MissionResult) -> None:
-        self._ground.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, result))

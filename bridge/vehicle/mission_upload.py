@@ -7,6 +7,7 @@ packets of its own and takes any ack to MISSION_COUNT as "continue"; most specia
 in docs/ground-stations.md.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -14,10 +15,9 @@ from typing import Any
 from bridge.gcs.cost import Cost
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.station import Peer, Severity, Station
-from bridge.line.conversation import LinkLost
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
-from bridge.missions.mission_service import NO_LINK, OCCUPIED, DeliveryResult, MissionTransfer, TransferStep
+from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionTransfer, TransferStep
 from bridge.missions.mission_texts import finding_lines
 from bridge.model.events import Level
 from bridge.model.finding import Finding, News
@@ -46,6 +46,7 @@ from protocols.mavlink.dialect import messages
 from protocols.mission_item import MissionItem, MissionResult
 
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, "Too many uploads: wait a few seconds")
+_NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, "A mission can only be written as a whole")
 _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, "Unknown upload: write it again")
 #: Mission Planner has reported "Write Fast" as a success to its user, so a failure is shown three times, 2 s apart.
 _REMINDERS_S = (2.0, 4.0)
@@ -79,7 +80,6 @@ class MissionUploads:
     def __init__(self, context: MissionContext) -> None:
         self._context = context
         self._missions = context.missions
-        self._runner = context.runner
         self._ground = context.ground
         self._flash = context.ground.flash
         self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
@@ -117,7 +117,7 @@ class MissionUploads:
         answer = self._answers.to(station, now)
         if present is None and not count and answer is not None and now < answer.cancelled_until:
             # A repeated Cancel, whose answer was lost: it must not clear the mission on the craft.
-            self._ack(station, answer.ack)
+            self._context.ack(station, answer.ack)
         elif present is None or not self._is_for(present, count, now):
             self._begin(station, count, now)
 
@@ -144,8 +144,7 @@ class MissionUploads:
             return
         if item.seq >= upload.count:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
-            self._ground.say(Severity.ERROR, text, station)
-            self._ack(station, MissionResult.INVALID_SEQUENCE)
+            self._context.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text))
             return
         if state.announced_again:
             state.announced_again = False
@@ -164,10 +163,9 @@ class MissionUploads:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
         answer = self._answers.to(station, now)
         if answer is not None and answer.is_refusal:
-            self._ack(station, answer.ack)
-            return
-        self._ground.say(Severity.ERROR, "A mission can only be written as a whole", station)
-        self._ack(station, MissionResult.UNSUPPORTED)
+            self._context.ack(station, answer.ack)
+        else:
+            self._context.refuse(station, _NOT_WHOLE)
 
     def ack(self, station: Station, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
@@ -295,7 +293,14 @@ class MissionUploads:
             upload.state = after(event, now)
         match event:
             case Turn() if isinstance(before, Complete):
-                self._deliver(upload, before.received, before.verdict, now)
+                verdict = before.verdict
+                self._deliver(
+                    upload,
+                    before.received,
+                    verdict,
+                    lambda result, at: self._delivered(upload, verdict, result, at),
+                    now,
+                )
             case Turn():
                 if self._in(Asking, Receiving) == [upload] and now >= self._last_end + _PAUSE_S:
                     self._arriving_since = now
@@ -374,33 +379,32 @@ class MissionUploads:
             for elsewhere in self._elsewhere(upload, now):
                 self._ground.to(elsewhere, request)
 
-    def _deliver(self, upload: _Upload, items: tuple[MissionItem, ...], verdict: Verdict[Any], now: float) -> None:
+    def _deliver(
+        self,
+        upload: _Upload,
+        items: tuple[MissionItem, ...],
+        verdict: Verdict[Any],
+        on_done: Callable[[DeliveryResult | Refusal, float], None],
+        now: float,
+    ) -> None:
+        """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
+        is_kept = verdict.result is not Result.REJECTED or self._ground.allows(upload.station, Cost.STORED)
         arrived = ArrivedMission(str(upload.station), items, verdict)
-        is_kept = verdict.result is not Result.REJECTED or self._is_kept(upload)
-        self._runner.start(
-            self._missions.deliver(arrived, _ignore, is_kept=is_kept),
-            lambda delivery, at: self._delivered(upload, verdict, delivery, at),
-            now,
-        )
-
-    def _is_kept(self, upload: _Upload) -> bool:
-        """False if a ground station sent too many lists that did not reach the flight controller."""
-        return self._ground.allows(upload.station, Cost.STORED)
+        self._context.run(self._missions.deliver(arrived, is_kept=is_kept), on_done, now)
 
     def _delivered(
-        self, upload: _Upload, verdict: Verdict[Any], delivery: DeliveryResult | LinkLost, now: float
+        self, upload: _Upload, verdict: Verdict[Any], delivery: DeliveryResult | Refusal, now: float
     ) -> None:
-        if isinstance(delivery, LinkLost):
-            delivery = DeliveryResult(NO_LINK.ack, NO_LINK.text, None)
-        if verdict.result is not Result.REJECTED and delivery.ack is MissionResult.ACCEPTED and not delivery.change:
+        if isinstance(delivery, Refusal):
+            self._end([upload], delivery, now)
+            return
+        accepted = delivery.ack is MissionResult.ACCEPTED
+        if verdict.result is not Result.REJECTED and accepted and not delivery.change:
             self._flash.not_written(upload.station.peer)
         self._tell(upload.station, verdict, delivery)
         if upload in self._uploads:
-            # A station that has announced another list would take this ack for that one's.
-            if not upload.is_superseded:
-                self._answer(upload, delivery.ack, now)
+            self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
-        accepted = delivery.ack is MissionResult.ACCEPTED
         facts = {"mission": delivery.number, "ack": delivery.ack.name, "detail": delivery.text}
         self._note("mission.upload_ended", upload, "info" if accepted else "warning", **facts)
         self._begin_next(now)
@@ -425,9 +429,7 @@ class MissionUploads:
         if items := state.received:
             finding = Finding(None, "list", len(items), None, refusal.text)
             verdict: Verdict[Any] = Verdict(Result.REJECTED, refusal.ack, findings=(finding,))
-            arrived = ArrivedMission(str(upload.station), items, verdict)
-            delivery = self._missions.deliver(arrived, _ignore, is_kept=self._is_kept(upload))
-            self._runner.start(delivery, lambda _delivery, _at: None, now)
+            self._deliver(upload, items, verdict, lambda _result, _at: None, now)
             if state.is_closed:
                 self._reminders += [(now + later_s, upload.station, refusal.text) for later_s in _REMINDERS_S]
         self._ground.say(Severity.ERROR, refusal.text, upload.station)
@@ -467,11 +469,10 @@ class MissionUploads:
         answer = self._answers.to(station, now)
         if answer is not None:
             if answer.is_refusal or seq == answer.count - 1:
-                self._ack(station, answer.ack)
+                self._context.ack(station, answer.ack)
         elif not self._uploads and not self._answers.is_known(station, now):
-            self._ground.say(Severity.ERROR, _UNKNOWN_UPLOAD.text, station)
             self._answers.note(station, _UNKNOWN_UPLOAD.ack, 0, now)
-            self._ack(station, _UNKNOWN_UPLOAD.ack)
+            self._context.refuse(station, _UNKNOWN_UPLOAD)
 
     def _elsewhere(self, upload: _Upload, now: float) -> list[Station]:
         """Other addresses of the upload's station, except those that have announced a list of their own."""
@@ -483,12 +484,12 @@ class MissionUploads:
         ]
 
     def _answer(self, upload: _Upload, ack: MissionResult, now: float) -> None:
+        if upload.is_superseded:
+            # The station would take this ack for that of the list that it has announced since.
+            return
         for where in (upload.station, *self._elsewhere(upload, now)):
             self._answers.note(where, ack, upload.count, now, is_cancelled=upload.is_cancelled)
-            self._ack(where, ack)
-
-    def _ack(self, station: Station, ack: MissionResult) -> None:
-        self._ground.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, ack))
+            self._context.ack(where, ack)
 
     def _note(self, event: str, upload: _Upload, level: Level = "info", **facts: object) -> None:
         self._context.log_event(level, event, **{"station": str(upload.station)} | facts, incident=upload.incident)
@@ -496,7 +497,3 @@ class MissionUploads:
 
 def _cancelled(why: str) -> Refusal:
     return Refusal(MissionResult.OPERATION_CANCELLED, f"Upload {why}, old mission kept")
-
-
-def _ignore(_records: int) -> None:
-    """No progress report: MAVLink has no message for it."""
