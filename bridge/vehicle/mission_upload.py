@@ -9,6 +9,7 @@ in docs/ground-stations.md.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -156,6 +157,7 @@ class MissionUploads:
         taken = state.take(item, now)
         if isinstance(taken, Judged):
             self._handle(upload, taken, now)
+            self._begin_next(now)
         elif taken:
             self._request(upload, now)
 
@@ -236,13 +238,16 @@ class MissionUploads:
         self._reminders = [reminder for reminder in self._reminders if reminder[1] != station]
         for older in self._uploads:
             older.is_superseded |= older.station == station
+        if not self._ground.allows(station, Cost.UPLOAD):
+            # A flood must cost less than the lists that it announces: no incident, no log entry.
+            self._answers.note(station, _TOO_MANY_UPLOADS.ack, count, now)
+            self._context.refuse(station, _TOO_MANY_UPLOADS)
+            return
         upload = _Upload(station, count, self._context.incidents.begin("upload"), Waiting(Announced(), now))
         self._uploads.append(upload)
-        refusal = self._missions.armed_refusal()
-        if refusal is None and not self._ground.allows(station, Cost.UPLOAD):
-            refusal = _TOO_MANY_UPLOADS
-        if refusal is not None:
-            self._handle(upload, Ended(refusal), now)
+        armed = self._missions.armed_refusal()
+        if armed is not None:
+            self._end([upload], armed, now)
         elif len(self._uploads) > _MOST_UPLOADS:
             self._end([min(self._undelivered(), key=self._worth)], _cancelled("ended: too many at once"), now)
         self._begin_next(now)
@@ -255,9 +260,6 @@ class MissionUploads:
     def _begin_next(self, now: float) -> None:
         """Continue the uploads whose turn has come: first that of the host that has written least."""
         for upload in sorted(self._in(Waiting, Complete), key=lambda upload: self._flash.used(upload.station.peer)):
-            if upload not in self._in(Waiting, Complete):
-                # The end of an earlier one has already continued it.
-                continue
             event = self._turn(upload, now)
             if event is not None:
                 self._handle(upload, event, now)
@@ -293,23 +295,14 @@ class MissionUploads:
             upload.state = after(event, now)
         match event:
             case Turn() if isinstance(before, Complete):
-                verdict = before.verdict
-                self._deliver(
-                    upload,
-                    before.received,
-                    verdict,
-                    lambda result, at: self._delivered(upload, verdict, result, at),
-                    now,
-                )
+                delivered = partial(self._delivered, upload, before.verdict)
+                self._deliver(upload, before.received, before.verdict, delivered, now)
             case Turn():
                 if self._in(Asking, Receiving) == [upload] and now >= self._last_end + _PAUSE_S:
                     self._arriving_since = now
-                self._ask(now)
             case Ready():
                 self._note("mission.upload_started", upload, count=upload.count)
                 self._request(upload, now)
-            case Judged():
-                self._begin_next(now)
             case Ended(refusal):
                 self._refuse(upload, before, refusal, now)
 
@@ -407,7 +400,6 @@ class MissionUploads:
             self._handle(upload, Delivered(), now)
         facts = {"mission": delivery.number, "ack": delivery.ack.name, "detail": delivery.text}
         self._note("mission.upload_ended", upload, "info" if accepted else "warning", **facts)
-        self._begin_next(now)
 
     def _tell(self, station: Station, verdict: Verdict[Any], delivery: DeliveryResult) -> None:
         """Report everything to the sender, and the change on the aircraft to other ground stations."""
@@ -435,7 +427,6 @@ class MissionUploads:
         self._ground.say(Severity.ERROR, refusal.text, upload.station)
         self._answer(upload, refusal.ack, now)
         self._note("mission.refused", upload, "warning", ack=refusal.ack.name, why=refusal.text)
-        self._begin_next(now)
 
     # Ground stations.
 
