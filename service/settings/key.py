@@ -2,11 +2,11 @@
 """One setting: its name, its meaning, how its value is read, and the problems of a wrong one."""
 
 import tomllib
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from reprlib import Repr
+from typing import NamedTuple
 
 _ENVIRONMENT = "NAZE_BRIDGE_"
 _repr = Repr()
@@ -36,16 +36,15 @@ class SettingsError(ValueError):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
-class Reader(ABC):
-    """Converts a given value to the one used; raises Unfit, or another ValueError with a whole sentence."""
+class Reader(NamedTuple):
+    """Converts a given value to the one used. `read` gets the value, and the folder of its file.
 
-    @abstractmethod
-    def read(self, value: object, folder: Path) -> object:
-        """Read a value of the file in `folder`."""
+    It raises Unfit, or another ValueError with a whole sentence. `from_text` converts text from the environment or a
+    flag to the form of the file.
+    """
 
-    def from_text(self, text: str) -> object:
-        """Convert text from the environment or a flag to the form of the file; most readers use it unchanged."""
-        return text
+    read: Callable[[object, Path], object]
+    from_text: Callable[[str], object] = str
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,119 +80,91 @@ def _wrong(value: object, wanted: str) -> Unfit:
     return Unfit(f"is {short(value)}, but must be {wanted}")
 
 
-@dataclass(frozen=True, slots=True)
-class Text(Reader):
+def text(wanted: str = "text in quotes", parse: Callable[[str], object] = str) -> Reader:
     """Any text; `wanted` describes it, `parse` may reject it."""
 
-    wanted: str = "text in quotes"
-    parse: Callable[[str], object] = str
-
-    def read(self, value: object, folder: Path) -> object:
-        """Read a text."""
+    def read(value: object, _folder: Path) -> object:
         if not isinstance(value, str) or not value:
-            raise _wrong(value, self.wanted)
-        return self.parse(value)
+            raise _wrong(value, wanted)
+        return parse(value)
+
+    return Reader(read)
 
 
-@dataclass(frozen=True, slots=True)
-class FileName(Reader):
+def file_name(*, in_config_folder: bool = False) -> Reader:
     """A file or folder; if `in_config_folder`, a relative path starts at the configuration file's folder."""
 
-    in_config_folder: bool = False
-
-    def read(self, value: object, folder: Path) -> object:
-        """Read a path."""
+    def read(value: object, folder: Path) -> object:
         if not isinstance(value, str) or not value or "\0" in value:
             raise _wrong(value, "text in quotes: the name of a file or folder")
-        return folder / value if self.in_config_folder else Path(value)
+        return folder / value if in_config_folder else Path(value)
+
+    return Reader(read)
 
 
-@dataclass(frozen=True, slots=True)
-class Whole(Reader):
+def whole(least: int, most: int) -> Reader:
     """A whole number from `least` to `most`."""
 
-    least: int
-    most: int
-
-    def read(self, value: object, folder: Path) -> object:
-        """Read a number."""
+    def read(value: object, _folder: Path) -> object:
         if type(value) is not int:
-            raise _wrong(value, f"a whole number, {self.least}..{self.most}")
-        if not self.least <= value <= self.most:
-            raise _wrong(value, f"{self.least}..{self.most}")
+            raise _wrong(value, f"a whole number, {least}..{most}")
+        if not least <= value <= most:
+            raise _wrong(value, f"{least}..{most}")
         return value
 
-    def from_text(self, text: str) -> object:
-        """Read its digits."""
-        return int(text) if text.isascii() and text.isdecimal() and len(text) < len(str(self.most)) + 2 else text
+    def from_text(digits: str) -> object:
+        return int(digits) if digits.isascii() and digits.isdecimal() and len(digits) < len(str(most)) + 2 else digits
+
+    return Reader(read, from_text)
 
 
-@dataclass(frozen=True, slots=True)
-class YesNo(Reader):
+def yes_no() -> Reader:
     """True or false."""
 
-    def read(self, value: object, folder: Path) -> object:
-        """Read a truth value."""
+    def read(value: object, _folder: Path) -> object:
         if type(value) is not bool:
             raise _wrong(value, "true or false")
         return value
 
-    def from_text(self, text: str) -> object:
-        """Read the word."""
-        return {"true": True, "false": False}.get(text.lower(), text)
+    return Reader(read, lambda word: {"true": True, "false": False}.get(word.lower(), word))
 
 
-@dataclass(frozen=True, slots=True)
-class Choice(Reader):
+def choice(words: Sequence[str], parse: Callable[[str], object] = str) -> Reader:
     """One of several words, converted by `parse`."""
 
-    words: Sequence[str]
-    parse: Callable[[str], object] = str
+    def read(value: object, _folder: Path) -> object:
+        if not isinstance(value, str) or value not in words:
+            raise _wrong(value, " or ".join(f'"{word}"' for word in words))
+        return parse(value)
 
-    def read(self, value: object, folder: Path) -> object:
-        """Read a word."""
-        if not isinstance(value, str) or value not in self.words:
-            raise _wrong(value, " or ".join(f'"{word}"' for word in self.words))
-        return self.parse(value)
+    return Reader(read)
 
 
-@dataclass(frozen=True, slots=True)
-class Several(Reader):
+def several(wanted: str, parse: Callable[[object, Path], object], *, may_be_empty: bool = True) -> Reader:
     """A list, each entry read by `parse(entry, folder)`."""
 
-    wanted: str
-    parse: Callable[[object, Path], object]
-    may_be_empty: bool = True
-
-    def read(self, value: object, folder: Path) -> object:
-        """Read a list."""
+    def read(value: object, folder: Path) -> object:
         if not isinstance(value, list):
-            raise _wrong(value, f"a list in brackets, {self.wanted}")
-        if not value and not self.may_be_empty:
-            raise Unfit(f"is empty: write {self.wanted}, or omit it")
-        return tuple(self.parse(entry, folder) for entry in value)
+            raise _wrong(value, f"a list in brackets, {wanted}")
+        if not value and not may_be_empty:
+            raise Unfit(f"is empty: write {wanted}, or omit it")
+        return tuple(parse(entry, folder) for entry in value)
 
-    def from_text(self, text: str) -> object:
-        """Take its words."""
-        return text.split()
+    return Reader(read, str.split)
 
 
-@dataclass(frozen=True, slots=True)
-class Table(Reader):
+def table(wanted: str, parse: Callable[[object], object]) -> Reader:
     """A table of one line, {name = value}."""
 
-    wanted: str
-    parse: Callable[[object], object]
-
-    def read(self, value: object, folder: Path) -> object:
-        """Read a table."""
+    def read(value: object, _folder: Path) -> object:
         if not isinstance(value, dict):
-            raise _wrong(value, f"a table, {self.wanted}")
-        return self.parse(value)
+            raise _wrong(value, f"a table, {wanted}")
+        return parse(value)
 
-    def from_text(self, text: str) -> object:
-        """Read the table as TOML."""
+    def from_text(toml: str) -> object:
         try:
-            return tomllib.loads(f"table = {text}")["table"]
+            return tomllib.loads(f"table = {toml}")["table"]
         except tomllib.TOMLDecodeError:
-            return text
+            return toml
+
+    return Reader(read, from_text)

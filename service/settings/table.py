@@ -7,7 +7,7 @@ from pathlib import Path
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.model.autopilot import Autopilot
 from service.settings.addresses import parse_fc
-from service.settings.key import Choice, FileName, Key, Several, Table, Text, Unfit, Whole, YesNo
+from service.settings.key import Key, Reader, Unfit, choice, file_name, several, table, text, whole, yes_no
 from service.settings.settings import (
     DEFAULT_GCS,
     DEFAULT_LOG_LEVEL,
@@ -24,12 +24,12 @@ LOG_LEVELS = ("debug", "info", "warning", "error")
 _LIMITS = TlogLimits()
 
 
-def _name(key: str) -> Text:
-    def parse(text: str) -> str:
-        check_name(key, text)
-        return text
+def _name(key: str) -> Reader:
+    def parse(name: str) -> str:
+        check_name(key, name)
+        return name
 
-    return Text(parse=parse)
+    return text(parse=parse)
 
 
 def _endpoint(entry: object, _folder: Path) -> str:
@@ -47,14 +47,14 @@ def _host_name(entry: object, _folder: Path) -> str:
 KEYS = (
     Key(
         "fc",
-        Text(parse=parse_fc),
+        text(parse=parse_fc),
         "The flight controller: auto looks for it on the header's UART and on USB; /dev/ttyAMA0 (detects the speed), "
         "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim: for a simulated one.",
         default='"auto"',
     ),
     Key(
         "gcs",
-        Several(f'as in ["{DEFAULT_GCS}"]', parse_link, may_be_empty=False),
+        several(f'as in ["{DEFAULT_GCS}"]', parse_link, may_be_empty=False),
         "Links to ground stations: udpin:ADDR:PORT, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:ADDR:PORT. As a table, "
         '{address = "udpin:0.0.0.0:14550", key_file = "gcs.key", writers = ["192.168.4.0/24"]}, a link limits who may '
         "write.",
@@ -63,7 +63,7 @@ KEYS = (
     ),
     Key(
         "share",
-        Several('as in [{address = "tcpin:127.0.0.1:5761"}]', parse_share),
+        several('as in [{address = "tcpin:127.0.0.1:5761"}]', parse_share),
         "Ports on which INAV Configurator, MultiWiiConf or mwp may speak MSP through the bridge while the craft is "
         "disarmed; also as [[share]] tables. write = true lets them change settings: MSP has no password, so anyone "
         "who reaches the port can.",
@@ -71,49 +71,49 @@ KEYS = (
     ),
     Key(
         "state_dir",
-        FileName(),
+        file_name(),
         "Folder for stored missions and telemetry logs. By default systemd's StateDirectory, else "
         "~/.local/state/naze-bridge.",
         example='"/var/lib/naze-bridge"',
     ),
-    Key("sysid", Whole(1, 255), "MAVLink system id of the vehicle, 1..255.", str(DEFAULT_SYSID)),
+    Key("sysid", whole(1, 255), "MAVLink system id of the vehicle, 1..255.", str(DEFAULT_SYSID)),
     Key(
         "takeoff_max_m",
-        Whole(2, 255),
+        whole(2, 255),
         "Maximum take-off altitude of a mission, metres, 2..255; a higher one is lowered to it.",
         str(TAKEOFF_MAX_M),
     ),
     Key(
         "autopilot",
-        Choice([each.value for each in Autopilot], Autopilot),
+        choice([each.value for each in Autopilot], Autopilot),
         'The sender of MAVLink on the port: "auto" detects it, "harakiri" is translated, "other" is passed through.',
         f'"{Autopilot.AUTO.value}"',
     ),
     Key(
         "pass_through",
-        Choice([each.value for each in PassThroughRule], PassThroughRule),
+        choice([each.value for each in PassThroughRule], PassThroughRule),
         "Messages for an autopilot in pass-through from links with neither key_file nor writers: "
         '"missions" (and parameters and requests), or "everything": arming, modes and control, too.',
         f'"{PassThroughRule.MISSIONS.value}"',
     ),
-    Key("record_tlog", YesNo(), "Record telemetry, for replay in Mission Planner.", "true"),
-    Key("tlog_file_mb", Whole(1, 1024), "Size of one telemetry log, megabytes, 1..1024.", str(_LIMITS.file_size >> 20)),
+    Key("record_tlog", yes_no(), "Record telemetry, for replay in Mission Planner.", "true"),
+    Key("tlog_file_mb", whole(1, 1024), "Size of one telemetry log, megabytes, 1..1024.", str(_LIMITS.file_size >> 20)),
     Key(
         "tlog_total_mb",
-        Whole(2, 1 << 20),
+        whole(2, 1 << 20),
         "Size of all telemetry logs together, megabytes, at least twice tlog_file_mb; the oldest are deleted.",
         str(_LIMITS.total_size >> 20),
     ),
-    Key("tlog_days", Whole(1, 3650), "How long a telemetry log is kept, days, 1..3650.", str(_LIMITS.days)),
+    Key("tlog_days", whole(1, 3650), "How long a telemetry log is kept, days, 1..3650.", str(_LIMITS.days)),
     Key(
         "record_uart",
-        FileName(),
+        file_name(),
         "File for a recording of the traffic with the flight controller, for a bug report. Off by default.",
         example='"/var/lib/naze-bridge/naze.uart"',
     ),
     Key(
         "log_level",
-        Choice(LOG_LEVELS),
+        choice(LOG_LEVELS),
         "Minimum level of logged events: debug, info, warning or error.",
         f'"{DEFAULT_LOG_LEVEL}"',
         is_live=True,
@@ -127,73 +127,73 @@ KEYS = (
     ),
     Key(
         "zenoh.encoding",
-        Choice([each.value for each in PayloadEncoding], PayloadEncoding),
+        choice([each.value for each in PayloadEncoding], PayloadEncoding),
         "Encoding of payloads: json or cbor.",
         f'"{PayloadEncoding.JSON.value}"',
     ),
     Key(
         "zenoh.profile",
-        Choice([each.value for each in ZenohProfile], ZenohProfile),
+        choice([each.value for each in ZenohProfile], ZenohProfile),
         "Data volume: full sends each sample; metered a group every 5 s, or 30 s if unchanged, but arming at once.",
         f'"{ZenohProfile.FULL.value}"',
     ),
     Key(
         "zenoh.rates",
-        Table("as in {attitude = 2, position = 1}", check_rates),
+        table("as in {attitude = 2, position = 1}", check_rates),
         "Maximum rate of a telemetry group, or of state, Hz; 0: never. Overrides the profile.",
         example="{attitude = 2, position = 1}",
     ),
     Key(
         "zenoh.connect",
-        Several('as in ["tcp/192.168.4.1:7447"]', _endpoint),
+        several('as in ["tcp/192.168.4.1:7447"]', _endpoint),
         "Endpoints to join: a router or other peers.",
         "[]",
     ),
     Key(
         "zenoh.listen",
-        Several('as in ["tcp/0.0.0.0:7447"]', _endpoint),
+        several('as in ["tcp/0.0.0.0:7447"]', _endpoint),
         "Endpoints on which to accept other sessions.",
         "[]",
     ),
     Key(
         "zenoh.config_file",
-        FileName(in_config_folder=True),
+        file_name(in_config_folder=True),
         "A zenoh configuration file, for TLS, passwords, access control, namespace.",
         example='"zenoh.json5"',
     ),
     Key(
         "zenoh.commands",
-        YesNo(),
+        yes_no(),
         "Allow writing and clearing missions over zenoh; the transport must be authenticated.",
         "false",
     ),
     Key(
         "zenoh.commands_without_authentication",
-        Text(f'"{I_KNOW}", or omitted'),
+        text(f'"{I_KNOW}", or omitted'),
         f'"{I_KNOW}": accept commands without authentication, from anyone who reaches the session.',
         example=f'"{I_KNOW}"',
     ),
     Key(
         "zenoh.mavlink_in",
-        YesNo(),
+        yes_no(),
         "Accept raw MAVLink frames over zenoh, under the same condition as commands.",
         "false",
     ),
     Key(
         "web.listen",
-        Text('"HOST:PORT"', parse_listen),
+        text('"HOST:PORT"', parse_listen),
         "Address of the status page: 0.0.0.0:8080 for the whole network, 127.0.0.1:8080 for this machine only.",
         f'"{DEFAULT_LISTEN}"',
     ),
     Key(
         "web.hosts",
-        Several('as in ["naze-1.example.ts.net"]', _host_name),
+        several('as in ["naze-1.example.ts.net"]', _host_name),
         "Full names by which browsers may open the page; addresses and local names always work.",
         "[]",
     ),
     Key(
         "web.token_file",
-        FileName(in_config_folder=True),
+        file_name(in_config_folder=True),
         "File with the token for writing missions and fetching logs, created if it is missing. By default web-token in"
         " state_dir.",
         example='"/etc/naze-bridge/web-token"',
