@@ -8,7 +8,7 @@ else needs the token in a header, which no other site can make a browser send.
 
 import ipaddress
 import re
-from collections.abc import Awaitable, Callable, Container, Mapping
+from collections.abc import Awaitable, Callable, Container
 from http import HTTPStatus
 
 import structlog
@@ -45,14 +45,6 @@ _FAILED = "The daemon failed to answer; see its log."
 _log = structlog.get_logger()
 
 
-class Refused(Exception):
-    """The request is refused: an HTTP status, and one sentence."""
-
-    def __init__(self, status: HTTPStatus, text: str) -> None:
-        super().__init__(text)
-        self.status = status
-
-
 def is_own_name(host: str, known: Container[str]) -> bool:
     """True if a Host header can only mean this machine: an address, a name without dots, a local or a known one."""
     named = _HOST.fullmatch(host)
@@ -69,27 +61,21 @@ def is_own_name(host: str, known: Container[str]) -> bool:
 def check_token(request: Request, token: Token | TokenError) -> None:
     """Refuse a request without the token."""
     if isinstance(token, TokenError):
-        raise Refused(HTTPStatus.FORBIDDEN, f"This page is read-only: {token}.")
+        raise HTTPException(HTTPStatus.FORBIDDEN, f"This page is read-only: {token}.")
     if not token.is_shown_by(request.headers.get("authorization")):
         peer = None if request.client is None else request.client.host
         _log.warning("web.wrong_token", peer=peer, path=request.url.path)
-        raise Refused(HTTPStatus.FORBIDDEN, f"Wrong token. It is in {token.path} on the Pi.")
+        raise HTTPException(HTTPStatus.FORBIDDEN, f"Wrong token. It is in {token.path} on the Pi.")
 
 
 def guarded(handler: Handler, max_body: int = 0) -> Handler:
-    """Check a request before its handler, and turn every outcome into a response. `max_body`: bytes."""
+    """Check a request before its handler. `max_body`: bytes."""
 
     async def answer(request: Request) -> Response:
-        try:
-            if not is_own_name(request.headers.get("host", ""), request.app.state.hosts):
-                raise Refused(HTTPStatus.MISDIRECTED_REQUEST, _WRONG_NAME)
-            _check_body(request, max_body)
-            return await handler(request)
-        except Refused as refusal:
-            return error_answer(refusal.status, str(refusal))
-        except Exception as error:
-            _log.error("web.failed", path=request.url.path, why=repr(error), exc_info=error)
-            return error_answer(HTTPStatus.INTERNAL_SERVER_ERROR, _FAILED)
+        if not is_own_name(request.headers.get("host", ""), request.app.state.hosts):
+            raise HTTPException(HTTPStatus.MISDIRECTED_REQUEST, _WRONG_NAME)
+        _check_body(request, max_body)
+        return await handler(request)
 
     return answer
 
@@ -99,18 +85,19 @@ def _check_body(request: Request, max_body: int) -> None:
     # h11 has checked that it is a number; int() of a very long one is slow.
     if "transfer-encoding" in request.headers or len(length) > len(str(MAX_FILE)) or int(length) > max_body:
         limit = f"at most {max_body >> 10} KiB" if max_body else "no data"
-        raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"This request may carry {limit}.")
+        raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"This request may carry {limit}.")
 
 
-async def not_found(_request: Request, error: Exception) -> Response:
-    """The response to an unknown path."""
+async def refused(_request: Request, error: Exception) -> Response:
+    """The response to a refused request: one sentence."""
     assert isinstance(error, HTTPException)
-    return error_answer(HTTPStatus(error.status_code), error.detail, error.headers)
+    return Response(to_json({"error": error.detail}), error.status_code, error.headers, "application/json")
 
 
-def error_answer(status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None) -> Response:
-    """An error response with one sentence."""
-    return Response(to_json({"error": text}), status, headers, "application/json")
+async def failed(request: Request, error: Exception) -> Response:
+    """The response to a request whose handler raised; uvicorn's own log of it is off."""
+    _log.error("web.failed", path=request.url.path, why=repr(error), exc_info=error)
+    return await refused(request, HTTPException(HTTPStatus.INTERNAL_SERVER_ERROR, _FAILED))
 
 
 class SafeHeaders:

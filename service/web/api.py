@@ -23,6 +23,7 @@ from dataclasses import asdict
 from functools import partial
 from http import HTTPStatus
 
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
@@ -38,7 +39,7 @@ from service.machine.host import Host
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.web import WebSettings
-from service.web.access import MAX_FILE, Refused, check_token, guarded
+from service.web.access import MAX_FILE, check_token, guarded
 from service.web.comparison import difference, shown, stored_mission
 from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.kept_answers import KeptAnswers
@@ -145,7 +146,9 @@ class Api:
     async def _connect_code(self, _request: Request) -> Response:
         urls = page_urls(self._listen, self._host.ipv4_addresses())
         if not urls:
-            raise Refused(HTTPStatus.NOT_FOUND, "Only this machine can open the page: see [web] in the configuration.")
+            raise HTTPException(
+                HTTPStatus.NOT_FOUND, "Only this machine can open the page: see [web] in the configuration."
+            )
         return Response(qr_code(urls[0]), media_type="image/svg+xml")
 
     async def _missions(self, _request: Request) -> Response:
@@ -188,7 +191,9 @@ class Api:
         try:
             return _json(await asyncio.to_thread(self._logs.list))
         except OSError as error:
-            raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {error.strerror}.") from error
+            raise HTTPException(
+                HTTPStatus.SERVICE_UNAVAILABLE, f"The logs cannot be read: {error.strerror}."
+            ) from error
 
     async def _read_log(self, request: Request) -> Response:
         check_token(request, self._token)
@@ -196,7 +201,9 @@ class Api:
         try:
             piece = await asyncio.to_thread(self._logs.read, request.path_params["name"], _whole(start))
         except OSError as error:
-            raise Refused(HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed meanwhile.") from error
+            raise HTTPException(
+                HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed meanwhile."
+            ) from error
         return Response(piece, media_type="application/octet-stream")
 
     async def _render_metrics(self, _request: Request) -> Response:
@@ -212,7 +219,7 @@ def _number(request: Request, name: str) -> int:
 
 def _whole(text: str) -> int:
     if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
-        raise Refused(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is not a valid number.")
+        raise HTTPException(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is not a valid number.")
     return int(text)
 
 
@@ -229,9 +236,9 @@ async def _told(asked: Awaitable[Json]) -> Json:
     try:
         return await asked
     except ControlError as error:
-        raise Refused(HTTPStatus.NOT_FOUND, str(error)) from error
+        raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
     except StoreError as error:
-        raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+        raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
 
 
 def _held_text(held: HeldMission) -> str:

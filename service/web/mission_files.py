@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
 
+from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 
 from protocols.mission_file import MissionFileError, read_mission_file
@@ -18,7 +19,6 @@ from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
 from service.daemon.mission_data import Json
-from service.web.access import Refused
 from service.web.comparison import MAX_ROWS, checked_mission
 from storage.store_error import StoreError
 
@@ -39,9 +39,9 @@ class MissionWriter:
         self.state: Json | None = None
 
     def begin(self, what: str, write: Callable[[Progress], Awaitable[Json]]) -> str:
-        """Start writing; returns the write's id, by which the page knows its own result. Refused: one is running."""
+        """Start writing; returns the write's id, by which the page knows its own result. Refused while one runs."""
         if self._task is not None and not self._task.done():
-            raise Refused(HTTPStatus.CONFLICT, "Another mission is being written: wait until it has finished.")
+            raise HTTPException(HTTPStatus.CONFLICT, "Another mission is being written: wait until it has finished.")
         state: Json = {"id": secrets.token_hex(8), "what": what, "records": 0, "done": False, "ok": False, "text": ""}
         self.state = state
         self._task = asyncio.get_running_loop().create_task(self._run(write, state))
@@ -81,7 +81,7 @@ class MissionFiles:
             try:
                 verdict = await self._api.check(items)
             except ControlError as error:
-                raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+                raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
             answer = await asyncio.to_thread(checked_mission, items, verdict)
             await asyncio.sleep(_PAUSE_S)
         return answer
@@ -95,17 +95,17 @@ class MissionFiles:
 async def _read(request: Request) -> tuple[str, list[MissionItem]]:
     name = request.query_params.get("name", "")[-_MAX_NAME:] or "mission file"
     if request.headers.get("content-type") != _CONTENT_TYPE:
-        raise Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the file as {_CONTENT_TYPE}.")
+        raise HTTPException(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Send the file as {_CONTENT_TYPE}.")
     try:
         body = await request.body()
     except ClientDisconnect as error:
-        raise Refused(HTTPStatus.BAD_REQUEST, "The file was not received completely.") from error
+        raise HTTPException(HTTPStatus.BAD_REQUEST, "The file was not received completely.") from error
     try:
         items = await asyncio.to_thread(read_mission_file, body, name)
     except MissionFileError as error:
-        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
+        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from error
     if len(items) > MAX_ROWS:
-        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
+        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has {len(items)} items; the limit is {MAX_ROWS}.")
     if not items:
-        raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
+        raise HTTPException(HTTPStatus.UNPROCESSABLE_ENTITY, f"{name} has no items: choose another file.")
     return name, items

@@ -15,7 +15,7 @@ from uvicorn.server import ServerState
 
 from service.daemon.daemon import Daemon
 from service.settings.web import WebSettings
-from service.web.access import SafeHeaders, guarded, not_found
+from service.web.access import SafeHeaders, failed, guarded, refused
 from service.web.api import Api
 from service.web.connection_limit import BoundedConnection, Door
 from service.web.static_files import static_files
@@ -88,9 +88,9 @@ class WebServer:
 
 def _config(api: Api, hosts: tuple[str, ...]) -> Config:
     routes = [*api.routes(), *(Route(path, guarded(handler)) for path, handler in static_files())]
-    app = Starlette(routes=routes, exception_handlers={HTTPException: not_found})
+    app = Starlette(routes=routes, exception_handlers={HTTPException: refused, Exception: failed})
     app.state.hosts = hosts
-    # uvicorn would log only the errors of browsers; ours are logged by `guarded`.
+    # uvicorn would log only the errors of browsers; ours are logged by `failed`.
     return Config(
         SafeHeaders(app),
         lifespan="off",
