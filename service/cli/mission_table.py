@@ -2,16 +2,16 @@
 """A mission as sent and as stored, side by side, for a terminal."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from bridge.model.finding import DROPPED, Finding, without_defaults
+from bridge.model.finding import Finding, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
-from service.daemon.mission_data import Json, mission_items
+from service.web.comparison import Row, sent_and_stored
 
 _CHANGED = "yellow"
 _DROPPED = "red"
@@ -28,46 +28,26 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
     and are printed below the table with their reasons, except filled-in defaults.
     """
-    reasons = Text("".join(f"\n{finding.text()}" for finding in without_defaults(findings)))
-    table = _empty_table(reasons)
-    dropped = {finding.seq for finding in findings if finding.becomes == DROPPED}
-    left = iter(stored)
-    for item in sent:
-        before = _values(item)
-        if item.seq in dropped:
-            table.add_row(f"{item.seq}->-", *before[1:], style=_DROPPED)
-        else:
-            held = next(left, None)
-            table.add_row(*map(_cell, before, _values(held) if held else before))
-    return table
+    reasons = "".join(f"\n{finding.text()}" for finding in without_defaults(findings))
+    return rows_table(sent_and_stored(sent, stored, findings), reasons)
 
 
-def _empty_table(caption: Text) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False, caption=caption, caption_justify="left")
+def rows_table(rows: Iterable[Row], caption: str) -> Table:
+    """Rows of a comparison, with "left->right" for each value that differs."""
+    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False, caption=Text(caption), caption_justify="left")
     table.add_column("WP", justify="right", no_wrap=True)
     table.add_column("Command", min_width=_LONGEST_STORED, overflow="fold")
     for title in ("p1", "p2", "p3", "p4", "Latitude", "Longitude", "Height"):
         table.add_column(title, justify="right", overflow="fold", no_wrap=True)
-    return table
-
-
-def difference_table(rows: Sequence[Json], first: str, second: str) -> Table:
-    """One row per item that differs (see service.web.comparison.difference), values as "first->second"."""
-    table = _empty_table(Text(f"\n{first} -> {second}"))
     for row in rows:
-        left, right = (None if row[side] is None else _values(_shown_item(row[side])) for side in ("left", "right"))
-        if left is not None and right is not None:
-            table.add_row(*map(_cell, left, right))
-        elif left is not None:
+        left, right = (item and _values(item) for item in (row.left, row.right))
+        if left and row.kind in ("dropped", "removed"):
             table.add_row(f"{left[0]}->-", *left[1:], style=_DROPPED)
-        elif right is not None:
+        elif left:
+            table.add_row(*map(_cell, left, right or left))
+        elif right:
             table.add_row(f"-->{right[0]}", *right[1:], style=_ADDED)
     return table
-
-
-def _shown_item(shown: Json) -> MissionItem:
-    (item,) = mission_items([{key: value for key, value in shown.items() if key != "name"}])
-    return item
 
 
 def _values(item: MissionItem) -> list[str]:

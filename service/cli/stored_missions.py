@@ -12,7 +12,7 @@ from rich.text import Text
 from service.cli.command_group import CommandGroup
 from service.cli.daemon_client import ask_store, ask_with_progress, bridge_options, daemon_options
 from service.cli.mission_commands import show_delivery
-from service.cli.mission_table import difference_table, mission_table
+from service.cli.mission_table import mission_table, rows_table
 from service.cli.printing import print_json, print_table
 from service.cli.sentences import say
 from service.daemon.mission_data import MOST, Json, mission_findings, mission_items
@@ -79,12 +79,11 @@ def show(number: int, state_dir: Path | None, as_json: bool) -> None:
 def diff(first: int, second: int, state_dir: Path | None, as_json: bool) -> None:
     """Compare missions FIRST and SECOND as sent. Exit code 1 if they differ."""
     before, after = (_fetch(state_dir, number)["received"]["items"] for number in (first, second))
-    rows = difference(mission_items(before), mission_items(after))
-    changed = [row for row in rows if row["kind"] != "same"]
+    changed = [row for row in difference(mission_items(before), mission_items(after)) if row.kind != "same"]
     if as_json:
-        print_json({"equal": not changed, "changes": changed})
+        print_json({"equal": not changed, "changes": [row.to_json() for row in changed]})
     elif changed:
-        print_table(difference_table(changed, f"Mission {first}", f"Mission {second}"))
+        print_table(rows_table(changed, f"\nMission {first} -> Mission {second}"))
     else:
         click.echo("no difference")
     if changed:

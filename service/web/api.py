@@ -169,7 +169,11 @@ class Api:
 
         async def make() -> tuple[str, bool]:
             first, second = await self._find(number), await self._find(other)
-            return await asyncio.to_thread(lambda: to_json({"rows": difference(_sent(first), _sent(second))})), True
+
+            def compare() -> str:
+                return to_json({"rows": [row.to_json() for row in difference(_sent(first), _sent(second))]})
+
+            return await asyncio.to_thread(compare), True
 
         return _text(await self._kept.get(f"{number} {other}", make))
 

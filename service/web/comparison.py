@@ -2,7 +2,8 @@
 """Two mission lists side by side: as sent and as stored, or two that were sent."""
 
 import difflib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import zip_longest
 
 from bridge.model.finding import DROPPED, REJECTED, Finding, value_label, without_defaults
@@ -14,6 +15,24 @@ from service.daemon.mission_data import Json, mission_findings, mission_items
 MAX_ROWS = 500
 
 _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """An item on both sides, or on one. `kind`: same, changed, dropped, rejected, added or removed.
+
+    `changes`: why each value changed, by its name; without a reason between two lists that were sent.
+    """
+
+    kind: str
+    left: MissionItem | None
+    right: MissionItem | None
+    changes: Mapping[str, str]
+
+    def to_json(self) -> Json:
+        """The row for the page."""
+        left, right = (None if item is None else shown(item) for item in (self.left, self.right))
+        return {"kind": self.kind, "left": left, "right": right, "changes": self.changes}
 
 
 def stored_mission(mission: Json) -> Json:
@@ -31,7 +50,7 @@ def stored_mission(mission: Json) -> Json:
         "detail": mission["detail"],
         "checksum": received["checksum"],
         "findings": [finding.text() for finding in without_defaults(findings)[:MAX_ROWS]],
-        "rows": sent_and_stored(sent[:MAX_ROWS], stored, findings),
+        "rows": [row.to_json() for row in sent_and_stored(sent[:MAX_ROWS], stored, findings)],
         "rows_left_out": max(len(sent) - MAX_ROWS, 0),
         "items": [shown(item) for item in (stored or sent)[:MAX_ROWS]],
     }
@@ -44,7 +63,7 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
     return {
         "verdict": verdict["result"],
         "findings": [finding.text() for finding in without_defaults(findings)],
-        "rows": sent_and_stored(items, stored, findings),
+        "rows": [row.to_json() for row in sent_and_stored(items, stored, findings)],
         "rows_left_out": 0,
         "items": [shown(item) for item in (stored or items)],
     }
@@ -52,7 +71,7 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
 
 def sent_and_stored(
     sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]
-) -> list[Json]:
+) -> list[Row]:
     """One row per item sent. `stored`: empty for a list that was rejected or cleared.
 
     A row with no change but filled-in defaults is "same"; its `changes` still hold their reasons.
@@ -65,27 +84,27 @@ def sent_and_stored(
     rows = []
     for seq, item in enumerate(sent):  # findings use the place in the list, not the item's seq
         if seq in dropped:
-            rows.append(_row("dropped", item, None, {"command": dropped[seq]}))
+            rows.append(Row("dropped", item, None, {"command": dropped[seq]}))
         elif seq in rejected:
-            rows.append(_row("rejected", item, None, {"command": rejected[seq]}))
+            rows.append(Row("rejected", item, None, {"command": rejected[seq]}))
         elif (held := next(left, None)) is not None:
             changes = {name: why for name in _VALUES if (why := reasons.get((seq, name)))}
-            rows.append(_row("changed" if seq in changed else "same", item, held, changes))
+            rows.append(Row("changed" if seq in changed else "same", item, held, changes))
         else:
-            rows.append(_row("same", item, None, {}))
+            rows.append(Row("same", item, None, {}))
     return rows
 
 
-def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[Json]:
+def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[Row]:
     """One row per item of either list; an item in only one of them has its own row."""
     rows = []
     for before, after in _pairs(first[:MAX_ROWS], second[:MAX_ROWS]):
         if before is None or after is None:
-            rows.append(_row("added" if before is None else "removed", before, after, {}))
+            rows.append(Row("added" if before is None else "removed", before, after, {}))
         else:
             was, becomes = _key(before), _key(after)
             changes = {name: "" for name, old, new in zip(_VALUES, was, becomes, strict=True) if old != new}
-            rows.append(_row("changed" if changes else "same", before, after, changes))
+            rows.append(Row("changed" if changes else "same", before, after, changes))
     return rows
 
 
@@ -108,12 +127,3 @@ def _key(item: MissionItem) -> tuple[float | None, ...]:
     """An item's values without its number, comparable: values not given are equal."""
     values = (getattr(item, name) for name in _VALUES)
     return tuple(None if value is None or value != value else value for value in values)
-
-
-def _row(kind: str, left: MissionItem | None, right: MissionItem | None, changes: dict[str, str]) -> Json:
-    return {
-        "kind": kind,
-        "left": None if left is None else shown(left),
-        "right": None if right is None else shown(right),
-        "changes": changes,
-    }

@@ -41,7 +41,7 @@ COMPARED = ("p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
 @given(lists)
 def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:
     verdict = check_list(sent, RULES)
-    rows = sent_and_stored(sent, verdict.items, verdict.findings)
+    rows = [row.to_json() for row in sent_and_stored(sent, verdict.items, verdict.findings)]
     assert [row["left"]["command"] for row in rows] == [item.command for item in sent]
     if verdict.result is not Result.ACCEPTED:
         assert all(row["right"] is None for row in rows)
@@ -60,11 +60,11 @@ def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:
 @settings(deadline=None)
 @given(lists, lists)
 def test_a_difference_has_both_lists_in_order(first: list[MissionItem], second: list[MissionItem]) -> None:
-    rows = difference(first, second)
+    rows = [row.to_json() for row in difference(first, second)]
     for side, whole in (("left", first), ("right", second)):
         assert [row[side]["command"] for row in rows if row[side]] == [item.command for item in whole]
     to_json(rows)
-    assert {row["kind"] for row in difference(first, first)} == {"same"}
+    assert {row.kind for row in difference(first, first)} == {"same"}
 
 
 def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
@@ -90,10 +90,10 @@ def test_a_finding_reads_as_in_the_messages_tab() -> None:
 
 def test_an_extra_item_is_one_extra_row() -> None:
     route = [replace(HOME, seq=seq, lat_e7=453838000 + seq) for seq in range(9)]
-    kinds = [row["kind"] for row in difference(route, route[:4] + route[5:])]
+    kinds = [row.kind for row in difference(route, route[:4] + route[5:])]
     assert kinds == ["same"] * 4 + ["removed"] + ["same"] * 4
     changed = [*route[:8], replace(route[8], p2=7.0)]
-    assert difference(route, changed)[8]["changes"] == {"p2": ""}
+    assert difference(route, changed)[8].changes == {"p2": ""}
 
 
 def test_a_list_of_thousands_is_truncated_with_a_note() -> None:
