@@ -120,15 +120,13 @@ class FcPort:
     def _try_write(self, data: bytes | bytearray) -> int:
         try:
             return os.write(self._descriptor, data)
-        except (BlockingIOError, InterruptedError):
+        except BlockingIOError:
             return 0
         except OSError as error:
             self._shut(error.strerror or str(error))
             return len(data)
 
     def _writable(self) -> None:
-        if self._device is None:
-            return
         sent = self._try_write(self._unsent)
         del self._unsent[:sent]
         if not self._unsent and self._device is not None:
@@ -177,7 +175,7 @@ class FcPort:
     def _read(self) -> bytes:
         try:
             data = os.read(self._descriptor, _READ_SIZE)
-        except (BlockingIOError, InterruptedError):
+        except BlockingIOError:
             return b""
         except OSError as error:
             self._shut(error.strerror or str(error))
@@ -204,6 +202,7 @@ class FcPort:
         self._stop_gathering()
         self._loop.remove_reader(self._descriptor)
         self._loop.remove_writer(self._descriptor)
+        self._descriptor = -1
         self._unsent.clear()
         self._speed = None
         device.close()

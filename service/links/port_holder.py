@@ -22,7 +22,9 @@ def explain_port_error(path: str, error: OSError) -> str:
     if code in (errno.EACCES, errno.EPERM):
         return f"{path}: no permission; add the user to the group that owns it: sudo usermod -aG dialout $USER"
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
-        holder = find_holder(path)
+        host = Host()
+        others = (process for process in host.processes() if process.pid != os.getpid())
+        holder = next((process for process in others if host.has_open(process, path)), None)
         return f"{path} is busy: {holder or 'another program'} has it open; stop it, or name another port"
     if code in (errno.ENOTTY, errno.EISDIR):
         return f"{path} is not a serial port"
@@ -34,25 +36,6 @@ def find_console(path: str) -> str | None:
     # Called four times a second: too often for a search through all processes while there is no port.
     terminal = Path(path).resolve().name
     return terminal if Path(path).exists() and Host().has_login(terminal) else None
-
-
-def find_holder(path: str) -> str | None:
-    """The process that has the port open, as "NAME (pid N)"; None if none is visible."""
-    try:
-        target = os.stat(path)
-    except OSError:
-        return None
-    for process in Host().processes():
-        if process.pid == os.getpid():
-            continue
-        try:
-            for descriptor in Path(f"/proc/{process.pid}/fd").iterdir():
-                # By device number: in a container the device may have another name.
-                if os.path.samestat(descriptor.stat(), target):
-                    return f"{process.name} (pid {process.pid})"
-        except OSError:
-            continue
-    return None
 
 
 def find_user(host: Host, path: str) -> str | None:
@@ -67,5 +50,5 @@ def find_user(host: Host, path: str) -> str | None:
         if process.pid in (os.getpid(), os.getppid()) or not process.name:
             continue
         if any(named.search(argument) for argument in process.arguments[1:]) or host.has_open(process, path):
-            return f"{process.name} (pid {process.pid})"
+            return str(process)
     return None

@@ -165,7 +165,7 @@ class _TcpClient:
     def _try_send(self, data: memoryview) -> int:
         try:
             return self._socket.send(data)
-        except (BlockingIOError, InterruptedError):
+        except BlockingIOError:
             return 0
         except OSError:
             self._hang_up()

@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,9 @@ class Process:
 
     pid: int
     arguments: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.name} (pid {self.pid})"
 
     @property
     def name(self) -> str:
@@ -72,11 +76,15 @@ class Host:
 
     def has_open(self, process: Process, link: str) -> bool:
         """True if a program has it open, as far as permissions show."""
-        try:
-            open_files = list(self.path(f"/proc/{process.pid}/fd").iterdir())
-            return any(os.readlink(descriptor) == link for descriptor in open_files)
-        except OSError:
-            return False
+        device = self.path(link)
+        is_there = device.exists()
+        with suppress(OSError):
+            for descriptor in self.path(f"/proc/{process.pid}/fd").iterdir():
+                # In a container the device may have another name.
+                is_same = is_there and descriptor.exists() and descriptor.samefile(device)
+                if is_same or os.readlink(descriptor) == link:
+                    return True
+        return False
 
     def has_login(self, terminal: str) -> bool:
         """True if a login console runs on a terminal, such as ttyS0.

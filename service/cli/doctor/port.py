@@ -114,10 +114,9 @@ def check_holder(host: Host, fc: FcAddress) -> Checked | None:
         return ok("other programs", f"no program has {device} open")
     if holder.name in LOGIN_PROGRAMS:
         return None  # reported by the console's check
-    who = f"{holder.name} (pid {holder.pid})"
     if holder.is_naze_bridge:
         return ok("other programs", f"the daemon has {device} open, pid {holder.pid}")
-    return problem("other programs", f"{who} has {device} open", f"stop it: sudo kill {holder.pid}")
+    return problem("other programs", f"{holder} has {device} open", f"stop it: sudo kill {holder.pid}")
 
 
 def holder_of_port(host: Host, fc: FcAddress) -> Process | None:
