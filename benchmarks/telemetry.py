@@ -43,7 +43,7 @@ from simulator.options import Tree
 
 POLLS_HZ = 100
 #: With the regular polls (STATUS 4 Hz, RC 2 Hz, three others 2.5 Hz) these make 100 polls per second.
-_WISHES_HZ = {
+_REQUESTED_HZ = {
     messages.MAVLINK_MSG_ID_ATTITUDE: 50,
     messages.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 21,
     messages.MAVLINK_MSG_ID_VFR_HUD: 21,
@@ -77,7 +77,7 @@ def _cpu(folder: Path) -> Figure:
         daemon(folder, board.link, udpout(ground)) as process,
     ):
         process.wait_for_event("fc.found")
-        wish(ground)
+        request_rates(ground)
         percent = cpu_percent(process.pid)
     return Figure(f"daemon at {POLLS_HZ} polls a second, CPU of one core", percent, "%", None, 5.0)
 
@@ -129,7 +129,7 @@ def _latency(folder: Path) -> list[Figure]:
         _bare_loop(folder, folder / "instant-bare", bare_ground, _POLLS_HZ),
     ):
         process.wait_for_event("fc.found")
-        wish(ground)
+        request_rates(ground)
         time.sleep(_SETTLING_S)
         asked, began_at = controller.asked, time.perf_counter()
         while len(ours_ms) < _ANSWERS:
@@ -208,9 +208,9 @@ def _noise() -> list[Figure]:
     ]
 
 
-def wish(ground: socket.socket) -> None:
+def request_rates(ground: socket.socket) -> None:
     """Request the rates for 100 polls a second, as a ground station does."""
-    _request(ground, _WISHES_HZ)
+    _request(ground, _REQUESTED_HZ)
 
 
 def _request(ground: socket.socket, rates_hz: Mapping[int, float]) -> None:

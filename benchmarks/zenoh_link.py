@@ -22,7 +22,7 @@ import zenoh
 from benchmarks.figure import Figure, Floor
 from benchmarks.idle import LIBRARIES, libraries_mb, listener, resident_mb, udpout
 from benchmarks.processes import BenchmarkError, daemon, running, wait_for
-from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, wish
+from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, request_rates
 from benchmarks.zenoh_programs import ALL_TELEMETRY, client, configuration, router_program
 from bridge.model.vehicle import Orientation
 from bridge.model.vehicle_groups import Group
@@ -61,7 +61,7 @@ def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:
         client(endpoint) as session,
     ):
         process.wait_for_event("fc.found")
-        wish(ground)
+        request_rates(ground)
 
         def heard(sample: zenoh.Sample) -> None:
             came_at = time.perf_counter()

@@ -25,7 +25,7 @@ _LATITUDE, _LONGITUDE = (0x13, 0x1B, 0x23), (0x12, 0x1A, 0x22)
 _SIGNS = {(_LATITUDE, ord("N")): 1, (_LATITUDE, ord("S")): -1, (_LONGITUDE, ord("E")): 1, (_LONGITUDE, ord("W")): -1}
 _HEIGHT_GROUP = (_HEIGHT_M, _HEIGHT_CM, _HEADING, _HEADING_FRACTION)
 _POWER, _PLACE = (_CELL, _VOLTS, _DECIVOLTS), (*_LATITUDE, *_LONGITUDE)
-#: Without a voltage sensor or a GPS the values of these are left out.
+#: Their values are missing without a voltage sensor or a GPS.
 _SLOW_GROUPS = {(_TEMPERATURE, *power, *place) for power in ((), _POWER) for place in ((), _PLACE)}
 #: Groups that end with their last value. Harakiri sends nothing for 0.1 s after most of them: if they counted only when
 #: the next one begins, climb and speed would be derived from the wrong times.
@@ -52,7 +52,7 @@ class FrskyParser:
     """Finds values and groups among other bytes."""
 
     def __init__(self) -> None:
-        #: Values that followed each other without a byte in between that does not belong there.
+        #: Consecutive values without a foreign byte in between.
         self.values_in_a_row = 0
         self._group: list[tuple[int, int]] = []
         self._value = bytearray()
@@ -120,7 +120,7 @@ class FrskyParser:
 
 
 def _read(group: list[tuple[int, int]]) -> FrskyReport | None:
-    """The other groups hold the acceleration, and the minutes and seconds since the start."""
+    """Other groups (acceleration, minutes and seconds since the start) are not used."""
     identifiers, values = tuple(identifier for identifier, _ in group), dict(group)
     if identifiers == _HEIGHT_GROUP:
         return _read_height(values)
@@ -137,7 +137,7 @@ def _read_height(values: Mapping[int, int]) -> FrskyReport | None:
 
 
 def _voltage_v(values: Mapping[int, int]) -> float | None:
-    """The voltage comes as 110/21 of itself, and once more divided by the number of cells: both must agree."""
+    """The voltage is sent times 110/21, and divided by the number of cells: both must agree."""
     if _CELL not in values:
         return None
     # 10 tenths are possible: Harakiri rounds up without carrying.

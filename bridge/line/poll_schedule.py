@@ -261,5 +261,5 @@ class PollSchedule:
     def _interval(self, slot: _Slot, scale: float) -> float:
         is_status = slot.poll.command is Msp.STATUS
         slowest = slot.cost / (self._budget * _STATUS_SHARE) if is_status else _SLOWEST_S
-        patience = 2.0 ** min(max(slot.misses - _TOLERATED_MISSES, 0), _MAX_DOUBLINGS)
-        return min(slot.wanted_s / scale * patience, max(slot.wanted_s, slowest))
+        backoff = 2.0 ** min(max(slot.misses - _TOLERATED_MISSES, 0), _MAX_DOUBLINGS)
+        return min(slot.wanted_s / scale * backoff, max(slot.wanted_s, slowest))

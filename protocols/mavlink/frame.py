@@ -114,7 +114,7 @@ class MavlinkSplitter:
         return self.feed(b"", is_end=True)
 
     def feed(self, data: bytes, *, is_end: bool = False) -> list[MavlinkFrame]:
-        """Take received bytes; return the completed frames. At an end an incomplete one is dropped.
+        """Take received bytes; return the completed frames. `is_end`: drop an incomplete one.
 
         One loop, with no call per frame except the CRC's: this is the main cost of forwarding a frame.
         """

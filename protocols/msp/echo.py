@@ -7,7 +7,7 @@ line. This applies to Harakiri (cli.c, tree TestCode3), Baseflight and INAV; Har
 
 _DEL = b"\x7f"
 _UNPRINTABLE = bytes(byte for byte in range(256) if not ord(" ") <= byte <= ord("~"))
-#: Two requests and no other byte: noise cannot produce that.
+#: Exactly two requests: noise cannot produce that.
 _EVIDENCE = 10
 _TYPED_KEPT = 256
 #: The longest line that can be typed: 64 characters on INAV, 48 on Harakiri.

@@ -49,7 +49,7 @@ KEYS = (
         "fc",
         text(parse=parse_fc),
         "The flight controller: auto looks for it on the header's UART and on USB; /dev/ttyAMA0 (detects the speed), "
-        "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim: for a simulated one.",
+        "/dev/ttyUSB0,57600 (baud), tcp:HOST:PORT, or sim for a simulated one.",
         default='"auto"',
     ),
     Key(

@@ -2,8 +2,8 @@
 """The check of every request, and the security headers of every response.
 
 Reading needs no token, so another site's page must not read through the pilot's browser: under its own name resolved
-to our address (DNS rebinding), or in a frame. Hence the check of the Host header, and the response headers. Everything
-else needs the token in a header, which no other site can make a browser send.
+to our address (DNS rebinding), or in a frame. The check of the Host header and the response headers prevent that.
+Everything else needs the token in a header, which no other site can make a browser send.
 """
 
 import ipaddress

@@ -29,7 +29,7 @@ class WriteFile:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Run a program to its end."""
+    """Run a program and wait until it exits."""
 
     command: tuple[str, ...]
 
