@@ -29,6 +29,10 @@ _API_VERSION = bytes((0, 2, 5))
 _HDOP_E2 = 130
 _MISSION_SETTING = b"nav_wp_multi_mission_index\0"
 _FIELD_ALTITUDE_CM = round(FIELD_ALTITUDE_M * 100)
+#: The sticks that load the saved missions have to be held for 20 ticks, each of the first receiver frame after 20 ms:
+#: 0.4 s to 0.8 s (rc_controls.c). This is SBUS, at 14 ms.
+_LOAD_AFTER_S, _STICKS_HELD_S = 0.56, 0.8
+_STICK_END_US = 2000
 
 
 class InavCommand(IntEnum):
@@ -73,6 +77,8 @@ class InavFirmware(MspFirmware):
         self._navigation = InavNavigation(self._mission, self._craft)
         self._booted_at = boot.now
         self._stick_loads = boot.faults.stick_loads
+        self._load_at: float | None = None
+        self._sticks_released_at = boot.now
 
     @property
     def stored(self) -> list[bytes]:
@@ -85,7 +91,7 @@ class InavFirmware(MspFirmware):
     def follow_pilot(self, now: float) -> None:
         """Fly until `now`, arm and disarm. CrashError: the check before arming found a JUMP with an invalid target."""
         self._fly_until(now)
-        self._follow_sticks()
+        self._follow_sticks(now)
         flyable = self.armed or self._mission.is_flyable()
         if self._faults.armed and not self.armed and flyable and not self._faults.arming_blockers:
             self.armed = True
@@ -97,11 +103,14 @@ class InavFirmware(MspFirmware):
             self._navigation.disarm()
             self._craft.rest()
 
-    def _follow_sticks(self) -> None:
+    def _follow_sticks(self, now: float) -> None:
         if self._faults.selected_mission:
             self._mission.selected = self._faults.selected_mission
         if self._faults.stick_loads > self._stick_loads:
             self._stick_loads = self._faults.stick_loads
+            self._load_at, self._sticks_released_at = now + _LOAD_AFTER_S, now + _STICKS_HELD_S
+        if self._load_at is not None and now >= self._load_at:
+            self._load_at = None
             if not self.armed:
                 self._mission.load()
 
@@ -225,6 +234,9 @@ class InavFirmware(MspFirmware):
             case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
         usual = self._sensors.payload(command, craft)
+        if command == MspCommand.RC and usual and self._clock < self._sticks_released_at:
+            # Roll and pitch; the throttle is low.
+            return struct.pack("<2H", _STICK_END_US, _STICK_END_US) + usual[4:]
         if command == MspCommand.RAW_GPS and usual is not None:
             return usual + struct.pack("<H", _HDOP_E2)
         if command == MspCommand.ALTITUDE and usual is not None:

@@ -10,19 +10,19 @@ from bridge.vehicle.mission_context import MissionContext
 
 
 class MissionWatch:
-    """Checks as often as the store needs it, while no transfer runs."""
+    """Checks as often as the store needs it, while no transfer runs: at once after a check that took longer."""
 
     def __init__(self, context: MissionContext) -> None:
         self._context = context
-        self._is_looking = False
+        #: When the running check began; None while none runs.
+        self._began_at: float | None = None
         #: The time of the next `tick`.
         self.due = inf
 
     def look(self, now: float) -> None:
         """Check now: a flight controller was found."""
-        self.due = now + self._context.missions.watch_s
-        if not self._is_looking:
-            self._is_looking = True
+        if self._began_at is None:
+            self._began_at, self.due = now, inf
             self._context.runner.start(self._context.missions.is_outdated(), self._looked, now, in_background=True)
 
     def tick(self, now: float) -> None:
@@ -41,7 +41,8 @@ class MissionWatch:
             self._caught_up(None, now)
 
     def _caught_up(self, news: MissionChange | LinkLost | None, now: float) -> None:
-        self._is_looking = False
+        assert self._began_at is not None
+        self.due, self._began_at = max(now, self._began_at + self._context.missions.watch_s), None
         if not isinstance(news, MissionChange):
             return
         self._context.ground.say(Severity.WARNING if news.is_warning else Severity.NOTICE, news.text)

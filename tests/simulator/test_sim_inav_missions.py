@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated INAV has every hazard of docs/inav.md, as observed on INAV's own simulator."""
 
+import struct
 from dataclasses import replace
 
 import pytest
@@ -35,6 +36,7 @@ def test_the_example_of_the_specification_is_acknowledged() -> None:
     assert bench.read(1).lat_e7 == 521234567
 
 
+RC = 105
 SELECTED = b"nav_wp_multi_mission_index\0"
 
 
@@ -313,8 +315,13 @@ def test_the_sticks_load_the_saved_missions() -> None:
     bench.restart()
     assert bench.info() == (120, False, 0)
     bench.faults.stick_loads += 1
-    bench.run(0.1)
+    channels = struct.unpack("<4H", bench.payload(RC)[:8])
+    assert channels == (2000, 2000, 1500, 1000)
+    bench.run(0.4)
+    assert bench.info() == (120, False, 0)
+    bench.run(0.4)
     assert bench.info() == (120, True, 6)
+    assert struct.unpack("<4H", bench.payload(RC)[:8]) == (1500, 1500, 1500, 1000)
 
 
 # -- the port ----------------------------------------------------------------------------------------------------

@@ -12,8 +12,9 @@ from itertools import chain
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.stored_missions import Mission, erased, flown, split_missions
-from bridge.line.conversation import Conversation, LinkLost, ask
+from bridge.line.conversation import Conversation, LinkLost, Pause, ask
 from bridge.missions.fc_mission_store import PushFailed, PushFailure, PushProgress, PushResult
+from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
 from protocols.msp.nav import (
     INFO_SIZE,
@@ -26,12 +27,18 @@ from protocols.msp.nav import (
     NavRecord,
     decode_info,
 )
+from protocols.msp.telemetry import decode_channels
 
 _MAX_SAVES = 2
 #: Requests after SAVE: their timeouts together exceed its flash time.
 _ASKS_AFTER_SAVE = 4
 _MAX_READS = 2
 _SETTING_SIZE = 1
+_RC_SIZE = 68
+#: With the throttle low, pitch and roll high for 0.4 s to 0.8 s, by receiver, INAV loads the saved missions
+#: (rc_controls.c). Its own thresholds are settings; to read a list that has not changed does no harm.
+_LOW_US, _HIGH_US = 1300, 1700
+_LOADED_AFTER_S = 0.8
 
 
 class InavMissions(NavMissions):
@@ -44,8 +51,9 @@ class InavMissions(NavMissions):
     _before_loaded = 0
     #: GETINFO's reply and the selected mission, as of the last read or write.
     _seen: tuple[NavInfo, int] | None = None
-    #: The same, as of the last check for changes.
+    #: The same, as of the last check for changes, and whether the sticks were held for LOAD.
     _last_look: tuple[NavInfo, int] | None = None
+    _sticks_held = False
 
     def erased_by(self, records: Sequence[NavRecord]) -> tuple[Mission, ...]:
         """The last of the others, as many as do not fit."""
@@ -89,7 +97,21 @@ class InavMissions(NavMissions):
         if not seen[0].is_valid and seen != before:
             return True
         was_written = before is not None and not before[0].is_valid and seen[0].is_valid
-        return not was_written and (yield from self._is_unchanged(seen))
+        if was_written or (yield from self._sticks_load()):
+            return False
+        return (yield from self._is_unchanged(seen))
+
+    def _sticks_load(self) -> Conversation[bool]:
+        """True, once, after the pilot may have loaded the saved missions with the sticks; INAV refuses it armed."""
+        if self._vehicle.armed:
+            return False
+        reply = yield from ask(request(Msp.RC), Msp.RC, _RC_SIZE)
+        channels = None if reply is None else decode_channels(reply.payload)
+        before, self._sticks_held = self._sticks_held, channels is not None and _is_load_gesture(channels)
+        if before or not self._sticks_held:
+            return False
+        yield Pause(_LOADED_AFTER_S)
+        return True
 
     def _is_unchanged(self, seen: tuple[NavInfo, int] | None) -> Conversation[bool]:
         if seen is None or seen != self._seen:
@@ -205,3 +227,8 @@ class InavMissions(NavMissions):
     def _info(self) -> Conversation[NavInfo | None]:
         reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE)
         return None if reply is None else decode_info(reply.payload)
+
+
+def _is_load_gesture(channels_us: Sequence[int]) -> bool:
+    roll, pitch, _, throttle, *_ = channels_us
+    return throttle < _LOW_US and min(roll, pitch) > _HIGH_US

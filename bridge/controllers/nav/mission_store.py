@@ -46,10 +46,10 @@ from protocols.msp.telemetry import decode_status
 NOTHING = (NavRecord(NavAction.RTH, flag=LAST),)
 _STATUS_PAYLOAD = 11
 _TRIES = 5
-#: A list is compared within this many checks, a quarter of a second each, but not too many records in one: other
-#: changes, and transfers, have to wait until it ends.
+#: A list is compared within this many checks, a quarter of a second each if the board answers fast enough.
 _CHECKS = 6
-_LEAST_COMPARED, _MOST_COMPARED = 4, 12
+#: Other changes, and transfers, have to wait until a check ends.
+_MOST_COMPARED = 12
 #: The number of former lists remembered: LOAD or another client is likely to bring one of them back.
 _FORMER = 3
 #: Restarts of one push after a read-back mismatch.
@@ -65,7 +65,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
     #: The list that was compared last, the ones before it, and the records by which they differ from it.
     _watched: tuple[NavRecord, ...] = ()
     _former: tuple[tuple[NavRecord, ...], ...] = ()
-    _telling: tuple[int, ...] = ()
+    _telling: frozenset[int] = frozenset()
     #: The number of the record that was compared last, those apart.
     _compared = 0
 
@@ -226,25 +226,27 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return None
 
     def _has_same_records(self, known: tuple[NavRecord, ...], before: int = 0) -> Conversation[bool]:
-        """Compare some records; `before`: records in the store before the first.
+        """Compare the next records, and those that would show that a former list is back.
 
-        These are the next ones each time, and those that would show that a former list is back.
+        `before`: records in the store before the first.
         """
         self._watch(known)
-        count = min(max(_LEAST_COMPARED, ceil(len(known) / _CHECKS)), _MOST_COMPARED, len(known))
+        count = min(ceil(len(known) / _CHECKS), _MOST_COMPARED)
         following = [(self._compared + step) % len(known) + 1 for step in range(count)]
         for number in (*self._telling, *following):
             held = yield from self.read(before + number)
             if held is not None and held != known[number - 1]:
                 return False
-        self._compared = following[-1] if following else 0
+        self._compared += count
         return True
 
     def _watch(self, known: tuple[NavRecord, ...]) -> None:
         if known != self._watched:
             self._former = (self._watched, *[former for former in self._former if former != known])[:_FORMER]
-            self._telling = tuple({number for former in self._former for number in _first_difference(known, former)})
-            self._watched, self._compared = known, 0
+            pairs = [enumerate(zip(known, former, strict=False), 1) for former in self._former]
+            firsts = [next((number for number, (one, other) in pair if one != other), 0) for pair in pairs]
+            self._telling, self._compared = frozenset(filter(None, firsts)), 0
+            self._watched = known
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
         """Write the old list again, if known; True if it is restored."""
@@ -269,12 +271,6 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD, tries=_TRIES)
         status = None if reply is None else decode_status(reply.payload)
         return None if status is None else bool(status.box_flags & self._arm_mask)
-
-
-def _first_difference(known: Sequence[NavRecord], former: Sequence[NavRecord]) -> list[int]:
-    """The number of the first record that differs, if there is one."""
-    pairs = enumerate(zip(known, former, strict=False), 1)
-    return [number for number, (one, other) in pairs if one != other][:1]
 
 
 def _frame(number: int, record: NavRecord) -> bytes:
