@@ -11,7 +11,7 @@ from rich.text import Text
 from bridge.model.finding import Finding, without_defaults
 from protocols.mavlink.command import command_name
 from protocols.mission_item import MissionItem
-from service.web.comparison import Row, sent_and_stored
+from service.web.comparison import ItemRow, sent_and_stored
 
 _CHANGED = "yellow"
 _DROPPED = "red"
@@ -32,7 +32,7 @@ def mission_table(sent: Sequence[MissionItem], stored: Sequence[MissionItem], fi
     return rows_table(sent_and_stored(sent, stored, findings), reasons)
 
 
-def rows_table(rows: Iterable[Row], caption: str) -> Table:
+def rows_table(rows: Iterable[ItemRow], caption: str) -> Table:
     """Rows of a comparison, with "left->right" for each value that differs."""
     table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False, caption=Text(caption), caption_justify="left")
     table.add_column("WP", justify="right", no_wrap=True)

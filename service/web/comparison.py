@@ -18,7 +18,7 @@ _VALUES = ("command", "frame", "p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ItemRow:
     """An item on both sides, or on one. `kind`: same, changed, dropped, rejected, added or removed.
 
     `changes`: why each value changed, by its name; without a reason between two lists that were sent.
@@ -71,7 +71,7 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
 
 def sent_and_stored(
     sent: Sequence[MissionItem], stored: Sequence[MissionItem], findings: Sequence[Finding]
-) -> list[Row]:
+) -> list[ItemRow]:
     """One row per item sent. `stored`: empty for a list that was rejected or cleared.
 
     A row with no change but filled-in defaults is "same"; its `changes` still hold their reasons.
@@ -84,27 +84,27 @@ def sent_and_stored(
     rows = []
     for seq, item in enumerate(sent):  # findings use the place in the list, not the item's seq
         if seq in dropped:
-            rows.append(Row("dropped", item, None, {"command": dropped[seq]}))
+            rows.append(ItemRow("dropped", item, None, {"command": dropped[seq]}))
         elif seq in rejected:
-            rows.append(Row("rejected", item, None, {"command": rejected[seq]}))
+            rows.append(ItemRow("rejected", item, None, {"command": rejected[seq]}))
         elif (held := next(left, None)) is not None:
             changes = {name: why for name in _VALUES if (why := reasons.get((seq, name)))}
-            rows.append(Row("changed" if seq in changed else "same", item, held, changes))
+            rows.append(ItemRow("changed" if seq in changed else "same", item, held, changes))
         else:
-            rows.append(Row("same", item, None, {}))
+            rows.append(ItemRow("same", item, None, {}))
     return rows
 
 
-def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[Row]:
+def difference(first: Sequence[MissionItem], second: Sequence[MissionItem]) -> list[ItemRow]:
     """One row per item of either list; an item in only one of them has its own row."""
     rows = []
     for before, after in _pairs(first[:MAX_ROWS], second[:MAX_ROWS]):
         if before is None or after is None:
-            rows.append(Row("added" if before is None else "removed", before, after, {}))
+            rows.append(ItemRow("added" if before is None else "removed", before, after, {}))
         else:
             was, becomes = _key(before), _key(after)
             changes = {name: "" for name, old, new in zip(_VALUES, was, becomes, strict=True) if old != new}
-            rows.append(Row("changed" if changes else "same", before, after, changes))
+            rows.append(ItemRow("changed" if changes else "same", before, after, changes))
     return rows
 
 

@@ -80,5 +80,5 @@ def test_an_installation_has_the_example(tmp_path: Path) -> None:
 
 def test_a_missing_file(tmp_path: Path) -> None:
     ended = run_naze_bridge("demo", "--once", tmp_path / "none")
-    assert ended.returncode == 1
+    assert ended.returncode == 2
     assert ended.stderr.startswith(f"naze-bridge: {tmp_path / 'none'}: no such file")
