@@ -60,10 +60,15 @@ test: $(VENV)/.test-ready
 	    $$($(BROWSER) || echo --ignore=tests/web/test_web_page.py) \
 	    $$($(BARE_ROOT) || echo --deselect=$(IN_BARE_ROOT)) $(ARGS)
 
+# Turns of phrase that are not English, or say again what a name says; CONTRIBUTING.md has the rule.
+UN_ENGLISH := whoever|whomever|anew|amidst|somebody|anybody|everybody|hung up on|at the most|stands (still|in the way)
+UN_ENGLISH := \b($(UN_ENGLISH)|(what|who) (comes|goes|stands)|(Return|Tell)s? (what|when|how|whether|which|who|where|why))\b
+
 lint: $(VENV)/.test-ready
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	! git grep -nE '$(UN_ENGLISH)' -- ':!LICENSE' ':!Makefile' ':!CONTRIBUTING.md'
 
 bench: $(VENV)/.test-ready
 	$(BIN)/python -m benchmarks $(ARGS)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m generators.message_table`: print a new message_table.py from pymavlink's dialect `all`.
 
-A frame can only be checked with its message's CRC_EXTRA, so that every message counts that any flight controller may
-send; pymavlink's own module of that dialect would cost the daemon 6 MB on top of the one that it speaks.
+Checking a frame needs its message's CRC_EXTRA, so the table has every message that any flight controller may send.
+Importing pymavlink's module of that dialect would cost the daemon 6 MB.
 
-`all` takes ardupilotmega's meaning, which includes common, where a smaller dialect (matrixpilot, paparazzi) has given
-the same id to a message of its own: frames of those cannot be told from damaged ones and are not passed on.
+Where a smaller dialect (matrixpilot, paparazzi) reuses an id, `all` has the message of ardupilotmega, which includes
+common. The smaller dialect's frames then look damaged and are dropped.
 """
 
 import os

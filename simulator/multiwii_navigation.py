@@ -17,7 +17,7 @@ _HOVER_HEIGHT_M = 10.0
 #: NAV_CONFIG's rth_altitude: the lowest altitude of an RTH, unless the step's own is higher.
 _RTH_HEIGHT_M = 20.0
 _NO_JUMP = -10
-#: NAV_CONFIG's safe_wp_distance and nav_max_altitude: a longer leg is not begun, and no greater height is flown at.
+#: NAV_CONFIG's safe_wp_distance and nav_max_altitude: longer legs are not begun, greater heights not flown.
 SAFE_DISTANCE_M, HIGHEST_M = 500, 100
 
 

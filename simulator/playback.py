@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Replays the flight controller of a UART capture, to reproduce field problems, or in simulated time in a test.
 
-Unsolicited data is sent at its recorded time, replies on request: the current bridge may send requests earlier, later,
-or other ones than the recorded bridge. So each request gets the reply that the same request got at this time of the
+Unsolicited data is sent at its recorded time, replies on request, because the present bridge may send different
+requests, or the same ones sooner or later. Each request gets the reply that the same request got at this time of the
 recording, with the same delay, and none if it got none. Invented replies:
 
 - A request that was never recorded gets MSP's error frame, as from firmware that does not know it, if the flight

@@ -28,7 +28,7 @@ class PlugError(Exception):
 class PtyLink:
     """The board's USB plug: `path` is a symbolic link to the terminal while it is plugged in.
 
-    If a client sets another speed than the board's, both receive garbled bytes as on a real wire.
+    If a client sets a speed different from the board's, both receive garbled bytes as on a real wire.
     """
 
     def __init__(self, board: FarEnd, path: Path, loop: asyncio.AbstractEventLoop) -> None:

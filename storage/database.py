@@ -96,7 +96,7 @@ def contents_crc32(contents: Iterable[object]) -> int:
 def _connect(path: Path | str) -> sqlite3.Connection:
     # Transactions are explicit (isolation_level). The caller ensures that one thread at a time uses the
     # connection, not necessarily the one that opened it. Only a tool such as sqlite3 can hold a lock, and a
-    # ground station waits meanwhile, so the timeout is short (seconds).
+    # ground station waits for it, so the timeout is short (seconds).
     connection = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
     return _configured(connection)
 

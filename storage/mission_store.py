@@ -22,7 +22,7 @@ from storage.database import (
 from storage.salvage import salvage
 from storage.store_error import StoreError, explained
 
-PENDING = "PENDING"  # the outcome until conclude(); it stays if the daemon died in between
+PENDING = "PENDING"  # the outcome until conclude(); it stays if the daemon dies before
 VERIFIED = "VERIFIED"  # the outcome that latest_verified() looks for
 DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match its checksum
 
@@ -62,8 +62,8 @@ class ReceivedMission:
 class MissionSummary:
     """One line of a list of missions. Times are unix seconds; concluded_at is None while PENDING.
 
-    finding_count leaves out filled-in defaults. A line that was damaged on the disk has the outcome DAMAGED, and no
-    other values than its number.
+    finding_count leaves out filled-in defaults. A line that was damaged on the disk has only its number and the
+    outcome DAMAGED.
     """
 
     number: int

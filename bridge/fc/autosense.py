@@ -7,7 +7,7 @@ speak MAVLink only. So the search listens for both, but probes for MSP and prefe
 Each visit to a speed runs through the phases below. Evidence is two matching MSP replies to our own probes, or a
 heartbeat with plausible fields; noise produces neither (tests/bridge/test_autosense_noise.py). A board that echoes our
 probes is in its command line.
-Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives other bytes than we send;
+Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives different bytes;
 tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
 """
 

@@ -139,7 +139,7 @@ class Runner:
         if now < self._deadline:
             return
         if isinstance(self._awaited, Receive) and self._link is not None:
-            # The link may have sent the request later than it was handed over, or heard other replies meanwhile.
+            # The link may have delayed the request, or received other replies first.
             deadline = self._link.reply_deadline(self._awaited.commands, now)
             if now < deadline:
                 self._deadline = deadline

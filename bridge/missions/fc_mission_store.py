@@ -47,16 +47,16 @@ class PushFailure(Enum):
     FLASH = "the flight controller could not write its flash; its old mission is kept"
     NO_ANSWER = "the flight controller does not answer; its old mission is kept: write it again"
     OUT_OF_TIME = "the flight controller did not finish in time; its old mission is kept: check the wiring"
-    STOPPED = "naze-bridge was stopped meanwhile; the old mission is kept"
+    STOPPED = "naze-bridge was stopped during the write; the old mission is kept"
     UNCERTAIN = "Link lost while writing: checked when it is back"
-    INCOMPLETE = "interrupted: the flight controller has no mission to fly now; write it again"
-    ARMED_MEANWHILE = "armed meanwhile: the flight controller has no mission to fly now; disarm, write it again"
+    INCOMPLETE = "interrupted: the flight controller has no mission to fly; write it again"
+    ARMED_WHILE_WRITING = "armed during the write: the flight controller has no mission to fly; disarm, write it again"
     NOT_SAVED = "the mission is there but not saved: it is lost at power-off; write it again"
 
 
 #: After these failures the old list is lost, or may be.
 LIST_IS_GONE = frozenset(
-    (PushFailure.UNCERTAIN, PushFailure.INCOMPLETE, PushFailure.ARMED_MEANWHILE, PushFailure.NOT_SAVED)
+    (PushFailure.UNCERTAIN, PushFailure.INCOMPLETE, PushFailure.ARMED_WHILE_WRITING, PushFailure.NOT_SAVED)
 )
 
 

@@ -123,7 +123,7 @@ class ListCheck(ABC):
             self._note(item, "frame", item.frame, int(Frame.GLOBAL), why, News.WARNING)
 
     def _now_relative(self, item: MissionItem) -> None:
-        """Report that an altitude is relative to another level than the one sent."""
+        """Report that an altitude is now relative to a different level."""
         level = "sea level" if item.frame in SEA_LEVEL_FRAMES else "terrain"
         why = f"Alt flown above home, not above {level}"
         self._note(item, "frame", item.frame, int(Frame.GLOBAL_RELATIVE_ALT), why, News.WARNING)

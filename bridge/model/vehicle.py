@@ -227,7 +227,7 @@ class Vehicle:
         self.forget()
 
     def forget(self) -> None:
-        """Begin again: the board is another one than before."""
+        """Begin again with a different board."""
         self.airframe = Airframe.QUADROTOR
         #: The firmware version: major, minor, patch level.
         self.version: tuple[int, int, int] | None = None

@@ -446,7 +446,7 @@ static void test_a_silent_transfer_is_dropped(void)
 {
     const list_t list = list_of(20, 2);
     fresh_board(NULL);
-    board.now_ms = 0xFFFFF000u; /* the counter wraps meanwhile */
+    board.now_ms = 0xFFFFF000u; /* the counter wraps during the test */
     CHECK(begin(&list) == NM_OK);
     sim_advance(&board, 5000);
     CHECK(chunk(&list, 0, 15) == NM_OK);

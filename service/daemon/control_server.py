@@ -107,7 +107,7 @@ class ControlServer:
         except ConnectionError:
             pass
         except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
-            tell({"error": "the daemon was stopped meanwhile; `pull` shows what the flight controller holds"})
+            tell({"error": "the daemon stopped before it could reply; `pull` shows what the flight controller holds"})
 
 
 async def _send_all(writer: asyncio.StreamWriter) -> None:

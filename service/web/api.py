@@ -205,9 +205,7 @@ class Api:
         try:
             piece = await asyncio.to_thread(self._logs.read, request.path_params["name"], _whole(start))
         except OSError as error:
-            raise HTTPException(
-                HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed meanwhile."
-            ) from error
+            raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such log: it may have been removed.") from error
         return Response(piece, media_type="application/octet-stream")
 
     async def _render_metrics(self, _request: Request) -> Response:

@@ -61,7 +61,7 @@ def read_logged_past(folder: Path, wanted: TimeRange, max_positions: int) -> Log
             continue
         if time.monotonic() > deadline:
             break
-        with suppress(FileNotFoundError):  # removed meanwhile, or renamed because a flight began
+        with suppress(FileNotFoundError):  # already removed, or renamed because a flight began
             found = _read(log, wanted, max_positions)
             past.events[:0] = found.events
             past.positions[:0] = found.positions

@@ -20,7 +20,7 @@ from storage.store_error import StoreError
 
 #: More at once are refused: each may hold a mission file.
 _MAX_AT_ONCE = 16
-_STOPPED = "the daemon was stopped meanwhile; mission/current shows what the flight controller holds, after a restart"
+_STOPPED = "the daemon stopped before it could reply; after a restart mission/current shows what is on board"
 
 #: The encoding of a command's replies and of all errors.
 JSON_REPLY = encoding_of(UPLOAD, PayloadEncoding.JSON)

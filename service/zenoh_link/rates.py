@@ -114,7 +114,7 @@ class SampleRates:
 
 
 def _differs(value: Any, before: Any, step: float) -> bool:
-    """True if a value, or any of several, has changed by `step`; True for any change of other kinds than numbers."""
+    """True if a number, or any of several, has changed by `step`; other values count any change."""
     if value == before:
         return False
     if isinstance(value, int | float) and isinstance(before, int | float):

@@ -27,8 +27,8 @@ class EmulatedNaze(SimulatedBoard):
     """A Naze32 that runs `image`, without a simulated flight: it lies on a bench.
 
     `flash` is the chip of 128 KB: the image replaces its program, and the rest is kept; without it the rest is blank.
-    With `longest_step_s`, a call that comes later than that finds that the board's time has stood still meanwhile: a
-    computer that is too slow gets a slow board.
+    Between two calls the board's time advances by `longest_step_s` at most: a computer that is too slow gets a slow
+    board.
     """
 
     faults: EmulatedFaults

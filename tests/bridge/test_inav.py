@@ -176,7 +176,7 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
     assert upload.run() is DENIED
     assert not inav.is_valid
     assert len(inav.records) < 59
-    assert any("armed meanwhile" in text for text in station.texts())
+    assert any("armed during the write" in text for text in station.texts())
     assert world.bridge.missions.held is None
 
 

@@ -236,7 +236,7 @@ def test_a_stop_during_a_transfer_loads_the_old_list_again() -> None:
     world.run(0.4)
     world.bridge.runner.stop(world.now)
     assert upload.run(2) is DENIED
-    assert any("stopped meanwhile" in text for text in station.texts())
+    assert any("stopped during the write" in text for text in station.texts())
     assert without_home(Download(station).run()) == without_home(plan(10))
     assert board.counters.flash_writes == 1
 

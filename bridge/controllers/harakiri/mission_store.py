@@ -144,7 +144,7 @@ class HarakiriMissions(HarakiriStore):
         return PushResult(failure)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read the whole list and compare its checksum; once more if the list changed meanwhile."""
+        """Read the whole list and compare its checksum; once more if the list changed during the reading."""
         for _ in range(2):
             info = yield from self._read_info()
             if info is None:

@@ -79,7 +79,7 @@ class InavMissions(NavMissions):
                 if record is None:
                     return None
                 records.append(record)
-            # If it armed meanwhile, numbers count from the loaded mission's first record.
+            # If it armed during the reading, numbers count from the loaded mission's first record.
             if (yield from self._look()) == seen:
                 self._take_over(split_missions(records), seen)
                 return self._known
@@ -158,7 +158,7 @@ class InavMissions(NavMissions):
             raise PushFailed(PushFailure.REFUSED, is_final=False)
 
     def _keep(self) -> Conversation[None]:
-        """SAVE, then verify again: the flight controller stalls meanwhile, and may have restarted."""
+        """SAVE, then verify again: the flight controller stalls during SAVE, and may have restarted."""
         before = yield from self._info()
         if before is None:
             raise PushFailed(PushFailure.UNCERTAIN)

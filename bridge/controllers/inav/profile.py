@@ -40,7 +40,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
         return None
     boxes = yield from board.boxes_by_id(_BOXES)
     controller = FlightController(PROFILE, PROFILE.name, boxes=boxes)
-    # The pilot may load another mission meanwhile: only the capacity is constant.
+    # The pilot may load another mission at any time: only the capacity is constant.
     info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE, lasting=_LASTING_INFO)).payload)
     if info is None or not info.capacity or controller.arm_bit is None:
         # Without an arm flag nothing would prevent a mission write in flight.

@@ -282,4 +282,4 @@ def _frame(number: int, record: NavRecord) -> bytes:
 
 
 #: The failures to report instead if the old list is lost.
-_UNRESTORED = {PushFailure.ARMED: PushFailure.ARMED_MEANWHILE}
+_UNRESTORED = {PushFailure.ARMED: PushFailure.ARMED_WHILE_WRITING}

@@ -77,7 +77,7 @@ class Port:
     family: str | None = None
 
     def meet(self, controller: FlightController) -> None:
-        """Begin a new vehicle if this is another board than before."""
+        """Begin a new vehicle if this is a different board."""
         if controller.profile.family != self.family:
             self.family = controller.profile.family
             self.vehicle.forget()
