@@ -5,10 +5,15 @@ import asyncio
 from collections.abc import Callable
 from typing import cast
 
+from bridge.gcs.budget import TokenBucket
+from bridge.gcs.cost import Rate
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from service.links.gcs_links import LinkError
 from service.settings.addresses import GcsAddress, family_of
 
+#: A flood would delay telemetry and missions: requests beyond the limit are dropped, the oldest first.
+_LIMIT = Rate(200, 200)
+_READ_SIZE = 512
 #: A client that does not read its replies is disconnected.
 _MAX_UNSENT = 65536
 _MAX_CLIENTS = 8
@@ -22,12 +27,13 @@ async def open_share(address: GcsAddress, requested: Requested) -> Callable[[], 
     loop = asyncio.get_running_loop()
     where = (address.host, address.port)
     family = family_of(address.host)
+    requests = _Requests(requested)
     try:
         if address.kind == "udpin":
-            port, _ = await loop.create_datagram_endpoint(lambda: _UdpShare(requested), local_addr=where, family=family)
+            port, _ = await loop.create_datagram_endpoint(lambda: _UdpShare(requests), local_addr=where, family=family)
             return port.close
         clients: set[asyncio.Transport] = set()
-        server = await loop.create_server(lambda: _TcpClient(requested, clients), *where, family=family)
+        server = await loop.create_server(lambda: _TcpClient(requests, clients), *where, family=family)
     except OSError as error:
         raise LinkError(f"share {address} cannot be opened: {error.strerror or error}") from error
 
@@ -39,9 +45,26 @@ async def open_share(address: GcsAddress, requested: Requested) -> Callable[[], 
     return close
 
 
-class _TcpClient(asyncio.Protocol):
-    def __init__(self, requested: Requested, clients: set[asyncio.Transport]) -> None:
+class _Requests:
+    """The requests of all clients of a port."""
+
+    def __init__(self, requested: Requested) -> None:
         self._requested = requested
+        self._limit = TokenBucket(_LIMIT)
+        self._loop = asyncio.get_running_loop()
+
+    def take(self, data: bytes, parser: MspParser, answer: Callable[[MspFrame], None]) -> None:
+        if self._limit.has(self._loop.time()):
+            frames = parser.feed(data[-_READ_SIZE:])
+            self._limit.spend(len(frames))
+            for frame in frames:
+                if frame.direction is Direction.REQUEST:
+                    self._requested(frame, answer)
+
+
+class _TcpClient(asyncio.Protocol):
+    def __init__(self, requests: _Requests, clients: set[asyncio.Transport]) -> None:
+        self._requests = requests
         self._clients = clients
         self._parser = MspParser(takes_low_v2=True)
 
@@ -57,9 +80,7 @@ class _TcpClient(asyncio.Protocol):
         self._clients.discard(self._transport)
 
     def data_received(self, data: bytes) -> None:
-        for frame in self._parser.feed(data):
-            if frame.direction is Direction.REQUEST:
-                self._requested(frame, self._answer)
+        self._requests.take(data, self._parser, self._answer)
 
     def _answer(self, frame: MspFrame) -> None:
         # The client may be gone by now.
@@ -71,8 +92,8 @@ class _TcpClient(asyncio.Protocol):
 
 
 class _UdpShare(asyncio.DatagramProtocol):
-    def __init__(self, requested: Requested) -> None:
-        self._requested = requested
+    def __init__(self, requests: _Requests) -> None:
+        self._requests = requests
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         # Before Python 3.12 the event loop's transport is not a subclass of it.
@@ -84,6 +105,4 @@ class _UdpShare(asyncio.DatagramProtocol):
                 self._transport.sendto(frame.encode(), addr)
 
         # Complete requests only: the rest of a truncated one may be lost.
-        for frame in MspParser(takes_low_v2=True).feed(data):
-            if frame.direction is Direction.REQUEST:
-                self._requested(frame, answer)
+        self._requests.take(data, MspParser(takes_low_v2=True), answer)

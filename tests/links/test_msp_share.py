@@ -158,6 +158,15 @@ async def test_over_udp_each_program_gets_its_own_replies() -> None:
     assert len(daemon.share_refused) == 1
 
 
+async def test_a_flood_is_dropped() -> None:
+    async with shared() as (daemon, program):
+        program._writer.write(MspFrame(Direction.REQUEST, REBOOT).encode() * 50_000)
+        await program._writer.drain()
+        (reply,) = await program.ask(IDENT)
+        assert reply.direction in Direction
+        assert 0 < daemon.share_refused.total() < 15_000
+
+
 async def test_noise_is_not_passed_on() -> None:
     async with shared() as (daemon, program):
         program._writer.write(b"###\r\r\rRRR#\n" * 100)
