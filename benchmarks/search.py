@@ -111,7 +111,7 @@ def _noise() -> Figure:
     chance = random.Random(_SEED)
     wrong = fed = 0
     now = 0.0
-    search = Autosense(SPEEDS, None, now)
+    search = Autosense(SPEEDS, (), now)
     while fed < _NOISE_BYTES:
         assert search.speed is not None
         now += _READ_BYTES * _BITS_PER_BYTE / search.speed
@@ -121,5 +121,5 @@ def _noise() -> Figure:
         search.take_output()
         if search.found:
             wrong += 1
-            search = Autosense(SPEEDS, None, now)
+            search = Autosense(SPEEDS, (), now)
     return Figure(f"wrong verdicts on {fed / 1e6:.0f} MB of noise", wrong, "", None, 0)

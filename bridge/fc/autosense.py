@@ -14,6 +14,7 @@ tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run th
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from itertools import cycle, islice
 
 from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE
 from bridge.line.pending_replies import PendingReplies
@@ -74,16 +75,14 @@ class Found:
 
 
 def visit_order(
-    known: int | None, speeds: Sequence[int | None], first: Sequence[int | None] = ()
+    speeds: Sequence[int | None], good: Sequence[int | None], first: Sequence[int | None]
 ) -> Iterator[int | None]:
-    """Yield speeds forever; every other one is the last good speed, to which a rebooting board returns."""
+    """Yield speeds forever: `first` once, then the good ones, to which a board returns, before each of the others."""
     yield from first
-    others = [speed for speed in speeds if speed != known] or [known]
+    others = cycle(speed for speed in speeds if speed not in good)
     while True:
-        for speed in others:
-            if known is not None:
-                yield known
-            yield speed
+        yield from good
+        yield from islice(others, 1)
 
 
 @dataclass(slots=True)
@@ -108,12 +107,12 @@ class Autosense:
     def __init__(
         self,
         speeds: Sequence[int | None],
-        known: int | None,
+        good: Sequence[int | None],
         now: float,
         first: Sequence[int | None] = (),
         pending: PendingReplies | None = None,
     ) -> None:
-        self._order = visit_order(known, speeds, first)
+        self._order = visit_order(speeds, good, first)
         self.speed = next(self._order)
         self.phase = Phase.LISTEN
         self.found: Found | None = None
@@ -219,12 +218,10 @@ class Autosense:
         self.pending.heard(self.speed, 0, now)
         if self.found or visit.heartbeat is not None:
             return
-        follows = (
-            before is not None
-            and (before.sysid, before.compid) == (frame.sysid, frame.compid)
-            and frame.seq == (before.seq + 1) % 256
-        )
-        if follows or is_plausible_heartbeat(frame):
+        if before is None:
+            # On a slow line a Harakiri's stream is torn, and whole frames are rare.
+            visit.ends = max(visit.ends, now + _FULL_VISIT_S)
+        if is_plausible_heartbeat(frame) or (before is not None and before.sender == frame.sender):
             visit.heartbeat = frame
             if self.phase is Phase.LISTEN:
                 visit.phase_ends = now

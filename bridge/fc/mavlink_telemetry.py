@@ -100,7 +100,8 @@ class MavlinkTelemetry:
 
     def _recognise(self, frames: Sequence[MavlinkFrame]) -> None:
         for frame in frames:
-            if frame.msgid == _HEARTBEAT and frame.payload[_AUTOPILOT_AT] != m.MAV_AUTOPILOT_INVALID:
+            is_heartbeat = frame.msgid == _HEARTBEAT
+            if self._is_harakiri or (is_heartbeat and frame.payload[_AUTOPILOT_AT] != m.MAV_AUTOPILOT_INVALID):
                 sender = bytes((frame.sysid, frame.compid))
                 for msgid in self._readers:
                     self._known[sender + msgid.to_bytes(3, "little")] = msgid

@@ -20,8 +20,8 @@ from bridge.line.conversation import (
     TimeLimit,
     Transmit,
 )
-from bridge.line.mavlink_line import MavlinkLine
 from bridge.line.msp_link import MspLink
+from protocols.mavlink.codec import Packed
 from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.frame import MspFrame
 
@@ -53,7 +53,7 @@ class Runner:
     def __init__(self) -> None:
         self._store_effects: list[StoreEffect] = []
         self._link: MspLink | None = None
-        self._mavlink: MavlinkLine | None = None
+        self._transmit: Callable[[Packed], bool] | None = None
         self._queue: deque[Task[Any]] = deque()
         self._current: Task[Any] | None = None
         self._awaited: Receive | Await | Pause | StoreEffect | None = None
@@ -93,14 +93,14 @@ class Runner:
         """Use this link from now on."""
         self._link = link
 
-    def mavlink_up(self, line: MavlinkLine) -> None:
-        """Use this line from now on."""
-        self._mavlink = line
+    def mavlink_up(self, transmit: Callable[[Packed], bool]) -> None:
+        """Send MAVLink messages with this function from now on; False: no frame of the message is safe to send."""
+        self._transmit = transmit
 
     def link_down(self, now: float) -> None:
         """The line is down: LinkLost is raised in the running conversation."""
         self._link = None
-        self._mavlink = None
+        self._transmit = None
         if self._interruptible is not None:
             self._advance(LinkLost("the flight controller's port is gone"), now)
 
@@ -184,11 +184,11 @@ class Runner:
                     task.ends_at = now + effect.seconds + line_s
                 elif isinstance(effect, Send | Receive) and self._link is None:
                     answer = LinkLost("there is no link to the flight controller")
-                elif isinstance(effect, Transmit | Await) and self._mavlink is None:
+                elif isinstance(effect, Transmit | Await) and self._transmit is None:
                     answer = LinkLost("the flight controller no longer speaks MAVLink")
                 elif isinstance(effect, Transmit):
-                    assert self._mavlink is not None
-                    answer = self._mavlink.send(effect.packed)
+                    assert self._transmit is not None
+                    answer = self._transmit(effect.packed)
                 elif isinstance(effect, Await):
                     self._awaited = effect
                     self._deadline = now + effect.seconds

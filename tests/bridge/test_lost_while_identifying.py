@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boards that fall silent, restart, arm or change speed at any moment of identification are found again."""
+"""Boards that fall silent, restart, arm or change speed at any moment of identification are found again.
+
+The one exception is a Harakiri that arms into MAVLink at 1200 baud, with `tele_prot` 2: it sends 1590 bytes a second
+into a ring of 264, of which the line carries 120. All but one frame in 40 s are torn, so it is found when it disarms.
+"""
 
 import random
 from functools import cache
@@ -9,14 +13,13 @@ import pytest
 from bridge.controllers.harakiri import profile as harakiri
 from bridge.fc.autosense import SPEEDS
 from bridge.fc.states.msp import Identifying
+from simulator.firmware import Protocol
 from simulator.options import SimOptions, TelemetryProtocol
 from tests.support.world import World
 
 #: Counted from when the board can be heard again.
 FOUND_WITHIN_S = 8.0
 ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
-#: A slower line cannot carry the telemetry of an armed Harakiri.
-ARMED_SPEEDS = [baud for baud in ALL_SPEEDS if baud >= 9600]
 MOMENTS = 12
 
 
@@ -57,16 +60,19 @@ def test_a_power_cut(baud: int) -> None:
         assert world.kind is harakiri.PATCHED
 
 
-@pytest.mark.parametrize("baud", ARMED_SPEEDS)
+@pytest.mark.parametrize("baud", ALL_SPEEDS)
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
 def test_arming(baud: int, protocol: TelemetryProtocol) -> None:
     for seed in range(MOMENTS):
         world = identifying(baud, seed, protocol)
         world.faults.armed = True
-        world.wait_until(is_known, FOUND_WITHIN_S)
-        # At 9600 baud Harakiri's telemetry exceeds the line's capacity, so many heartbeats are lost.
-        world.wait_until(lambda w: w.bridge.session.vehicle.armed is True, FOUND_WITHIN_S)
+        if (baud, protocol) != (1200, TelemetryProtocol.MAVLINK):
+            world.wait_until(lambda w: is_known(w) and w.bridge.session.vehicle.armed is True, FOUND_WITHIN_S)
+        world.run(random.Random(seed).random() * 6)
         world.faults.armed = False
+        # Until 4 s after the last request it hears only MAVLink; then its ring must empty.
+        world.wait_until(lambda w: w.naze.protocol is not Protocol.MAVLINK, FOUND_WITHIN_S)
+        world.run(world.naze.options.tree.value * 10 / baud)
         world.wait_until(lambda w: w.kind is harakiri.PATCHED, FOUND_WITHIN_S)
 
 

@@ -124,7 +124,7 @@ class Screen:
         """Show a message; each of its values was true a moment ago."""
         for name, what in SCREEN_BY_KIND.get(message.get_type(), ()):
             value = what.value(message)
-            if value is None:
+            if value is None or math.isnan(value):  # unknown
                 continue
             self.shown[name] = self.world.now, value
             if not self.is_true(name, value):
@@ -255,8 +255,8 @@ def test_values_from_before_a_lost_link_are_not_shown_as_current(board: str | Te
     lost = [text for text in screen.station.texts() if "lost" in text]
     assert lost == ["Flight controller lost: silent for 3 s", "Flight controller lost: silent for 13 s"]
     screen.world.faults.hang = False
-    screen.world.wait_until(is_found, 8)
-    screen.fly(3, linked=False)
+    screen.fly(8, linked=False)
+    assert is_found(screen.world)
     assert screen.heartbeat.system_status == m.MAV_STATE_ACTIVE
     assert any(text.startswith("Flight controller back after 2") for text in screen.station.texts())
     screen.shown.clear()

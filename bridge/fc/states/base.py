@@ -6,6 +6,7 @@ Every state takes bytes and time, reports an event when it ends, and has a deadl
 """
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import inf
@@ -19,7 +20,7 @@ from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
 from bridge.model.ground_track import GroundTrack
-from bridge.model.vehicle import Vehicle
+from bridge.model.vehicle import FlightState, Source, Vehicle
 from protocols.mavlink.frame import MavlinkFrame
 
 
@@ -49,7 +50,7 @@ class Lost:
     """The line fell silent, or carries something else. `first`: speeds to try before all others."""
 
     why: str
-    first: Sequence[int] = ()
+    first: Sequence[int | None] = ()
     pending: PendingReplies = field(default_factory=PendingReplies)
 
 
@@ -69,8 +70,9 @@ class Port:
     polls: PollSchedule = field(default_factory=PollSchedule)
     vehicle: Vehicle = field(default_factory=Vehicle)
     output: list[bytes] = field(default_factory=list)
-    #: A Harakiri that arms may change its speed; disarmed, it comes back to this one.
-    known_speed: int | None = None
+    #: The last two speeds at which the board was found, the older first: a Harakiri that arms may change its speed,
+    #: and disarmed it comes back.
+    good_speeds: deque[int | None] = field(default_factory=lambda: deque(maxlen=2))
     #: The family of the board that was last identified over MSP on this port.
     met_family: str | None = None
     #: The family of the board that `vehicle` describes, which outlives a lost link and a change of protocol.
@@ -85,6 +87,11 @@ class Port:
         self.vehicle.track = GroundTrack()
         self.vehicle.airframe = controller.airframe or self.vehicle.airframe
         self.vehicle.version = controller.version or self.vehicle.version
+
+    def hear_armed(self, source: Source, now: float) -> None:
+        """The craft must be armed, to send what it sends. Its mode is the last known one."""
+        known = self.vehicle.last(FlightState)
+        self.vehicle.hear(FlightState(now, source, True, None if known is None else known.mode))
 
 
 class State(ABC):

@@ -6,7 +6,7 @@ from bridge.fc.frsky_telemetry import FrskyTelemetry
 from bridge.fc.profile import FlightController
 from bridge.fc.states.base import Event, Lost, Port, State
 from bridge.line.msp_link import PROBE
-from bridge.model.vehicle import FlightState, Source
+from bridge.model.vehicle import Source
 from protocols.frsky import FRSKY_SPEED, FrskyParser
 from protocols.msp.frame import MspParser
 
@@ -43,8 +43,7 @@ class Frsky(State):
     def _note_armed(self, now: float) -> None:
         """Only an armed Harakiri sends FrSky telemetry."""
         self._heard_at = now
-        known = self.port.vehicle.last(FlightState)
-        self.port.vehicle.hear(FlightState(now, Source.FRSKY, True, None if known is None else known.mode))
+        self.port.hear_armed(Source.FRSKY, now)
 
     def tick(self, now: float) -> Event | None:
         """Ask for MSP now and then; notice silence."""

@@ -1,64 +1,123 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight controller speaks MAVLink."""
 
+from math import inf
+
 from bridge.fc.autosense import Found, Spoken
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController, Profile
 from bridge.fc.states.base import Event, Lost, Port, State
-from bridge.line.mavlink_line import MavlinkLine
+from bridge.line.mavlink_sender import HarakiriSender
+from bridge.line.msp_link import PROBE
 from bridge.model.autopilot import Autopilot
-from protocols.mavlink.frame import MavlinkFrame
+from bridge.model.vehicle import Source
+from protocols.mavlink.codec import Packed
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.msp.frame import MspParser
+
+_HEARTBEAT = 0
+#: Two lost heartbeats.
+_SILENCE_S = 2.5
+#: An armed Harakiri sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
+_HARAKIRI_ARMED_SILENCE_S = 0.8
+#: Its stream of 1600 bytes a second overruns its own send ring on a slow line, so most frames are torn. At 2400 baud
+#: whole ones come up to 3.5 s apart. At 1200 baud there is one in 40 s: no deadline would help.
+_TORN_BYTES = 1000
+#: Harakiri is probed for MSP, which it answers again once it is disarmed.
+_PROBE_INTERVAL_S = 1.0
+#: After this long without a byte, an incomplete frame is given up.
+_LINE_SILENCE_S = 0.1
 
 
 class Mavlink(State):
-    """The flight controller speaks MAVLink: an armed Harakiri, or an autopilot that represents itself."""
+    """The flight controller speaks MAVLink: an armed Harakiri, or an autopilot that represents itself.
+
+    The bridge itself sends only to a Harakiri; other autopilots get nothing but the frames of ground stations.
+    """
 
     name = "MAVLink"
     controller: FlightController
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
+        assert event.heard is not None
         profile = self._profile(event.heard)
         self.controller = FlightController(profile, profile.name)
         port.meet(self.controller)
-        self._line = MavlinkLine(is_harakiri=not profile.is_passed_through, now=now)
-        self.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=not profile.is_passed_through)
-        if not profile.is_passed_through:
-            port.runner.mavlink_up(self._line)
-        if event.heard is not None:
-            self.telemetry.take([event.heard], now)
+        self._is_harakiri = not profile.is_passed_through
+        self.telemetry = MavlinkTelemetry(port.vehicle, is_harakiri=self._is_harakiri)
+        self._splitter, self._msp, self._sender = MavlinkSplitter(), MspParser(), HarakiriSender()
+        self._heard_at = self._last_byte_at = now
+        self._look_at = now + _LINE_SILENCE_S
+        self._probe_due = now + _PROBE_INTERVAL_S if self._is_harakiri else inf
+        if self._is_harakiri:
+            port.runner.mavlink_up(self._send)
+            if event.heard.msgid != _HEARTBEAT:
+                # Unasked, it sends more than heartbeats only while armed.
+                port.hear_armed(Source.MAVLINK, now)
+        self.telemetry.take([event.heard], now)
 
     @property
     def bad_checksums(self) -> int | None:
-        """As the line counts them."""
-        return self._line.bad_frames
+        """Frames with a wrong checksum."""
+        return self._splitter.bad_frames
 
     def receive(self, data: bytes, now: float) -> Event | None:
         """Take frames."""
-        return self._take(self._line.receive(data, now), now)
+        if self._is_harakiri and self._msp.feed(data):
+            return Lost("it answers MSP again", (self.speed,))
+        self._last_byte_at = now
+        self._take(self._splitter.feed(data), now)
+        return None
 
     def tick(self, now: float) -> Event | None:
-        """Ask a Harakiri for MSP now and then; notice silence."""
-        return self._take(self._line.tick(now, is_conversing=self.port.runner.is_busy), now)
+        """Ask a Harakiri for MSP now and then, but not during a conversation; notice silence."""
+        if self._splitter.is_waiting and now >= self._last_byte_at + _LINE_SILENCE_S:
+            # Frames may be hidden behind a false header.
+            self._take(self._splitter.reset(), now)
+        # Checked ten times a second rather than after each byte: a timer per byte would cost more than the frames.
+        self._look_at = now + _LINE_SILENCE_S
+        if now >= self._heard_at + self._timeout_s:
+            return Lost(f"no MAVLink for {self._timeout_s:.1f} s")
+        if now >= self._probe_due:
+            self._probe_due = now + _PROBE_INTERVAL_S
+            if not self.port.runner.is_busy:
+                self.port.output.append(PROBE)
+        return None
 
     def deadline(self) -> float:
-        """The line's next deadline."""
-        return self._line.next_deadline()
+        """The next probe, or the end of the silence."""
+        deadline = min(self._heard_at + self._timeout_s, self._probe_due)
+        return min(deadline, self._look_at) if self._splitter.is_waiting else deadline
 
-    def take_output(self) -> list[bytes]:
-        """The line's own frames."""
-        return self._line.take_output()
+    def _take(self, frames: list[MavlinkFrame], now: float) -> None:
+        if not frames:
+            return
+        self._heard_at = now
+        was_armed = self.port.vehicle.armed
+        self.telemetry.take(frames, now)
+        if self._is_harakiri and was_armed and not self.port.vehicle.armed:
+            self._probe_due = now
+        self.port.on_mavlink(frames)
+        if self.port.runner.is_busy:
+            for frame in frames:
+                self.port.runner.received_mavlink(frame, now)
 
-    def _take(self, frames: list[MavlinkFrame], now: float) -> Event | None:
-        if frames:
-            self.telemetry.take(frames, now)
-            self.port.on_mavlink(frames)
-            if self.port.runner.is_busy:
-                for frame in frames:
-                    self.port.runner.received_mavlink(frame, now)
-        return Lost(self._line.ended) if self._line.ended else None
+    def _send(self, packed: Packed) -> bool:
+        """Send a message; False if none of its frames would be free of hazard bytes."""
+        frame = self._sender.frame(packed)
+        if frame is None:
+            return False
+        self.port.output.append(frame)
+        return True
 
-    def _profile(self, heard: MavlinkFrame | None) -> Profile:
+    @property
+    def _timeout_s(self) -> float:
+        if not (self._is_harakiri and self.port.vehicle.armed):
+            return _SILENCE_S
+        return _HARAKIRI_ARMED_SILENCE_S + (_TORN_BYTES * 10 / self.speed if self.speed else 0.0)
+
+    def _profile(self, heard: MavlinkFrame) -> Profile:
         """A board met over MSP on this port stays in its family; otherwise the sender decides."""
         profiles = [profile for profile in self.port.profiles if profile.spoken is Spoken.MAVLINK]
         ours = [profile for profile in profiles if not profile.is_passed_through]
@@ -67,6 +126,6 @@ class Mavlink(State):
             return other
         if self.port.autopilot is Autopilot.HARAKIRI:
             return ours[0]
-        sender = None if heard is None else (heard.version, heard.sysid, heard.compid)
+        sender = (heard.version, heard.sysid, heard.compid)
         known = (p for p in ours if p.family == self.port.met_family or p.mavlink_sender == sender)
         return next(known, other)

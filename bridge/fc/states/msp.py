@@ -21,8 +21,10 @@ from protocols.msp.frame import MspFrame
 
 #: A flight controller that answers nothing for this long is gone: unplugged, reset, or switched to another protocol.
 MSP_SILENCE_S = 2.0
-#: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now.
+#: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now. On a slow line a Harakiri's
+#: MAVLink is torn, and a whole frame takes longer to come.
 _FOREIGN_SILENCE_S = 0.5
+_TORN_BYTES = 300
 _FOREIGN_SIZE = 16
 #: Identification must be done by then; on a line at 1200 baud it takes 8 s.
 _IDENTIFY_TIMEOUT_S = 15.0
@@ -103,7 +105,11 @@ class MspLine(State):
 
     @property
     def _silence_s(self) -> float:
-        return _FOREIGN_SILENCE_S if self._is_foreign else MSP_SILENCE_S
+        return (
+            min(_FOREIGN_SILENCE_S + _TORN_BYTES * self.link.byte_s, MSP_SILENCE_S)
+            if self._is_foreign
+            else MSP_SILENCE_S
+        )
 
     @property
     def _is_foreign(self) -> bool:
@@ -118,10 +124,9 @@ class MspLine(State):
         heard = self._foreign.mavlink
         if heard is not None:
             return Found(Spoken.MAVLINK, self.speed, "heard where MSP was answered before", heard)
-        if self._is_foreign:
-            first = [speed for speed in _ARMED_SPEEDS if speed in self.port.speeds and speed != self.speed]
-            return Lost("the incoming data is no longer MSP", first, self.unanswered())
-        return Lost(f"no answer for {MSP_SILENCE_S} s", pending=self.unanswered())
+        # Much slower than its telemetry, the port reads only a few wrong bytes of it, or none.
+        why = "the incoming data is no longer MSP" if self._is_foreign else f"no answer for {MSP_SILENCE_S} s"
+        return Lost(why, _ARMED_SPEEDS, self.unanswered())
 
 
 class Identifying(MspLine):

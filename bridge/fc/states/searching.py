@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Searches for the protocol and speed of a port."""
 
-from bridge.fc.autosense import Autosense, Spoken
+from bridge.fc.autosense import Autosense
 from bridge.fc.states.base import Event, Lost, Port, PortOpened, State
 
 
@@ -14,7 +14,8 @@ class Searching(State):
     def __init__(self, port: Port, event: PortOpened | Lost, now: float) -> None:
         super().__init__(port, event, now)
         first, pending = (event.first, event.pending) if isinstance(event, Lost) else ((), None)
-        self._search = Autosense(port.speeds, port.known_speed, now, first, pending)
+        first = [speed for speed in first if speed in port.speeds]
+        self._search = Autosense(port.speeds, tuple(port.good_speeds), now, first, pending)
         self.speed = self._search.speed
 
     def receive(self, data: bytes, now: float) -> Event | None:
@@ -42,6 +43,7 @@ class Searching(State):
         if found is None:
             return None
         self.port.output += self._search.take_output()
-        if found.spoken is Spoken.MSP or (self.port.known_speed is None and found.spoken is Spoken.MAVLINK):
-            self.port.known_speed = found.speed
+        if self.speed in self.port.good_speeds:
+            self.port.good_speeds.remove(self.speed)
+        self.port.good_speeds.append(self.speed)
         return found
