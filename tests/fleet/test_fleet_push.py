@@ -12,7 +12,7 @@ NAMES = ("a", "b", "c")
 
 
 def push_to(*names: str) -> FleetPush:
-    return FleetPush.of(names, [BridgeState(name, f"{number}") for number, name in enumerate(names)])
+    return FleetPush(names, [BridgeState(name, f"{number}") for number, name in enumerate(names)])
 
 
 def test_a_failure_does_not_affect_the_others() -> None:
@@ -21,7 +21,7 @@ def test_a_failure_does_not_affect_the_others() -> None:
     fleet.refused("b", {"error": "Armed: disarm to change the mission"})
     assert fleet.waiting == ["a", "c"]
     fleet.replied("a", ACCEPTED)
-    fleet.gone("c")
+    fleet.ended("c", is_alive=False)
     assert fleet.waiting == []
     assert [each.vehicle for each in fleet.failed] == ["b", "c"]
     assert fleet.vehicles["b"].error == "Armed: disarm to change the mission"
@@ -33,7 +33,7 @@ def test_a_vehicle_that_disappears_after_its_success_has_not_failed() -> None:
     fleet = push_to("a")
     fleet.replied("a", ACCEPTED)
     fleet.ended("a", is_alive=True)
-    fleet.gone("a")
+    fleet.ended("a", is_alive=False)
     assert fleet.failed == []
 
 
@@ -48,9 +48,18 @@ def test_silence_has_three_reasons() -> None:
 
 
 def test_a_name_used_by_two_bridges_gets_nothing() -> None:
-    fleet = FleetPush.of(["a", "b"], [BridgeState("a", "1"), BridgeState("a", "2"), BridgeState("b", "3")])
+    fleet = FleetPush(["a", "b"], [BridgeState("a", "1"), BridgeState("a", "2"), BridgeState("b", "3")])
     assert fleet.waiting == ["b"]
     assert "several bridges" in str(fleet.vehicles["a"].error)
+
+
+def test_a_staged_push_begins_no_other_after_a_failure() -> None:
+    fleet = push_to(*NAMES)
+    begun = fleet.begin(NAMES, staged=True)
+    assert next(begun) == "a"
+    fleet.refused("a", {"error": "no"})
+    assert list(begun) == []
+    assert [each.error for each in fleet.failed] == ["no", "not started: a had failed", "not started: a had failed"]
 
 
 def test_any_result_but_accepted_is_a_failure() -> None:
@@ -76,7 +85,7 @@ _ODD: list[object] = [
 _ANSWERS = st.none() | st.dictionaries(
     st.sampled_from(["progress", "of", "result", "error"]), st.sampled_from(_ODD), max_size=4
 )
-_EVENTS = st.tuples(st.sampled_from(["replied", "refused", "ended", "gone"]), st.sampled_from(NAMES), _ANSWERS)
+_EVENTS = st.tuples(st.sampled_from(["replied", "refused", "ended"]), st.sampled_from(NAMES), _ANSWERS)
 
 
 @given(st.lists(_EVENTS, max_size=20))
@@ -91,12 +100,10 @@ def test_events_in_any_order(events: list[tuple[str, str, dict[str, object] | No
                 fleet.refused(name, answer)
             case "ended":
                 fleet.ended(name, is_alive=answer is None)
-            case "gone":
-                fleet.gone(name)
         for each in fleet.vehicles.values():
             if each.is_done:
                 assert ends.setdefault(each.vehicle, (each.result, each.error)) == (each.result, each.error)
-                assert (each.result is None) == each.has_failed
+                assert (each.result is None) == (each.error is not None)
                 assert each.error != ""
     for name in fleet.waiting:
         fleet.ended(name, is_alive=False)

@@ -4,18 +4,17 @@
 `FleetPush` keeps the progress of each vehicle; `push` feeds it from zenoh.
 """
 
-import queue
-from collections import deque
-from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass
 
 import zenoh
 
 from service.cli.fleet.payload import decode, part, text, whole
-from service.cli.fleet.session import AT_ONCE, NO_COMMANDS, ask, send_query
-from service.cli.fleet.vehicle import BridgeState, bridge_of, replier
+from service.cli.fleet.session import NO_COMMANDS, ask, ask_each
+from service.cli.fleet.vehicle import BridgeState, replier
 from service.daemon.mission_data import Json
-from service.zenoh_link.keys import ALIVE, STATE, UPLOAD, full
+from service.zenoh_link.keys import STATE, UPLOAD, full
 
 #: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
 _PUSH_TIMEOUT_S = 120.0
@@ -29,7 +28,7 @@ _TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
 @dataclass(slots=True)
 class PushState:
-    """The progress of one vehicle. `records` of `total` are written; `error` is the reason for a failure."""
+    """The progress of one vehicle. `records` of `total` are written; `error`: why it failed."""
 
     vehicle: str
     records: int = 0
@@ -43,23 +42,13 @@ class PushState:
         """True if this is final."""
         return self.result is not None or self.error is not None
 
-    @property
-    def has_failed(self) -> bool:
-        """True if the vehicle is not known to hold the mission."""
-        return self.error is not None
 
-
-@dataclass(slots=True)
 class FleetPush:
-    """Every vehicle's progress, by name."""
+    """Every vehicle's progress, by name. A name used by several bridges fails at once."""
 
-    vehicles: dict[str, PushState] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, names: Iterable[str], bridges: Iterable[BridgeState]) -> "FleetPush":
-        """Make one for vehicles by name; a name used by several bridges fails at once."""
-        found = [bridge.vehicle for bridge in bridges]
-        return cls({name: PushState(name, error=_TWO if found.count(name) > 1 else None) for name in names})
+    def __init__(self, names: Iterable[str], bridges: Iterable[BridgeState]) -> None:
+        uses = Counter(bridge.vehicle for bridge in bridges)
+        self.vehicles = {name: PushState(name, error=_TWO if uses[name] > 1 else None) for name in names}
 
     @property
     def waiting(self) -> list[str]:
@@ -69,18 +58,22 @@ class FleetPush:
     @property
     def running(self) -> list[str]:
         """The vehicles that were started and are not done."""
-        return [name for name, progress in self.vehicles.items() if progress.is_begun and not progress.is_done]
+        return [name for name in self.waiting if self.vehicles[name].is_begun]
 
     @property
     def failed(self) -> list[PushState]:
-        """The vehicles that do not hold the mission."""
-        return [progress for progress in self.vehicles.values() if progress.has_failed]
+        """The vehicles that are not known to hold the mission."""
+        return [progress for progress in self.vehicles.values() if progress.error is not None]
 
-    def stop(self, why: str) -> None:
-        """Skip the vehicles that were not started."""
-        for progress in self.vehicles.values():
-            if not progress.is_done and not progress.is_begun:
-                progress.error = f"not started: {why}"
+    def begin(self, names: Iterable[str], *, staged: bool) -> Iterator[str]:
+        """Yield each vehicle whose push begins now; with `staged` no further one after a failure."""
+        for name in names:
+            if staged and (failed := self.failed):
+                for other in set(self.waiting) - set(self.running):
+                    self.vehicles[other].error = f"not started: {failed[0].vehicle} had failed"
+            if not self.vehicles[name].is_done:
+                self.vehicles[name].is_begun = True
+                yield name
 
     def replied(self, vehicle: str, reply: Json | None) -> None:
         """Take a reply: progress, or the result of an accepted mission."""
@@ -109,12 +102,6 @@ class FleetPush:
         if not progress.is_done:
             progress.error = NO_COMMANDS if is_alive and progress.total is None else _LOST
 
-    def gone(self, vehicle: str) -> None:
-        """Take the loss of a vehicle's liveliness token."""
-        progress = self.vehicles.get(vehicle)
-        if progress is not None and not progress.is_done:
-            progress.error = _LOST
-
 
 def push(
     session: zenoh.Session,
@@ -130,50 +117,20 @@ def push(
 
     `staged`: a tenth of the vehicles first, then the others; after a failure no other one is started.
     """
-    events: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-
-    def taken(name: str, reply: zenoh.Reply) -> None:
-        if reply.ok is not None:
-            fleet.replied(name, decode(reply.ok))
-        elif reply.err is not None:
-            fleet.refused(name, decode(reply.err))
-
-    def token(sample: zenoh.Sample) -> None:
-        bridge = bridge_of(str(sample.key_expr), prefix)
-        if bridge is not None and sample.kind == zenoh.SampleKind.DELETE:
-            events.put(lambda: fleet.gone(bridge.vehicle))
-
-    def ended(name: str) -> None:
-        if not fleet.vehicles[name].is_done:
-            # The token proves nothing: a vehicle that has just died may still have one.
-            state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_TIMEOUT_S)
-            # Nor does a reply from a storage, which keeps answering for a dead vehicle.
-            fleet.ended(name, is_alive=any(replier(reply) in bridges for reply in state))
-
-    def start(name: str) -> None:
-        fleet.vehicles[name].is_begun = True
-        send_query(
-            session,
-            full(prefix, name, UPLOAD.suffix),
-            lambda reply: events.put(lambda: taken(name, reply)),
-            lambda: events.put(lambda: ended(name)),
-            mission,
-            _PUSH_TIMEOUT_S,
-        )
-
-    with session.liveliness().declare_subscriber(full(prefix, "*", f"{ALIVE}/*"), token):
-        show(fleet)
-        for stage in _stages(fleet.waiting, staged=staged):
-            waiting = deque(stage)
-            while any(not fleet.vehicles[name].is_done for name in stage):
-                if staged and (failed := fleet.failed):
-                    fleet.stop(f"{failed[0].vehicle} had failed")
-                    waiting.clear()
-                while waiting and len(fleet.running) < AT_ONCE:
-                    start(waiting.popleft())
-                if fleet.running:
-                    events.get()()
-                show(fleet)
+    show(fleet)
+    for stage in _stages(fleet.waiting, staged=staged):
+        begun = fleet.begin(stage, staged=staged)
+        for name, reply in ask_each(session, prefix, begun, UPLOAD.suffix, _PUSH_TIMEOUT_S, mission):
+            if reply is None:
+                if not fleet.vehicles[name].is_done:
+                    # Neither its token nor a storage's reply proves that it is alive.
+                    state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_TIMEOUT_S)
+                    fleet.ended(name, is_alive=any(replier(each) in bridges for each in state))
+            elif reply.ok is not None:
+                fleet.replied(name, decode(reply.ok))
+            elif reply.err is not None:
+                fleet.refused(name, decode(reply.err))
+            show(fleet)
 
 
 def _stages(names: list[str], *, staged: bool) -> list[list[str]]:

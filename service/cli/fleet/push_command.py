@@ -71,7 +71,7 @@ def push_mission(
         if dry_run:
             _show_trials(try_mission(session, prefix, meant, bridges, mission), as_json)
             return
-        delivery, is_stopped = FleetPush.of(meant, bridges), False
+        delivery, is_stopped = FleetPush(meant, bridges), False
         try:
             with progress_bars(item_count) as show:
                 push(session, prefix, delivery, bridges, mission, show, staged=staged)

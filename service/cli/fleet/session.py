@@ -8,9 +8,9 @@ import json
 import queue
 import subprocess
 import sys
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -85,8 +85,11 @@ def ask_each(
     suffix: str,
     timeout_s: float,
     payload: bytes | None = None,
-) -> Iterator[tuple[str, zenoh.Reply]]:
-    """Query vehicles individually, some at a time, and yield the replies of each as they arrive."""
+) -> Iterator[tuple[str, zenoh.Reply | None]]:
+    """Query vehicles individually, some at a time, and yield the replies of each as they arrive, then None.
+
+    Names are taken one by one, when there is room for another query.
+    """
     replies: queue.SimpleQueue[tuple[str, zenoh.Reply | None]] = queue.SimpleQueue()
 
     def start(name: str) -> None:
@@ -99,16 +102,16 @@ def ask_each(
             timeout_s,
         )
 
-    waiting, running = deque(names), 0
-    while waiting or running:
-        while waiting and running < AT_ONCE:
-            start(waiting.popleft())
+    waiting, running = iter(names), 0
+    while True:
+        for name in islice(waiting, AT_ONCE - running):
+            start(name)
             running += 1
+        if not running:
+            return
         name, reply = replies.get()
-        if reply is None:
-            running -= 1
-        else:
-            yield name, reply
+        running -= reply is None
+        yield name, reply
 
 
 def send_query(

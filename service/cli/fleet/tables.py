@@ -134,7 +134,7 @@ def push_table(fleet: FleetPush) -> Table:
 
 
 def _result(progress: PushState) -> Text:
-    if progress.has_failed:
+    if progress.error is not None:
         return Text("failed", style="bold red")
     if progress.is_done:
         return Text("verified", style="green")

@@ -48,7 +48,8 @@ def try_mission(
     """Have each vehicle check the mission, and get the checksum of its own."""
     trials = {name: Trial(name) for name in names}
     for name, reply in ask_each(session, prefix, names, CHECK.suffix, _TIMEOUT_S, mission):
-        _take(trials[name], reply)
+        if reply is not None:
+            _take(trials[name], reply)
     for held in pull(session, prefix, names, bridges):
         if held.error is None:
             trials[held.vehicle].held_count, trials[held.vehicle].held = held.count, held.checksum
