@@ -8,10 +8,10 @@ from bridge.model.vehicle_groups import Group
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
-from service.daemon.mission_data import MOST, Json, to_json
+from service.daemon.mission_data import MOST, Json
 from service.settings.zenoh import STATE_NAME
 from service.zenoh_link import keys
-from service.zenoh_link.queries import JSON_REPLY, Answerer, QueryRefused, Question
+from service.zenoh_link.queries import Answerer, QueryRefused, Question
 from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates
 
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
@@ -38,37 +38,35 @@ class CommandQueries:
             keys.RATES: self._raise_rates,
         }
 
-    async def _upload(self, question: Question) -> None:
+    async def _upload(self, question: Question) -> Json:
         items = await _items(question)
-        progress = _teller(question, len(items))
         # A file of which nothing can be stored must not erase the missions of a fleet.
-        _end(question, await self._api.push(items, "zenoh upload", progress, may_erase=False))
+        return _end(await self._api.push(items, "zenoh upload", _teller(question, len(items)), may_erase=False))
 
-    async def _check(self, question: Question) -> None:
-        _tell(question, {"result": await self._api.check(await _items(question))})
+    async def _check(self, question: Question) -> Json:
+        return {"result": await self._api.check(await _items(question))}
 
-    async def _clear(self, question: Question) -> None:
-        _end(question, await self._api.push([], "zenoh clear", lambda _: None))
+    async def _clear(self, _: Question) -> Json:
+        return _end(await self._api.push([], "zenoh clear", lambda _: None))
 
-    async def _restore(self, question: Question) -> None:
+    async def _restore(self, question: Question) -> Json:
         number = question.parameter("number")
         if number is None or not number.isascii() or not number.isdigit() or not 0 < int(number) <= MOST:
             raise QueryRefused("add the mission's number: restore?number=3; mission/list has the numbers")
         data = await self._api.show_mission(int(number))
-        count = len(data["received"]["items"])
-        _end(question, await self._api.restore(int(number), _teller(question, count)))
+        return _end(await self._api.restore(int(number), _teller(question, len(data["received"]["items"]))))
 
-    async def _status(self, question: Question) -> None:
-        _tell(question, {"result": self._api.status()})
+    async def _status(self, _: Question) -> Json:
+        return {"result": self._api.status()}
 
-    async def _raise_rates(self, question: Question) -> None:
+    async def _raise_rates(self, question: Question) -> Json:
         now = asyncio.get_running_loop().time()
         for_s = _number(question, "for_s", MAX_REQUEST_S) or _USUAL_REQUEST_S
         wanted = {name: _number(question, name, MAX_REQUEST_HZ) for name in _RATE_NAMES}
         for name, rate_hz in wanted.items():
             if rate_hz is not None:
                 self._rates.request(name, rate_hz, now + for_s)
-        _tell(question, {"result": {"rates_hz": self._rates.describe(now)}})
+        return {"result": {"rates_hz": self._rates.describe(now)}}
 
 
 async def _items(question: Question) -> list[MissionItem]:
@@ -102,14 +100,10 @@ def _number(question: Question, name: str, most: float) -> float | None:
 
 def _teller(question: Question, count: int) -> Callable[[Json], None]:
     """A function that reports the progress towards `count` records."""
-    return lambda progress: _tell(question, progress | {"of": count})
+    return lambda progress: question.tell(progress | {"of": count})
 
 
-def _end(question: Question, answer: Json) -> None:
+def _end(answer: Json) -> Json:
     if answer["ack"] != _ACCEPTED:
         raise QueryRefused(answer["text"], answer)
-    _tell(question, {"result": answer})
-
-
-def _tell(question: Question, body: Json) -> None:
-    question.tell(to_json(body).encode(), JSON_REPLY)
+    return {"result": answer}

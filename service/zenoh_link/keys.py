@@ -2,21 +2,20 @@
 """Every key of a vehicle, in one table; docs/zenoh.md has the same one.
 
 A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` selects a whole fleet. The
-version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread.
+version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread. Verbatim
+chunks (@) match no wildcard: a wildcard never sends a command, and a recorder of `fleet/**` does not become a MAVLink
+ground station.
 """
 
 from dataclasses import dataclass
 from enum import Enum
 
 from bridge.model.vehicle_groups import Group
+from service.settings.zenoh import PayloadEncoding
 
 #: The version of keys and payloads. A new field does not change it; a change that would mislead a reader raises it.
 VERSION = 1
 _V = f"v{VERSION}"
-#: Verbatim chunks (@) match no wildcard: a wildcard never sends a command, and a recorder of `fleet/**` does not become
-#: a MAVLink ground station.
-COMMANDS = f"@cmd/{_V}"
-MAVLINK = f"@mavlink/{_V}"
 
 
 class SampleDelivery(Enum):
@@ -31,15 +30,15 @@ class SampleDelivery(Enum):
 class ZenohKey:
     """One key. `schema`: file name below schemas/, without its suffix; None: the payload is raw MAVLink.
 
-    `kept`: the number of samples kept for subscribers that lost some; 0: none. `is_compact`: CBOR in any case,
-    and the time in whole seconds.
+    `kept`: the number of samples kept for subscribers that lost some; 0: none. `encoding`: None for the one in the
+    settings.
     """
 
     suffix: str
     schema: str | None
     delivery: SampleDelivery
     kept: int = 0
-    is_compact: bool = False
+    encoding: PayloadEncoding | None = None
 
     @property
     def is_published(self) -> bool:
@@ -49,21 +48,29 @@ class ZenohKey:
 
 TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}
 STATE = ZenohKey(f"{_V}/state", "state", SampleDelivery.DROP, kept=1)
-OVERVIEW = ZenohKey(f"{_V}/overview", "overview", SampleDelivery.DROP, is_compact=True)
+OVERVIEW = ZenohKey(f"{_V}/overview", "overview", SampleDelivery.DROP, encoding=PayloadEncoding.CBOR)
 EVENT = ZenohKey(f"{_V}/event", "event", SampleDelivery.RELIABLE, kept=256)
 HISTORY = ZenohKey(f"{_V}/history", "history", SampleDelivery.REPLY)
 MISSION_CURRENT = ZenohKey(f"{_V}/mission/current", "mission_current", SampleDelivery.RELIABLE, kept=1)
 MISSION_LIST = ZenohKey(f"{_V}/mission/list", "mission_list", SampleDelivery.REPLY)
 MISSION_REPORT = ZenohKey(f"{_V}/mission/report", "mission_report", SampleDelivery.RELIABLE, kept=16)
-MAVLINK_OUT = ZenohKey(f"{MAVLINK}/out", None, SampleDelivery.DROP)
-MAVLINK_IN = ZenohKey(f"{MAVLINK}/in", None, SampleDelivery.RELIABLE)
+MAVLINK_OUT = ZenohKey(f"@mavlink/{_V}/out", None, SampleDelivery.DROP)
+MAVLINK_IN = ZenohKey(f"@mavlink/{_V}/in", None, SampleDelivery.RELIABLE)
 
-UPLOAD = ZenohKey(f"{COMMANDS}/mission/upload", "command_reply", SampleDelivery.REPLY)
-CHECK = ZenohKey(f"{COMMANDS}/mission/check", "command_reply", SampleDelivery.REPLY)
-CLEAR = ZenohKey(f"{COMMANDS}/mission/clear", "command_reply", SampleDelivery.REPLY)
-RESTORE = ZenohKey(f"{COMMANDS}/mission/restore", "command_reply", SampleDelivery.REPLY)
-STATUS = ZenohKey(f"{COMMANDS}/status", "command_reply", SampleDelivery.REPLY)
-RATES = ZenohKey(f"{COMMANDS}/rates", "command_reply", SampleDelivery.REPLY)
+
+COMMANDS = f"@cmd/{_V}"
+
+
+def _command(name: str) -> ZenohKey:
+    return ZenohKey(f"{COMMANDS}/{name}", "command_reply", SampleDelivery.REPLY, encoding=PayloadEncoding.JSON)
+
+
+UPLOAD = _command("mission/upload")
+CHECK = _command("mission/check")
+CLEAR = _command("mission/clear")
+RESTORE = _command("mission/restore")
+STATUS = _command("status")
+RATES = _command("rates")
 COMMAND_KEYS = (UPLOAD, CHECK, CLEAR, RESTORE, STATUS, RATES)
 
 KEYS = (

@@ -67,12 +67,12 @@ class Node(Follower):
         self._mavlink = MavlinkLink(self._publisher, daemon.gcs)
         self._presence = Liveliness(settings.vehicle, self._note)
         self._data = VehicleData(settings.vehicle, daemon.bridge, self._presence.others, clock)
-        self._queries = Queries(self._thread)
+        self._queries = Queries(self._payloads, self._thread)
         api = DaemonApi(daemon)
         state_dir = daemon.settings.state_dir
         self._rates = SampleRates(settings.profile, settings.rates)
         self._history = History(api, None if state_dir is None else state_dir / TLOG_FOLDER, clock.unix_s)
-        self._answerers = Answers(self._data, daemon.bridge, api, self._payloads, self._history).answerers
+        self._answerers = Answers(self._data, daemon.bridge, api, self._history).answerers
         if settings.commands:
             self._answerers |= CommandQueries(api, self._rates).answerers
         self._held: HeldMission | None = None
@@ -126,7 +126,7 @@ class Node(Follower):
             if key.is_published:
                 self._publisher.declare(session, key, self._name(key.suffix))
         for key, answerer in self._answerers.items():
-            self._queries.declare(session, self._name(key.suffix), answerer)
+            self._queries.declare(session, key, self._name(key.suffix), answerer)
         if self._settings.mavlink_in:
             self._mavlink.declare_input(session, self._name(keys.MAVLINK_IN.suffix))
         self._presence.declare(session, self._name(keys.ALIVE))

@@ -10,10 +10,10 @@ from typing import Any
 
 import zenoh
 
-from service.daemon.mission_data import Json
+from service.daemon.mission_data import Json, to_json
 from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link import compact
-from service.zenoh_link.keys import VERSION, ZenohKey
+from service.zenoh_link.keys import COMMAND_KEYS, OVERVIEW, VERSION, ZenohKey
 
 _write_any = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 _SCALARS = frozenset((float, int, str, bool, type(None)))
@@ -49,20 +49,17 @@ class Payloads:
 
     def encoding(self, key: ZenohKey) -> zenoh.Encoding:
         """The encoding of a key's samples."""
-        return encoding_of(key, self._encoding_for(key))
+        return encoding_of(key, key.encoding or self._encoding)
 
     def encode(self, key: ZenohKey, body: Json) -> bytes:
         """Encode a payload. May be called on any thread."""
-        if self._encoding_for(key) is PayloadEncoding.CBOR and key.schema is not None:
+        if (key.encoding or self._encoding) is PayloadEncoding.CBOR and key.schema is not None:
             return compact.dumps(key.schema, body)
         return _to_json(body)
 
     def _envelope(self, key: ZenohKey, seq: int) -> Json:
         time_s = self._clock()
-        return {"v": VERSION, "seq": seq, "time_s": round(time_s) if key.is_compact else time_s}
-
-    def _encoding_for(self, key: ZenohKey) -> PayloadEncoding:
-        return PayloadEncoding.CBOR if key.is_compact else self._encoding
+        return {"v": VERSION, "seq": seq, "time_s": round(time_s) if key is OVERVIEW else time_s}
 
     def head(self, key: ZenohKey) -> Json:
         """Begin the next payload of a key."""
@@ -70,8 +67,10 @@ class Payloads:
         self._next[key.suffix] = seq + 1
         return self._envelope(key, seq)
 
-    def answer(self, key: ZenohKey, body: Json) -> bytes:
-        """Make the reply to a query: it has the number of the last sample."""
+    def reply(self, key: ZenohKey, body: Json) -> bytes:
+        """Make the reply to a query: it has the number of the last sample. A command's reply has no head."""
+        if key in COMMAND_KEYS:
+            return to_json(body).encode()
         seq = max(self._next.get(key.suffix, 0) - 1, 0)
         return self.encode(key, self._envelope(key, seq) | body)
 

@@ -12,18 +12,14 @@ import zenoh
 from service.daemon.client import ControlError
 from service.daemon.mission_data import Json, to_json
 from service.machine.threads import post
-from service.settings.zenoh import PayloadEncoding
-from service.zenoh_link.keys import UPLOAD
-from service.zenoh_link.payload import encoding_of
+from service.zenoh_link.keys import UPLOAD, ZenohKey
+from service.zenoh_link.payload import Payloads
 from service.zenoh_link.session import SessionThread
 from storage.store_error import StoreError
 
 #: More at once are refused: each may hold a mission file.
 _MAX_AT_ONCE = 16
 _STOPPED = "the daemon stopped before it could reply; after a restart mission/current shows what is on board"
-
-#: The encoding of a command's replies and of all errors.
-JSON_REPLY = encoding_of(UPLOAD, PayloadEncoding.JSON)
 
 _log = structlog.get_logger()
 
@@ -37,12 +33,13 @@ class QueryRefused(Exception):
 
 
 class Question:
-    """One query waiting for its reply."""
+    """One query waiting for its reply. `name`: the full key."""
 
-    def __init__(self, query: zenoh.Query, name: str, thread: SessionThread) -> None:
+    def __init__(self, query: zenoh.Query, key: ZenohKey, name: str, payloads: Payloads, thread: SessionThread) -> None:
         self._query = query
+        self._key = key
+        self._payloads = payloads
         self._thread = thread
-        #: The full key.
         self.name = name
 
     @property
@@ -60,8 +57,18 @@ class Question:
         """A parameter of the selector; None if it is not given."""
         return self._query.parameters.get(name)
 
-    def tell(self, data: bytes, encoding: zenoh.Encoding) -> None:
+    def whole_number(self, name: str, usual: int, most: int) -> int:
+        """A parameter's number, greater than 0; `usual` if it is not given. QueryRefused."""
+        text = self.parameter(name)
+        if text is None:
+            return usual
+        if not (text.isascii() and text.isdigit() and 0 < int(text) <= most):
+            raise QueryRefused(f"{name} must be a whole number from 1 to {most}")
+        return int(text)
+
+    def tell(self, body: Json) -> None:
         """Send one reply; more may follow."""
+        data, encoding = self._payloads.reply(self._key, body), self._payloads.encoding(self._key)
 
         def reply() -> None:
             self._query.reply(self.name, data, encoding=encoding, timestamp=self._thread.timestamp())
@@ -71,8 +78,7 @@ class Question:
     def refuse(self, error: QueryRefused) -> None:
         """Send the error."""
         body = {"error": str(error)} | ({} if error.result is None else {"result": error.result})
-        data = to_json(body).encode()
-        answer = partial(self._query.reply_err, data, encoding=JSON_REPLY)
+        answer = partial(self._query.reply_err, to_json(body).encode(), encoding=self._payloads.encoding(UPLOAD))
         self._thread.submit(answer, is_reply=True)
 
     def end(self) -> None:
@@ -80,24 +86,25 @@ class Question:
         self._thread.submit(self._query.drop, is_reply=True)
 
 
-#: Handles a query; QueryRefused, ControlError, StoreError, OSError and ValueError become the error reply.
-Answerer = Callable[[Question], Awaitable[None]]
+#: Returns the last reply's body; QueryRefused, ControlError, StoreError, OSError and ValueError become an error reply.
+Answerer = Callable[[Question], Awaitable[Json]]
 
 
 class Queries:
     """Starts a task per query, up to a maximum."""
 
-    def __init__(self, thread: SessionThread) -> None:
+    def __init__(self, payloads: Payloads, thread: SessionThread) -> None:
+        self._payloads = payloads
         self._thread = thread
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
         self._room = threading.Semaphore(_MAX_AT_ONCE)
 
-    def declare(self, session: zenoh.Session, name: str, answerer: Answerer) -> None:
-        """Declare the queryable of one key; called on the session's thread."""
+    def declare(self, session: zenoh.Session, key: ZenohKey, name: str, answerer: Answerer) -> None:
+        """Declare the queryable of one key; `name`: the full key. Called on the session's thread."""
 
         def asked(query: zenoh.Query) -> None:
-            question = Question(query, name, self._thread)
+            question = Question(query, key, name, self._payloads, self._thread)
             if self._room.acquire(blocking=False):
                 post(self._loop, self._begin, question, answerer)
             else:
@@ -123,7 +130,7 @@ class Queries:
 
     async def _answer(self, question: Question, answerer: Answerer) -> None:
         try:
-            await answerer(question)
+            question.tell(await answerer(question))
         except QueryRefused as error:
             self._refuse(question, error)
         except (ControlError, StoreError, OSError, ValueError) as error:

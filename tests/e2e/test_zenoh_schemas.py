@@ -11,6 +11,7 @@ from jsonschema import Draft202012Validator
 
 from generators.zenoh_schemas import schemas, text
 from service.zenoh_link.compact import SCHEMAS as FOLDER
+from service.settings.zenoh import PayloadEncoding
 from service.zenoh_link.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
@@ -19,7 +20,7 @@ from tests.support.zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, end
 
 MISSION = (Path(__file__).parents[2] / "examples" / "naze-field.waypoints").read_bytes()
 SCHEMAS = {key.suffix: key.schema for key in KEYS}
-COMPACT = {key.suffix for key in KEYS if key.is_compact}
+COMPACT = {key.suffix for key in KEYS if key.encoding is PayloadEncoding.CBOR}
 
 
 def validator(name: str) -> Draft202012Validator:
