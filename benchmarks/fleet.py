@@ -2,8 +2,8 @@
 """A fleet of 5 and of 50 through one router: `fleet list`, `fleet push` to all, and the cost of each further vehicle.
 
 Each vehicle is a daemon (`naze-bridge run`) in its own process, with the simulated Naze inside, which keeps the pace of
-a UART. The router is a zenoh session in router mode in another process. Whole commands are timed, from start to exit;
-the floor is a Python program that only opens and closes a zenoh session.
+a UART. The router is another process: $ZENOHD, or the router of the Python package. Whole commands are timed, from
+start to exit; the floor is a Python program that only opens and closes a zenoh session.
 """
 
 import json
@@ -20,10 +20,11 @@ from pathlib import Path
 from benchmarks.figure import Figure, Floor
 from benchmarks.missions import COUNT, random_mission
 from benchmarks.processes import ENVIRONMENT, NAZE_BRIDGE, ROOT, daemon, free_udp_port, wait_for
-from benchmarks.zenoh_programs import ALL_TELEMETRY, client, configuration, cpu_s, router_program
+from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration, cpu_s
 from protocols.mission_file import write_qgc_wpl
 from service.settings.zenoh import DEFAULT_PREFIX
 from service.zenoh_link.keys import STATE, full
+from tests.support.zenoh_router import client, running_router
 
 _FEW, _MANY = 5, 50
 _STATES = full(DEFAULT_PREFIX, "*", STATE.suffix)
@@ -49,7 +50,8 @@ def measure() -> list[Figure]:
     """Measure both fleets; the larger one contains the smaller one."""
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
-        endpoint, router = stack.enter_context(router_program(folder))
+        router = stack.enter_context(running_router(folder))
+        endpoint = router.endpoint
         start_s = statistics.median(_timed([sys.executable, "-c", _OPEN_AND_LEAVE, endpoint]) for _ in range(_LISTS))
         pids: list[int] = []
         costs = {}
@@ -58,7 +60,7 @@ def measure() -> list[Figure]:
                 new = range(len(pids), len(pids) + _FEW)
                 pids += [stack.enter_context(_vehicle(folder, number, endpoint)) for number in new]
                 _wait_for_vehicles(endpoint, len(pids))
-            costs[count] = _cost(folder, count, endpoint, router, pids)
+            costs[count] = _cost(folder, count, endpoint, router.process.pid, pids)
     few, many = costs[_FEW], costs[_MANY]
     floor = Floor(start_s, "Python, a zenoh session")
     return [

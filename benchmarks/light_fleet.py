@@ -7,18 +7,19 @@ loopback: $ZENOHD, or the router of the Python package. One subscriber reads eve
 """
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from socket import SOCK_STREAM
 
 from benchmarks.processes import ROOT, running, wait_for
-from benchmarks.zenoh_programs import client, cpu_s
+from benchmarks.zenoh_programs import cpu_s
+from tests.support.programs import free_port
+from tests.support.zenoh_router import client, running_router
 
 _COUNTS = (1, 100, 400)
 _WATCHED_S = 20.0
@@ -62,7 +63,9 @@ def main(counts: tuple[int, ...]) -> None:
     print("vehicles  opened in s  router MB  router CPU %  samples/s  list s  vehicles' process MB")
     for count in counts:
         with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
-            endpoint, router = stack.enter_context(_router(Path(name)))
+            endpoint = f"tcp/127.0.0.1:{free_port(SOCK_STREAM)}"
+            config = _config(Path(name), endpoint)
+            router = stack.enter_context(running_router(Path(name), endpoint, config)).process.pid
             before_mb = _resident_mb(router)
             log, began_at = Path(name) / "vehicles.log", time.monotonic()
             command = [sys.executable, "-c", _VEHICLES, endpoint, "0", str(count)]
@@ -93,23 +96,17 @@ def _is_up(log: Path) -> bool:
     return b"up" in log.read_bytes()
 
 
-@contextmanager
-def _router(folder: Path) -> Iterator[tuple[str, int]]:
-    zenohd = os.environ.get("ZENOHD")
-    port = 17600 + os.getpid() % 300
-    endpoint, log = f"tcp/127.0.0.1:{port}", folder / "router.log"
-    config = folder / "router.json5"
+def _config(folder: Path, endpoint: str) -> Path:
+    """Write the router's configuration, which admits more sessions than zenoh's own."""
+    path = folder / "router.json5"
     settings = {
         "mode": "router",
         "listen": {"endpoints": [endpoint]},
         "scouting": {"multicast": {"enabled": False}},
         "transport": {"unicast": {"max_sessions": 12000, "accept_pending": 1000}, "shared_memory": {"enabled": False}},
     }
-    config.write_text(json.dumps(settings))
-    program = [zenohd] if zenohd else [sys.executable, str(ROOT / "examples" / "zenoh_router.py")]
-    with running([*program, *(("-c",) if zenohd else ()), str(config)], log) as process:
-        wait_for(lambda: b"is up" in log.read_bytes() or b"reached at" in log.read_bytes(), "the router is up")
-        yield endpoint, process.pid
+    path.write_text(json.dumps(settings))
+    return path
 
 
 def _listed_s(endpoint: str, count: int) -> float:

@@ -23,7 +23,7 @@ from benchmarks.figure import Figure, Floor
 from benchmarks.idle import LIBRARIES, libraries_mb, listener, resident_mb, udpout
 from benchmarks.processes import BenchmarkError, daemon, running, wait_for
 from benchmarks.telemetry import ATTITUDES, POLLS_HZ, Controller, drain, instant_controller, request_rates
-from benchmarks.zenoh_programs import ALL_TELEMETRY, client, configuration, router_program
+from benchmarks.zenoh_programs import ALL_TELEMETRY, configuration
 from bridge.model.vehicle import Orientation
 from bridge.model.vehicle_groups import Group
 from service.daemon.daemon import Daemon
@@ -33,6 +33,7 @@ from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettings
 from service.settings.zenoh_config import make_config
 from service.zenoh_link.keys import TELEMETRY, full
 from service.zenoh_link.node import Node
+from tests.support.zenoh_router import client, running_router
 
 _VEHICLE = "naze"
 _SETTLING_S = 2.0
@@ -45,8 +46,9 @@ _ANSWERS_A_TURN = 2000
 
 def measure() -> list[Figure]:
     """Measure all four."""
-    with tempfile.TemporaryDirectory() as name, router_program(Path(name)) as (endpoint, _):
-        return [*_latency_and_memory(Path(name), endpoint), *asyncio.run(_cpu(Path(name), endpoint))]
+    with tempfile.TemporaryDirectory() as name, running_router(Path(name)) as router:
+        folder, endpoint = Path(name), router.endpoint
+        return [*_latency_and_memory(folder, endpoint), *asyncio.run(_cpu(folder, endpoint))]
 
 
 def _latency_and_memory(folder: Path, endpoint: str) -> list[Figure]:

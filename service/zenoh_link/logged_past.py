@@ -156,13 +156,6 @@ def _position(time_s: float, message: Message) -> Json:
 
 
 def _thinned(positions: list[Json], most: int) -> list[Json]:
-    """The newest position of each of `most` equal parts of the time."""
-    if len(positions) <= most:
-        return positions
-    end_s = positions[-1]["time_s"]
-    part_s = (end_s - positions[0]["time_s"]) / most or 1.0
-    # The first position alone would be one part too many.
-    chosen: dict[int, Json] = {}
-    for each in reversed(positions):
-        chosen.setdefault(min(int((end_s - each["time_s"]) / part_s), most - 1), each)
-    return list(reversed(chosen.values()))
+    """Every n-th position, with the newest one."""
+    step = -(-len(positions) // most) if positions else 1
+    return positions[(len(positions) - 1) % step :: step]

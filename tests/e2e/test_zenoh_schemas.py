@@ -10,8 +10,8 @@ import zenoh
 from jsonschema import Draft202012Validator
 
 from generators.zenoh_schemas import schemas, text
-from service.zenoh_link.compact import SCHEMAS as FOLDER
 from service.settings.zenoh import PayloadEncoding
+from service.zenoh_link.compact import SCHEMAS as FOLDER
 from service.zenoh_link.keys import COMMANDS, KEYS, MAVLINK_OUT, VERSION
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan

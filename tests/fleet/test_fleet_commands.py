@@ -14,7 +14,7 @@ import zenoh
 
 from protocols.mission_file import read_mission_file, write_qgc_wpl
 from protocols.mission_item import Command
-from service.cli.fleet.session import FleetAddress, open_session
+from service.cli.fleet.session import open_session
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import HOME, PlanRow, judge, plain_plan, records_of, waypoint
 from tests.support.programs import run_naze_bridge, until
@@ -142,7 +142,7 @@ def test_an_unknown_name(fleet: Fleet, tmp_path: Path) -> None:
 def test_invalid_states_of_strangers(fleet: Fleet) -> None:
     """Tokens and states of other programs neither stop the list nor reach the terminal."""
     with ExitStack() as stack:
-        session = stack.enter_context(open_session(FleetAddress(connect=(fleet.router.endpoint,))))
+        session = stack.enter_context(open_session((fleet.router.endpoint,)))
         liveliness = session.liveliness()
         for key in (
             "fleet/ghost/v1/alive/0",

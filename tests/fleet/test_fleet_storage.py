@@ -15,7 +15,8 @@ from service.cli.fleet.watch import watching
 from tests.support.fleet_bench import Fleet
 from tests.support.plan import plain_plan
 from tests.support.programs import until
-from tests.support.zenoh_storage import client, storage
+from tests.support.zenoh_router import client
+from tests.support.zenoh_storage import storage
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from service.cli.fleet.roll_call import roll_call
-from service.cli.fleet.session import FleetAddress, open_session
+from service.cli.fleet.session import open_session
 from tests.support.programs import Board, Daemon, run_naze_bridge, until
 from tests.support.zenoh_router import Router, running_router
 
@@ -26,7 +26,7 @@ class Fleet:
         self._stack = stack
         self.router: Router = stack.enter_context(running_router(folder))
         #: For waiting in tests: `fleet list` would start a process for each look.
-        self.session = stack.enter_context(open_session(FleetAddress(connect=(self.router.endpoint,))))
+        self.session = stack.enter_context(open_session((self.router.endpoint,)))
         self.daemons: dict[str, Daemon] = {}
         self.boards: dict[str, Board] = {}
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The router of a fleet as a separate process: zenohd if ZENOHD names one, else examples/zenoh_router.py."""
 
+import json
 import os
 import signal
 import socket
@@ -9,6 +10,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+import zenoh
 
 from tests.support.programs import PATIENCE, Program, free_port, until
 
@@ -57,3 +60,11 @@ def running_router(directory: Path, endpoint: str = "", config: Path | None = No
         yield router
     finally:
         router.end(signal.SIGKILL)
+
+
+def client(endpoint: str) -> zenoh.Session:
+    """Open a session like a user's own subscriber."""
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    return zenoh.open(config)

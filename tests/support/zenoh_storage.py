@@ -11,18 +11,11 @@ from threading import Lock
 import zenoh
 
 from tests.support.programs import until
-from tests.support.zenoh_router import ZENOHD
+from tests.support.zenoh_router import ZENOHD, client
 
 _PLUGIN = "libzenoh_plugin_storage_manager.so"
 #: The storage's key in the admin space of its process.
 _STATUS = "@/*/router/status/plugins/storage_manager/storages/fleet"
-
-
-def client(endpoint: str) -> zenoh.Session:
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    return zenoh.open(config)
 
 
 @contextmanager

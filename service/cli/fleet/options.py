@@ -10,7 +10,7 @@ import click
 import zenoh
 
 from service.cli.fleet.conditions import FIELDS, parse_condition
-from service.cli.fleet.session import DEFAULT_ENDPOINT, FleetAddress, FleetError, open_session
+from service.cli.fleet.session import DEFAULT_ENDPOINT, FleetError, open_session
 from service.cli.sentences import fail
 from service.settings.zenoh import ZenohSettings, ZenohSettingsError, check_name
 
@@ -68,28 +68,22 @@ where_option = click.option(
 
 @contextmanager
 def fleet_session(where: dict[str, Any]) -> Iterator[tuple[zenoh.Session, str]]:
-    """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C without any."""
-    address = _address(**where)
+    """Join the fleet for one command. An error ends the program with one sentence, Ctrl-C without any.
+
+    `where`: the options for the fleet's address, which override the daemon's file.
+    """
     try:
-        with open_session(address) as session:
-            yield session, address.prefix
+        daemon = ZenohSettings() if where["config"] is None else _daemon_settings(where["config"])
+        check_name("prefix", prefix := where["prefix"] or daemon.prefix)
+    except ZenohSettingsError as error:
+        raise click.UsageError(str(error)) from error
+    try:
+        with open_session(where["connect"] or daemon.connect, where["zenoh_config"] or daemon.config_file) as session:
+            yield session, prefix
     except FleetError as error:
         fail(str(error))
     except KeyboardInterrupt:
         raise SystemExit(INTERRUPTED) from None
-
-
-def _address(
-    connect: tuple[str, ...], zenoh_config: Path | None, prefix: str | None, config: Path | None
-) -> FleetAddress:
-    """The fleet's address: options override the daemon's file."""
-    try:
-        daemon = ZenohSettings() if config is None else _daemon_settings(config)
-        address = FleetAddress(prefix or daemon.prefix, connect or daemon.connect, zenoh_config or daemon.config_file)
-        check_name("prefix", address.prefix)
-    except ZenohSettingsError as error:
-        raise click.UsageError(str(error)) from error
-    return address
 
 
 def _daemon_settings(config: Path) -> ZenohSettings:

@@ -19,11 +19,6 @@ def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
     return value if isinstance(value, dict) else None
 
 
-def decode_reply(reply: zenoh.Reply) -> Json | None:
-    """The object in a reply; None for an error reply."""
-    return decode(reply.ok) if reply.ok is not None else None
-
-
 def part(data: Json, *path: str) -> Any:
     """data[path[0]][path[1]]...; None if it is missing."""
     value: Any = data

@@ -3,7 +3,7 @@
 
 import zenoh
 
-from service.cli.fleet.payload import decode_reply
+from service.cli.fleet.payload import decode
 from service.cli.fleet.session import FleetError, ask
 from service.cli.fleet.vehicle import BridgeState, FleetVehicle, as_fleet, bridge_of, in_order, replier, vehicle_of
 from service.daemon.mission_data import Json
@@ -32,8 +32,8 @@ def roll_call(session: zenoh.Session, prefix: str) -> list[FleetVehicle]:
     # Without bridges there is no reply to wait for.
     if bridges:
         for reply in ask(session, full(prefix, "*", STATE.suffix), timeout_s=_TIMEOUT_S):
-            state, bridge = decode_reply(reply), replier(reply)
-            if state is not None and bridge in bridges:
+            bridge = replier(reply)
+            if reply.ok is not None and bridge in bridges and (state := decode(reply.ok)) is not None:
                 states[bridge] = state
                 if len(states) == len(bridges):
                     break

@@ -9,7 +9,6 @@ import queue
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -39,24 +38,15 @@ class FleetError(Exception):
     """A fleet command failed; one sentence."""
 
 
-@dataclass(frozen=True, slots=True)
-class FleetAddress:
-    """The fleet's address. Of several endpoints the first to answer is used.
+def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -> zenoh.Session:
+    """Open the session; FleetError if that fails. Of several endpoints the first to answer is used.
 
     `config_file`: a zenoh configuration to start from, for TLS, passwords and the like.
     """
-
-    prefix: str = "fleet"
-    connect: Sequence[str] = ()
-    config_file: Path | None = None
-
-
-def open_session(address: FleetAddress) -> zenoh.Session:
-    """Open the session; FleetError if that fails."""
-    config = _config(address)
+    config = _config(connect, config_file)
     endpoints = connect_endpoints(config)
     if not endpoints:
-        raise FleetError(f"{address.config_file} names no connect/endpoints: add them, or use --connect")
+        raise FleetError(f"{config_file} names no connect/endpoints: add them, or use --connect")
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
@@ -138,10 +128,10 @@ def is_connected(session: zenoh.Session) -> bool:
     return bool(session.info.routers_zid() or session.info.peers_zid())
 
 
-def _config(address: FleetAddress) -> zenoh.Config:
-    config = zenoh.Config() if address.config_file is None else _from_file(address.config_file)
-    endpoints = list(address.connect)
-    if not endpoints and address.config_file is None:
+def _config(connect: Sequence[str], config_file: Path | None) -> zenoh.Config:
+    config = zenoh.Config() if config_file is None else _from_file(config_file)
+    endpoints = list(connect)
+    if not endpoints and config_file is None:
         endpoints = [DEFAULT_ENDPOINT]
     settings: dict[str, object] = {
         "mode": "client",
