@@ -58,6 +58,10 @@ class MissionResult(IntEnum):
     OPERATION_CANCELLED = 15
 
 
+MAX_LAT_E7 = 90 * 10**7
+MAX_LON_E7 = 180 * 10**7
+
+
 @dataclass(frozen=True, slots=True)
 class MissionItem:
     """An item of a mission list, as sent (any value is possible) or as stored.
@@ -76,6 +80,11 @@ class MissionItem:
     lat_e7: int | None
     lon_e7: int | None
     alt_m: float
+
+
+def is_on_earth(lat_e7: int, lon_e7: int) -> bool:
+    """True if the coordinates are those of a place."""
+    return abs(lat_e7) <= MAX_LAT_E7 and abs(lon_e7) <= MAX_LON_E7
 
 
 def degrees_to_e7(degrees: float) -> int | None:

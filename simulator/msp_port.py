@@ -150,6 +150,8 @@ class MspAnswers:
 
     def __init__(self, craft: Callable[[], Craft], tree: Tree) -> None:
         self._craft = craft
+        #: GPSLatLonErrorVal in HarakiriWebstore1's mw.h.
+        self._unknown_e7 = 0 if tree is Tree.TESTCODE3 else 1_900_000_000
         self._boxes = [box for box in _BOXES if box != "PASSTHRU" or tree is Tree.TESTCODE3]
         self._settings = {
             HarakiriCommand.RC_TUNING: bytes((90, 65, 0, 0, 0, 50, 0)),
@@ -226,7 +228,7 @@ class MspAnswers:
         craft = self._craft()
         match payload[0]:
             case 0:
-                number, (lat, lon) = _HOME, craft.home or (0, 0)
+                number, (lat, lon) = _HOME, craft.home or (self._unknown_e7, self._unknown_e7)
             case 16:
                 number, lat, lon = _HOLD, craft.flight.lat_e7, craft.flight.lon_e7
             case _:

@@ -12,10 +12,8 @@ from typing import Any, Protocol
 
 from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from bridge.model.verdict import CLEARED_LIST, Verdict, rejected
-from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from protocols.mission_item import MAX_LAT_E7, MAX_LON_E7, Command, Frame, MissionItem, MissionResult
 
-MAX_LAT_E7 = 90 * 10**7
-MAX_LON_E7 = 180 * 10**7
 RELATIVE_FRAMES = (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT)
 SEA_LEVEL_FRAMES = (Frame.GLOBAL, Frame.GLOBAL_INT)
 TERRAIN_FRAMES = (Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT)

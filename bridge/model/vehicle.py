@@ -15,6 +15,7 @@ from bridge.model.airframe import Airframe
 from bridge.model.battery import least_cells, remaining_percent
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import GroundTrack, distance_m
+from protocols.mission_item import is_on_earth
 from protocols.msp.nav import NavStatus
 from protocols.msp.telemetry import Sensor
 
@@ -273,8 +274,8 @@ class Vehicle:
         return replace(reading, cells=self._cells, remaining_percent=remaining_percent(reading.voltage_v, self._cells))
 
     def hear_home(self, lat_e7: int, lon_e7: int, altitude_m: float | None = None) -> None:
-        """Take the flight controller's own home, degrees * 1e7. It has none while these are 0."""
-        if not (lat_e7 and lon_e7):
+        """Take the flight controller's own home, degrees * 1e7. It has none while these are 0 or 190 degrees."""
+        if not (lat_e7 and lon_e7 and is_on_earth(lat_e7, lon_e7)):
             return
         self.is_home_settled = True
         if self.home is None or (self.home.lat_e7, self.home.lon_e7) != (lat_e7, lon_e7):

@@ -112,7 +112,7 @@ class Analog(NamedTuple):
 
 
 class HomePoint(NamedTuple):
-    """MSP_WP number 0: home, degrees * 1e7; 0, 0 if unknown."""
+    """MSP_WP number 0: home, degrees * 1e7; 0 or 190 degrees if unknown."""
 
     lat_e7: int
     lon_e7: int

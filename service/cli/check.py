@@ -12,11 +12,11 @@ from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USU
 from bridge.controllers.nav.rules import INAV_CAPACITY, MULTIWII_CAPACITY
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
-from bridge.missions.list_check import MAX_LAT_E7, MAX_LON_E7, MissionRules, check_list
+from bridge.missions.list_check import MissionRules, check_list
 from bridge.model.finding import DROPPED, without_defaults
 from bridge.model.verdict import Result, Verdict
 from protocols.mission_file import MissionFileError
-from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7
+from protocols.mission_item import MissionItem, MissionResult, degrees_to_e7, is_on_earth
 from protocols.mission_record import identify
 from service.cli.mission_source import load_mission
 from service.cli.mission_table import mission_table
@@ -52,7 +52,7 @@ def _place(_ctx: click.Context, _param: click.Parameter, text: str | None) -> tu
         lat, lon = (degrees_to_e7(float(each)) for each in text.split(","))
     except ValueError:
         lat = lon = None
-    if lat is None or lon is None or abs(lat) > MAX_LAT_E7 or abs(lon) > MAX_LON_E7:
+    if lat is None or lon is None or not is_on_earth(lat, lon):
         raise click.BadParameter(f"{text!r} is not a position: write it like 45.3838,8.4733")
     return lat, lon
 

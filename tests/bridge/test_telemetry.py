@@ -14,7 +14,7 @@ from protocols.mavlink.dialect import Message, messages
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
 from simulator.flight import FlightState
-from simulator.options import Faults, SimOptions
+from simulator.options import Faults, SimOptions, Tree
 from tests.support.conversations import waypoints
 from tests.support.world import GroundStation, World
 
@@ -207,6 +207,17 @@ def test_home_is_the_place_and_altitude_of_arming() -> None:
     home = station.said("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == (453838000, 84733000)
     assert home.altitude == pytest.approx(131_000, abs=1000)
+
+
+@pytest.mark.parametrize("tree", Tree)
+def test_home_before_arming_is_the_position(tree: Tree) -> None:
+    """HarakiriWebstore1 reports an unknown home as 190 degrees, TestCode3 as 0."""
+    world = World(SimOptions(tree=tree), speeds=(115200,))
+    world.wait_ready()
+    station = listening(world)
+    world.run(3)
+    home = station.said("HOME_POSITION")[-1]
+    assert (home.latitude, home.longitude) == (453838000, 84733000)
 
 
 # The line is not overloaded.
