@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
+from io import FileIO
 from pathlib import Path
 
 import structlog
@@ -53,7 +54,9 @@ class TlogFolder:
         self._folder = folder
         self._limits = limits
         self._measure_free_space = measure_free_space
-        self._file: _OpenFile | None = None
+        #: Without a buffer: written bytes survive a crash of this process.
+        self._file: FileIO | None = None
+        self._path = folder
         self._own: list[Path] = []
         self._synced_at = 0.0
         self._retry_at = 0.0
@@ -62,13 +65,13 @@ class TlogFolder:
     @property
     def is_full(self) -> bool:
         """True if the open file has reached its maximum size."""
-        return self._file is not None and self._file.size >= self._limits.file_size
+        return self._file is not None and self._file.tell() >= self._limits.file_size
 
     def describe(self) -> str:
         """The open file, or the reason why none is open. May be called while another thread writes."""
-        file, trouble = self._file, self._trouble
-        if file is not None:
-            return str(file.path)
+        trouble = self._trouble
+        if self._file is not None:
+            return str(self._path)
         return f"stopped, {trouble}" if trouble else f"nothing yet, in {self._folder}"
 
     def write(self, records: bytes, now: float, *, is_flight: bool = False) -> None:
@@ -77,36 +80,46 @@ class TlogFolder:
             return
         try:
             if self._file is None:
-                self._file = self._create(datetime.fromtimestamp(first_stamp_us(records) / 1e6, UTC))
+                self._path = self._new_path(datetime.fromtimestamp(first_stamp_us(records) / 1e6, UTC))
+                self._file = FileIO(self._path, "x")
+                self._own.append(self._path)
             if self._measure_free_space(self._folder) < LEFT_FREE + len(records):
                 raise _LittleSpaceError(f"less than {LEFT_FREE >> 20} MB of the disk are free")
-            if is_flight:
-                self._mark_flight(self._file)
-            is_first = not self._file.size
-            self._file.append(records)
+            if is_flight and not _is_flight(self._path):
+                self._own.remove(self._path)
+                self._path = self._path.rename(_of_flight(self._path))
+                self._own.append(self._path)
+            is_first = not self._file.tell()
+            rest = memoryview(records)
+            while rest:
+                rest = rest[self._file.write(rest) :]
             if is_first:
-                _log.info("tlog.recording", file=str(self._file.path))
+                _log.info("tlog.recording", file=str(self._path))
                 self._trouble = ""
             if now >= self._synced_at + _SYNC_S:
-                self._file.sync()
+                os.fdatasync(self._file.fileno())
                 self._synced_at = now
         except OSError as error:
             self._give_up(error, now)
 
     def close(self) -> None:
-        """Close the open file; the next `write` begins another one."""
+        """Close the open file, and delete it if it is empty; the next `write` begins another one."""
         if self._file is not None:
+            with suppress(OSError):
+                os.fdatasync(self._file.fileno())
+            is_empty = not self._file.tell()
             self._file.close()
             self._file = None
+            if is_empty:
+                self._path.unlink(missing_ok=True)
 
-    def _create(self, began: datetime) -> "_OpenFile":
-        """Make a file named after `began`, or the first free second after it: clocks may be set back."""
+    def _new_path(self, began: datetime) -> Path:
+        """Name a file after `began`, or the first free second after it: clocks may be set back."""
         self._folder.mkdir(parents=True, exist_ok=True)
         self._make_room(began)
         while (path := self._folder / began.strftime(_NAME_FORMAT)).exists() or _of_flight(path).exists():
             began += timedelta(seconds=1)
-        self._own.append(path)
-        return _OpenFile(path)
+        return path
 
     def _make_room(self, now: datetime) -> None:
         """Remove the oldest files until another one fits, flights last. Files with other names are left alone.
@@ -127,12 +140,6 @@ class TlogFolder:
             total -= sizes[path]
             _log.debug("tlog.removed", file=str(path))
 
-    def _mark_flight(self, file: "_OpenFile") -> None:
-        if not _is_flight(file.path):
-            self._own.remove(file.path)
-            file.path = file.path.rename(_of_flight(file.path))
-            self._own.append(file.path)
-
     def _give_up(self, error: OSError, now: float) -> None:
         self.close()
         self._retry_at = now + _RETRY_S
@@ -151,30 +158,3 @@ def _of_flight(path: Path) -> Path:
 
 class _LittleSpaceError(OSError):
     """The disk is nearly full."""
-
-
-class _OpenFile:
-    """A file that is appended to without a buffer: written bytes survive a crash of this process."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.size = 0
-        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-
-    def append(self, data: bytes) -> None:
-        view = memoryview(data)
-        while view:
-            written = os.write(self._descriptor, view)
-            self.size += written
-            view = view[written:]
-
-    def sync(self) -> None:
-        os.fdatasync(self._descriptor)
-
-    def close(self) -> None:
-        """Close the file, and delete it if it is empty."""
-        with suppress(OSError):
-            self.sync()
-        os.close(self._descriptor)
-        if not self.size:
-            self.path.unlink(missing_ok=True)

@@ -53,6 +53,7 @@ def test_records_are_in_the_file_at_once(tmp_path: Path) -> None:
     folder = TlogFolder(tmp_path, TlogLimits())
     folder.write(record(), 0.0)
     assert (tmp_path / "2026-11-21 12-00-00.tlog").read_bytes() == record()
+    folder.close()
 
 
 def test_the_oldest_files_are_deleted_to_keep_the_total_size(tmp_path: Path) -> None:
@@ -111,6 +112,7 @@ def test_an_unusable_folder_is_reported_once_and_retried(tmp_path: Path) -> None
     began = datetime.strptime(name, "%Y-%m-%d %H-%M-%S.tlog").replace(tzinfo=UTC)
     assert began - NOON <= timedelta(seconds=260)
     assert (tmp_path / "logs" / name).stat().st_size == RECORD_SIZE * (400 - (began - NOON) // timedelta(seconds=1))
+    folder.close()
 
 
 @pytest.mark.parametrize("is_recording", [False, True])
@@ -128,6 +130,7 @@ def test_nothing_is_written_to_a_nearly_full_disk(tmp_path: Path, is_recording: 
     free[0] = PLENTY
     folder.write(record(NOON + timedelta(seconds=300)), 300.0)
     assert names(tmp_path)[-1] == "2026-11-21 12-05-00.tlog"
+    folder.close()
 
 
 def test_a_full_disk_is_reported_once_and_complete_records_can_be_read(tmp_path: Path) -> None:
@@ -145,3 +148,4 @@ def test_a_full_disk_is_reported_once_and_complete_records_can_be_read(tmp_path:
     assert (tmp_path / "2026-11-21 12-00-00.tlog").stat().st_size == 250
     folder.write(record(NOON + timedelta(seconds=100)), 100.0)
     assert names(tmp_path) == ["2026-11-21 12-00-00.tlog", "2026-11-21 12-01-40.tlog"]
+    folder.close()
