@@ -8,7 +8,10 @@ a connection waits for its turn: a page that is loaded twice in a second must no
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable
+
+from uvicorn.config import Config
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.server import ServerState
 
 #: Responses are a few kilobytes and quick to make.
 LIFETIME_S = 15.0
@@ -60,39 +63,37 @@ class Door:
             transport.abort()
 
 
-class BoundedConnection(asyncio.Protocol):
-    """The connection's side of the HTTP protocol that `serve` makes for it."""
+class BoundedConnection(H11Protocol):
+    """uvicorn's side of a connection, which begins when its turn comes."""
 
-    def __init__(self, door: Door, serve: Callable[[], asyncio.Protocol]) -> None:
+    def __init__(self, door: Door, config: Config, state: ServerState) -> None:
+        super().__init__(config, state, {})
         self._door = door
-        self._serve = serve
-        self._loop = asyncio.get_running_loop()
         self._address = ""
-        self._transport: asyncio.Transport | None = None
-        self._inner: asyncio.Protocol | None = None
+        self._admitted: asyncio.Transport | None = None
         self._end: asyncio.TimerHandle | None = None
         self._turn: asyncio.TimerHandle | None = None
+        self._is_served = False
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Pass on the connection when its turn comes; abort it if there is no room."""
-        assert isinstance(transport, asyncio.Transport)
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Wait for its turn; abort it if there is no room."""
         peer = transport.get_extra_info("peername")
         if peer is None or not self._door.admit(peer[0]):
             transport.abort()
             return
         self._address = peer[0]
-        self._transport = transport
+        self._admitted = transport
         self._door.transports.add(transport)
-        self._end = self._loop.call_later(self._door.lifetime_s, transport.abort)
+        self._end = self.loop.call_later(self._door.lifetime_s, transport.abort)
         transport.pause_reading()
         self._await_turn(transport)
 
     def _await_turn(self, transport: asyncio.Transport) -> None:
-        if not self._door.take_turn(self._address, self._loop.time()):
-            self._turn = self._loop.call_later(_TURN_S, self._await_turn, transport)
+        if not self._door.take_turn(self._address, self.loop.time()):
+            self._turn = self.loop.call_later(_TURN_S, self._await_turn, transport)
             return
-        self._inner = self._serve()
-        self._inner.connection_made(transport)
+        self._is_served = True
+        super().connection_made(transport)
         transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -100,27 +101,8 @@ class BoundedConnection(asyncio.Protocol):
         for timer in self._end, self._turn:
             if timer is not None:
                 timer.cancel()
-        if self._transport is not None:
-            self._door.transports.discard(self._transport)
+        if self._admitted is not None:
+            self._door.transports.discard(self._admitted)
             self._door.leave(self._address)
-        if self._inner is not None:
-            self._inner.connection_lost(exc)
-
-    def data_received(self, data: bytes) -> None:
-        """Pass it on."""
-        if self._inner is not None:
-            self._inner.data_received(data)
-
-    def eof_received(self) -> bool | None:
-        """Pass it on."""
-        return None if self._inner is None else self._inner.eof_received()
-
-    def pause_writing(self) -> None:
-        """Pass it on."""
-        if self._inner is not None:
-            self._inner.pause_writing()
-
-    def resume_writing(self) -> None:
-        """Pass it on."""
-        if self._inner is not None:
-            self._inner.resume_writing()
+        if self._is_served:
+            super().connection_lost(exc)

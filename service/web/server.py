@@ -10,7 +10,6 @@ from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.routing import Route
 from uvicorn.config import Config
-from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
 from service.daemon.daemon import Daemon
@@ -69,7 +68,7 @@ class WebServer:
         while self._server is None:
             try:
                 self._server = await loop.create_server(
-                    lambda: BoundedConnection(self._door, self._serve),
+                    lambda: BoundedConnection(self._door, self._config, self._state),
                     self._address.host,
                     self._address.port,
                     backlog=_BACKLOG,
@@ -81,9 +80,6 @@ class WebServer:
                 said = why
                 await asyncio.sleep(_RETRY_S)
         _log.info("web.listening", address=str(self._address))
-
-    def _serve(self) -> asyncio.Protocol:
-        return H11Protocol(self._config, self._state, {})
 
 
 def _config(api: Api, hosts: tuple[str, ...]) -> Config:

@@ -7,6 +7,9 @@ from functools import partial
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from starlette.types import Receive, Scope, Send
+from uvicorn.config import Config
+from uvicorn.server import ServerState
 
 from service.web.connection_limit import (
     MAX_CONNECTIONS,
@@ -50,31 +53,34 @@ def test_the_limits_are_never_exceeded(visits: list[tuple[str, float, bool]]) ->
     assert door.take_turn("a", now + 2)
 
 
-class _Greeter(asyncio.Protocol):
-    """Answers the first data with one byte and closes."""
+_REQUEST = b"GET / HTTP/1.1\r\nHost: pi\r\nConnection: close\r\n\r\n"
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
 
-    def data_received(self, _data: bytes) -> None:
-        self._transport.write(b"!")
-        self._transport.close()
+async def _listen(door: Door, body: bytes) -> tuple[asyncio.Server, int]:
+    """A server that answers each request with `body`; its port."""
+
+    async def serve(_scope: Scope, _receive: Receive, send: Send) -> None:
+        headers = [(b"connection", b"close"), (b"content-length", str(len(body)).encode())]
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        await send({"type": "http.response.body", "body": body})
+
+    config, state = Config(serve, lifespan="off", ws="none", log_config=None), ServerState()
+    make = partial(BoundedConnection, door, config, state)
+    server = await asyncio.get_running_loop().create_server(make, "127.0.0.1", 0)
+    return server, server.sockets[0].getsockname()[1]
 
 
 async def test_connections_over_the_rate_wait_and_are_served() -> None:
-    door = Door()
-    server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, _Greeter), "127.0.0.1", 0)
-    port = server.sockets[0].getsockname()[1]
+    server, port = await _listen(Door(), b"!")
     room = asyncio.Semaphore(6)  # as many as a browser opens
 
     async def ask() -> bytes:
         async with room:
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
-            writer.write(b"?")
+            writer.write(_REQUEST)
             answer = await reader.read()
             writer.close()
-            return answer
+            return answer[-1:]
 
     async with asyncio.timeout(60), asyncio.TaskGroup() as group:
         asked = [group.create_task(ask()) for _ in range(2 * MAX_IN_A_SECOND_FROM_ONE)]
@@ -83,15 +89,6 @@ async def test_connections_over_the_rate_wait_and_are_served() -> None:
 
 
 _VISITORS = 3
-
-
-class _Giver(asyncio.Protocol):
-    """Sends more than the socket buffers hold and closes when all of it has been read."""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        transport.write(bytes(16 << 20))
-        transport.close()
 
 
 class _NoticedDoor(Door):
@@ -109,15 +106,17 @@ class _NoticedDoor(Door):
             self.emptied.set()
 
 
-async def _is_cut_off(serve: type[asyncio.Protocol]) -> None:
-    """Connect and stay idle; return once no connection is counted."""
+async def _is_cut_off(request: bytes) -> None:
+    """Connect, send a request and stay idle; return once no connection is counted."""
     door = _NoticedDoor()
-    server = await asyncio.get_running_loop().create_server(partial(BoundedConnection, door, serve), "127.0.0.1", 0)
-    port = server.sockets[0].getsockname()[1]
+    server, port = await _listen(door, bytes(16 << 20))
     connections = [await asyncio.open_connection("127.0.0.1", port, limit=1024) for _ in range(_VISITORS)]
+    for _, writer in connections:
+        writer.write(request)
     try:
         async with asyncio.timeout(30):
             await door.emptied.wait()
+        assert not door.transports
     finally:
         for _, writer in connections:
             writer.close()
@@ -125,8 +124,9 @@ async def _is_cut_off(serve: type[asyncio.Protocol]) -> None:
 
 
 async def test_a_silent_connection_is_closed() -> None:
-    await _is_cut_off(asyncio.Protocol)
+    await _is_cut_off(b"")
 
 
 async def test_a_connection_that_does_not_read_is_closed() -> None:
-    await _is_cut_off(_Giver)
+    """The answer is larger than the socket buffers."""
+    await _is_cut_off(_REQUEST)
