@@ -171,7 +171,7 @@ class Bridge:
             self.session.next_deadline(),
             self.runner.next_deadline(),
             self._uploads.next_deadline(),
-            self.ground.next_deadline(),
+            self.ground.stations.next_deadline(),
             self._announcer.due,
             self._watch.due,
             self._vehicle.due if self._is_represented else inf,

@@ -50,9 +50,9 @@ class Ground:
         self.on_frames = on_frames or _drop
         self._standing = standing
         self._signers = signers
-        self._stations = Stations()
+        self.stations = Stations()
         self.budgets = Budgets(self.has_standing)
-        self.flash = FlashBudget(standing, self._stations)
+        self.flash = FlashBudget(standing, self.stations)
         self._default_peers: dict[Peer, bool] = {}
         self._splitters: dict[Peer, MavlinkSplitter] = {}
         self._writers: dict[Peer, FrameWriter] = {}
@@ -86,14 +86,10 @@ class Ground:
         """Forget all peers on a link; returns those that were heard."""
         for peer in [peer for peer in self._default_peers if peer.link == name]:
             self.remove_default_peer(peer)
-        heard = [peer for peer in self.peers() if peer.link == name]
+        heard = [peer for peer in self.stations.peers() if peer.link == name]
         for peer in heard:
             self.gone(peer)
         return heard
-
-    def peers(self) -> list[Peer]:
-        """The ground stations that were heard."""
-        return self._stations.peers()
 
     def everyone(self) -> Sequence[Peer]:
         """All peers that receive broadcasts."""
@@ -103,10 +99,10 @@ class Ground:
 
     def unheard(self) -> list[Peer]:
         """The default peers that are not connected: nothing may be listening there."""
-        return [peer for peer in self._default_peers if self._stations.is_unknown(peer)]
+        return [peer for peer in self._default_peers if self.stations.is_unknown(peer)]
 
     def _count_everyone(self) -> list[Peer]:
-        heard = self._stations.peers()
+        heard = self.stations.peers()
         answered = {peer.link for peer in heard}
         unheard = (
             peer
@@ -115,34 +111,22 @@ class Ground:
         )
         return [*heard, *unheard]
 
-    def moved_to(self, station: Station, now: float) -> list[Station]:
-        """The new addresses of a station that fell silent at its old one: usually none."""
-        return self._stations.moved_to(station, now)
-
-    def has_moved(self, station: Station, to: Station, now: float) -> bool:
-        """True if `to` is such an address."""
-        return self._stations.has_moved(station, to, now)
-
     def gone(self, peer: Peer) -> None:
         """A ground station's connection is closed."""
-        self._stations.gone(peer)
+        self.stations.gone(peer)
         self._forget(peer)
 
     def expire(self, now: float) -> list[Peer]:
         """Forget silent peers, and return them."""
         self.now = now
-        silent = self._stations.expire(now)
+        silent = self.stations.expire(now)
         for peer in silent:
             self._forget(peer)
         if silent:
-            self.budgets.keep(self._stations.peers())
+            self.budgets.keep(self.stations.peers())
         for peer in silent:
             self._log_event("info", "gcs.silent", peer=str(peer))
         return silent
-
-    def next_deadline(self) -> float:
-        """The time of the next `expire`."""
-        return self._stations.next_deadline()
 
     def _forget(self, peer: Peer) -> None:
         self._everyone = None
@@ -170,9 +154,9 @@ class Ground:
     def admits(self, peer: Peer, now: float) -> bool:
         """False if a frame must be ignored, because it comes from one of too many new addresses."""
         standing = self._standing(peer)
-        if standing is Standing.PROVEN or not self._stations.is_unknown(peer):
+        if standing is Standing.PROVEN or not self.stations.is_unknown(peer):
             return True
-        has_room = self._stations.has_room_for(peer, is_listener=standing is Standing.LISTENER)
+        has_room = self.stations.has_room_for(peer, is_listener=standing is Standing.LISTENER)
         return has_room and self.budgets.allows(Cost.ARRIVAL, peer, now)
 
     def heard(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
@@ -180,7 +164,7 @@ class Ground:
         self.frames_received[peer.link, frame.msgid] += 1
         station = Station(peer, frame.sysid, frame.compid)
         is_listener = self._standing(peer) is Standing.LISTENER
-        if self._stations.heard(station, frame.version, now, is_listener=is_listener):
+        if self.stations.heard(station, frame.version, now, is_listener=is_listener):
             self._everyone = None
             self._log_event("info", "gcs.found", station=str(station))
             self._on_newcomer(peer)
@@ -189,18 +173,18 @@ class Ground:
 
     def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
         """Pass an accepted frame to the frame listener."""
-        if not self._stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
+        if not self.stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
             self.on_frames([frame.raw])
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
         """The connection of a full link to drop; one with standing only if there is no other."""
         others = {peer: at for peer, at in peers.items() if self._standing(peer) is not Standing.PROVEN}
-        return displaced(others or peers, self._stations.steady)
+        return displaced(others or peers, self.stations.steady)
 
     def has_standing(self, peer: Peer) -> bool:
         """True for a peer that has authenticated, or has precedence on its link: strangers cannot use its shares."""
         standing = self._standing(peer)
-        return standing is Standing.PROVEN or (standing is Standing.OPEN and self._stations.has_standing(peer))
+        return standing is Standing.PROVEN or (standing is Standing.OPEN and self.stations.has_standing(peer))
 
     @property
     def is_recording(self) -> bool:
@@ -223,10 +207,7 @@ class Ground:
 
     def to(self, station: Station, message: Message) -> None:
         """Send a message to one ground station."""
-        peer = station.peer
-        frame = self._write(peer, message, self._version(peer))
-        if not self._stations.is_listener(peer):
-            self.on_frames([frame])
+        self._send(station.peer, self._writer(station.peer), message)
 
     def allows(self, station: Station, cost: Cost) -> bool:
         """Count work that a ground station causes; False if that exceeds its limit."""
@@ -234,18 +215,18 @@ class Ground:
 
     def to_as(self, sysid: int, compid: int, station: Station, message: Message) -> None:
         """Send a message to one ground station under the ids that it addressed."""
-        peer = station.peer
-        frame = FrameWriter(sysid, compid, self._signers.get(peer.link)).frame(pack(message), self._version(peer))
-        self._datagrams.append((peer, frame))
-        if not self._stations.is_listener(peer):
-            self.on_frames([frame])
+        self._send(station.peer, FrameWriter(sysid, compid, self._signers.get(station.peer.link)), message)
 
     def greet(self, peer: Peer, heartbeat: Message) -> None:
         """Send the heartbeat to a newcomer at once: Mission Planner waits for two before it continues."""
-        frame = self._write(peer, heartbeat, self._version(peer))
-        if not self._stations.is_listener(peer):
-            self.on_frames([frame])
+        self._send(peer, self._writer(peer), heartbeat)
         self._introduce(peer, heartbeat)
+
+    def _send(self, peer: Peer, writer: FrameWriter, message: Message) -> None:
+        frame = writer.frame(pack(message), self._version(peer))
+        self._datagrams.append((peer, frame))
+        if not self.stations.is_listener(peer):
+            self.on_frames([frame])
 
     def broadcast(self, message: Message) -> None:
         """Send a message to everyone."""
@@ -278,9 +259,9 @@ class Ground:
     def _introduce(self, peer: Peer, heartbeat: Message) -> None:
         if peer.link in self._signers or peer is RECORDER:
             return
-        other = 1 if self._stations.is_unknown(peer) else 2
-        if self._stations.version(peer) != other:
-            self._write(peer, heartbeat, other)
+        other = 1 if self.stations.is_unknown(peer) else 2
+        if self.stations.version(peer) != other:
+            self._datagrams.append((peer, self._writer(peer).frame(pack(heartbeat), other)))
 
     def say(self, severity: Severity, text: str, to: Station | None = None) -> None:
         """Show a text on one ground station or on all."""
@@ -317,11 +298,6 @@ class Ground:
             for frame in frames:
                 self._datagrams.append((peer, frame))
 
-    def _write(self, peer: Peer, message: Message, version: int) -> bytes:
-        frame = self._writer(peer).frame(pack(message), version)
-        self._datagrams.append((peer, frame))
-        return frame
-
     def _writer(self, peer: Peer) -> FrameWriter:
         writer = self._writers.get(peer)
         if writer is None:
@@ -332,7 +308,7 @@ class Ground:
         return writer
 
     def _version(self, peer: Peer) -> int:
-        return 2 if peer.link in self._signers else self._stations.version(peer)
+        return 2 if peer.link in self._signers else self.stations.version(peer)
 
 
 def split_text(text: str) -> list[str]:

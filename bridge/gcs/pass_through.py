@@ -96,7 +96,7 @@ class PassThrough:
             behind = self._heard.get(peer, ())
             return any(sysid == system and component in (0, compid) for sysid, compid in behind)
 
-        return [peer for peer in self._ground.peers() if is_there(peer)]
+        return [peer for peer in self._ground.stations.peers() if is_there(peer)]
 
     def _is_for_all(self, kind: bytes, frame: MavlinkFrame) -> bool:
         """Meet a new kind of message from a component aboard; True if it has no target field."""

@@ -84,7 +84,7 @@ class MissionUploads:
         self._ground = context.ground
         self._flash = context.ground.flash
         self._uploads: list[_Upload] = []  # in the order of their MISSION_COUNT
-        self._answers = RecentAnswers(context.ground.has_moved)
+        self._answers = RecentAnswers(context.ground.stations.has_moved)
         self._reminders: list[tuple[float, Station, str]] = []
         self._is_asking = False
         self._may_ask_at = 0.0
@@ -448,7 +448,7 @@ class MissionUploads:
         if self._of(station) is not None or self._answers.was_said_to(station, now):
             return
         for upload in self._uploads:
-            if self._ground.has_moved(upload.station, station, now):
+            if self._ground.stations.has_moved(upload.station, station, now):
                 self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
                 upload.station = station
 
@@ -470,7 +470,7 @@ class MissionUploads:
         announced = {other.station for other in self._uploads if other is not upload}
         return [
             where
-            for where in self._ground.moved_to(upload.station, now)
+            for where in self._ground.stations.moved_to(upload.station, now)
             if where not in announced and not self._answers.was_said_to(where, now)
         ]
 

@@ -30,7 +30,7 @@ class Answer:
 
 
 class RecentAnswers:
-    """Remembers answers for 10 s. `has_moved`: True if the second is the first's new address (Ground.has_moved)."""
+    """Remembers answers for 10 s. `has_moved`: True if the second is the first's new address (Stations.has_moved)."""
 
     def __init__(self, has_moved: Callable[[Station, Station, float], bool]) -> None:
         self._has_moved = has_moved

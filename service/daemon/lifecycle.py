@@ -100,7 +100,7 @@ def link_line(daemon: Daemon) -> str:
         speed = "" if state.speed is None else f", {state.speed} baud"
         armed = {None: "", True: ", armed", False: ", disarmed"}[bridge.session.vehicle.armed]
         where = f"{state.controller.name} ({state.name}{speed}{armed})"
-    count = len(list(bridge.ground.peers()))
+    count = len(list(bridge.ground.stations.peers()))
     return f"{where}; {count} ground station{'' if count == 1 else 's'}"
 
 

@@ -132,7 +132,7 @@ class _State(Collector):
             yield sizes
             yield pieces
         bridge = self._daemon.bridge
-        yield _gauge("ground_stations", "Ground stations currently heard.", {}, len(bridge.ground.peers()))
+        yield _gauge("ground_stations", "Ground stations currently heard.", {}, len(bridge.ground.stations.peers()))
         frames = _counters(
             "ground_received_frames", "Frames of ground stations, by MAVLink message id.", "link", "msgid"
         )

@@ -68,6 +68,20 @@ def test_a_newcomer_gets_as_much_as_each_greedy_host() -> None:
     assert used >= LIMITS[Cost.TRANSFER].total.burst / 11 / 2
 
 
+def test_a_flood_of_counts_is_not_logged() -> None:
+    world = World(speeds=(115200,))
+    world.wait_ready()
+    station = GroundStation(world)
+    world.faults.armed = True
+    world.wait_until(lambda world: bool(world.bridge.session.vehicle.armed), 5)
+    for number in range(2000):
+        world.after(number / 500, lambda: station.send(m.MAVLink_mission_count_message(1, 1, 999)))
+    world.run(5)
+    limit = LIMITS[Cost.UPLOAD].each
+    assert limit.burst / 2 < len(world.events("mission.refused")) <= limit.burst + limit.per_s * 5
+    assert {ack.type for ack in station.said("MISSION_ACK")} == {m.MAV_MISSION_DENIED}
+
+
 def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:
     """MISSION_CLEAR_ALL while armed once made it send eight times as much as telemetry does."""
     world = World(speeds=(115200,))

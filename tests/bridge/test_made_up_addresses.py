@@ -75,7 +75,7 @@ def test_a_pilot_connected_before_the_flood_notices_nothing() -> None:
     assert longest_gap_s(pilot, began) <= 1.1
     # Few of them are remembered.
     assert len(world.events("gcs.found")) < 3 * MAX_PEERS
-    assert len(world.bridge.ground.peers()) <= MAX_PEERS
+    assert len(world.bridge.ground.stations.peers()) <= MAX_PEERS
     assert len(world.bridge.ground.budgets._peers) < 2000
 
 

@@ -251,7 +251,7 @@ def test_a_crowd_does_not_multiply_frames() -> None:
     hello = stranger.pack(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     for number in range(200):
         world.bridge.gcs_received(Peer("udp", (f"10.0.0.{number}", 14550)), hello, world.now, datagram=True)
-    assert len(ground.peers()) > 100
+    assert len(ground.stations.peers()) > 100
     world.run(1)
     ground.take_datagrams()
     for number in range(400):
@@ -264,7 +264,7 @@ def test_a_crowd_does_not_multiply_frames() -> None:
     assert [peer for peer, _ in copies].count(pilot.peer) == 400
     assert len(copies) < 400 * 20
     world.bridge.fc_received(autopilot.pack(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3)), world.now)
-    assert {peer for peer, _ in ground.take_datagrams()} == set(ground.peers())
+    assert {peer for peer, _ in ground.take_datagrams()} == set(ground.stations.peers())
 
 
 def test_a_sender_with_all_ids_does_not_displace_others() -> None:

@@ -80,7 +80,7 @@ def test_the_new_address_is_served_at_once_and_the_old_one_dropped() -> None:
     old.take()
     world.run(3)
     assert old.heard == []
-    assert world.bridge.ground.peers() == [new.peer]
+    assert world.bridge.ground.stations.peers() == [new.peer]
 
 
 def test_moving_and_back() -> None:
@@ -122,7 +122,7 @@ def test_a_silent_station_with_shared_ids_is_kept_for_a_minute() -> None:
     station.send(heartbeat())
     beat(other, [other])
     world.run(EXPIRY_S - 2)
-    assert station.peer in world.bridge.ground.peers()
+    assert station.peer in world.bridge.ground.stations.peers()
 
 
 def test_behind_a_router_a_station_moves_only_with_all_others() -> None:
@@ -134,11 +134,11 @@ def test_behind_a_router_a_station_moves_only_with_all_others() -> None:
     world.run(1)
     beat(away, [away])
     world.run(MOVED_S + 3)
-    assert router.peer in world.bridge.ground.peers()
+    assert router.peer in world.bridge.ground.stations.peers()
     also_away = GroundStation(world, "away", sysid=250)
     beat(also_away, [also_away])
     world.run(MOVED_S + 3)
-    assert world.bridge.ground.peers() == [away.peer]
+    assert world.bridge.ground.stations.peers() == [away.peer]
 
 
 @pytest.mark.parametrize("seed", range(12))

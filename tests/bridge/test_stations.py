@@ -127,7 +127,7 @@ def test_a_station_silent_for_a_minute_gets_no_more_messages() -> None:
     station.take()
     world.run(5)
     assert station.heard == []
-    assert world.bridge.ground.peers() == []
+    assert world.bridge.ground.stations.peers() == []
     station.send(gcs_heartbeat())
     world.run(2)
     assert station.said("HEARTBEAT")
@@ -186,7 +186,7 @@ def test_hundreds_of_strangers_leave_room_for_a_new_station() -> None:
         world.bridge.gcs_received(Peer("udp", ("10.0.0.1", number)), frame, world.now, datagram=True)
         if number % 50 == 49:
             world.run(6)
-    assert len(world.bridge.ground.peers()) <= MAX_PEERS
+    assert len(world.bridge.ground.stations.peers()) <= MAX_PEERS
     world.run(6)
     assert len(world.bridge.ground._writers) <= MAX_PEERS
     # Once they are silent, there is room for a new one.
@@ -226,7 +226,7 @@ def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_its_end() -> None:
     world.run(0.01)
     assert len(station.said("COMMAND_ACK")) == 2
     world.bridge.gcs_gone(station.peer, world.now)
-    assert world.bridge.ground.peers() == []
+    assert world.bridge.ground.stations.peers() == []
     assert world.bridge.ground._splitters == {}
 
 
@@ -246,10 +246,10 @@ def test_our_own_frames_are_not_taken_for_a_station() -> None:
     station.send(gcs_heartbeat())
     world.run(2)
     echo = list(station.frames_heard)
-    before = len(world.bridge.ground.peers())
+    before = len(world.bridge.ground.stations.peers())
     for frame in echo:
         world.bridge.gcs_received(Peer("udp", "echo"), frame, world.now, datagram=True)
-    assert len(world.bridge.ground.peers()) == before
+    assert len(world.bridge.ground.stations.peers()) == before
 
 
 def test_texts_are_split_without_loss() -> None:
