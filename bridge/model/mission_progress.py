@@ -29,9 +29,6 @@ class FlownMission:
     progress: Progress = Progress.NOT_STARTED
 
 
-NO_MISSION = FlownMission()
-
-
 class MissionProgress:
     """Feed it every NAV_STATUS. Records count from 1; `number` is 0 while no mission is flown."""
 

@@ -224,8 +224,7 @@ class OwnVehicle:
 
     def _moment(self) -> Moment:
         boot_ms = int((self._now - self._started_at) * 1000) & 0xFFFFFFFF
-        unix_s = self._unix_time_s(self._now)
-        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s, self._flown_mission(), unix_s)
+        return Moment(self._session.vehicle, self._now, boot_ms, self._stale_s, self._flown_mission, self._unix_time_s)
 
     def _flown_mission(self) -> FlownMission:
         held = self._missions.held

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeVar
 from bridge.model.airframe import Airframe
 from bridge.model.flight_mode import FlightMode
 from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
-from bridge.model.mission_progress import NO_MISSION, FlownMission
+from bridge.model.mission_progress import FlownMission
 from bridge.model.vehicle import (
     STALE_S,
     Airspeed,
@@ -78,7 +78,7 @@ _CAPABILITIES = (
     | messages.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | messages.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
-_STATE_NO_MISSION = 1
+_NO_MISSION = 1
 _NO_TOTAL = 0xFFFF
 #: For firmware that reports no version: below 1.0 Mission Planner hides the choice of altitude frames.
 _UNKNOWN_VERSION = (1, 0, 0)
@@ -111,15 +111,15 @@ def known(value: T | None) -> T:
 class Moment:
     """The vehicle at one moment. now: monotonic s. stale_s: ages at which readings are unknown, if not STALE_S.
 
-    unix_s: the Pi's clock, None if it is not set.
+    unix_time_s: the Pi's clock at a monotonic time, None if it is not set.
     """
 
     vehicle: Vehicle
     now: float
     boot_ms: int
     stale_s: Mapping[type[Reading], float] = field(default_factory=dict)
-    mission: FlownMission = NO_MISSION
-    unix_s: float | None = None
+    mission: Callable[[], FlownMission] = FlownMission
+    unix_time_s: Callable[[float], float | None] = lambda _now: None
 
     def fresh(self, kind: type[ReadingT]) -> ReadingT | None:
         """The latest reading of a kind, unless it is stale."""
@@ -217,9 +217,9 @@ def autopilot_version(vehicle: Vehicle) -> Message:
 
 def mission_current(at: Moment) -> Message:
     """MISSION_CURRENT."""
-    mission = at.mission
+    mission = at.mission()
     if not mission.items:
-        return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _STATE_NO_MISSION, 0)
+        return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _NO_MISSION, 0)
     return messages.MAVLink_mission_current_message(mission.seq, len(mission.items) - 1, mission.progress.value, 0)
 
 
@@ -427,8 +427,8 @@ def nav_controller_output(at: Moment) -> Message:
     position, now = at.need(GlobalPosition), at.need(Orientation)
     if state is None or not state.armed:
         raise Unknown
-    items, seq = at.mission.items, at.mission.seq
-    item = items[seq] if 0 < seq < len(items) else None
+    mission = at.mission()
+    item = mission.items[mission.seq] if 0 < mission.seq < len(mission.items) else None
     climb_m = 0.0
     if item is not None and item.lat_e7 and item.lon_e7:
         target = Home(item.lat_e7, item.lon_e7)
@@ -446,7 +446,7 @@ def nav_controller_output(at: Moment) -> Message:
 
 def system_time(at: Moment) -> Message:
     """SYSTEM_TIME: the Pi's clock."""
-    return messages.MAVLink_system_time_message(round(known(at.unix_s) * 1e6), at.boot_ms)
+    return messages.MAVLink_system_time_message(round(known(at.unix_time_s(at.now)) * 1e6), at.boot_ms)
 
 
 def extended_sys_state(at: Moment) -> Message:
