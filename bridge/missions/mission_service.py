@@ -103,11 +103,13 @@ class MissionService:
     def __init__(self, vehicle: Vehicle, on_ending: EndingListener) -> None:
         self._vehicle = vehicle
         self._on_ending = on_ending
-        self._fc_store: AnyFcMissionStore | None = None
+        #: The mission store of the current flight controller; None if it has none.
+        self.fc_store: AnyFcMissionStore | None = None
         self._refusal = NO_LINK
         self._owner: object | None = None
         self._closed = False
-        self._is_settled = False
+        #: False until the current flight controller's list was read, and after an interrupted push.
+        self.is_settled = False
         self._told_unloaded = False
         #: Missions to compare with the list when it is next read.
         self._pending: list[PendingMission] = []
@@ -120,25 +122,20 @@ class MissionService:
 
     def use(self, store: AnyFcMissionStore | Refusal) -> None:
         """Switch to another flight controller; a Refusal becomes the reply to every attempt."""
-        self._fc_store, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
+        self.fc_store, self._refusal = (None, store) if isinstance(store, Refusal) else (store, NO_LINK)
         self.former_home = self.home_item()
         self.held = None
-        self._is_settled = self._told_unloaded = False
+        self.is_settled = self._told_unloaded = False
 
     @property
     def others(self) -> tuple[HeldMission, ...]:
         """Further missions in the flight controller's store, as last read."""
-        if self._fc_store is None:
+        if self.fc_store is None:
             return ()
         return tuple(
-            HeldMission(identify(records), records, self._fc_store.items(records, {}))
-            for records in self._fc_store.others
+            HeldMission(identify(records), records, self.fc_store.items(records, {}))
+            for records in self.fc_store.others
         )
-
-    @property
-    def fc_store(self) -> AnyFcMissionStore | None:
-        """The mission store of the current flight controller; None if it has none."""
-        return self._fc_store
 
     def home_item(self) -> MissionItem | None:
         """Item 0 of the last known list."""
@@ -147,13 +144,13 @@ class MissionService:
     @property
     def watch_s(self) -> float:
         """The interval at which `is_outdated` should be asked; infinity without a store."""
-        return inf if self._fc_store is None else self._fc_store.watch_s
+        return inf if self.fc_store is None else self.fc_store.watch_s
 
     def seq_of(self, number: int) -> int:
         """The seq of the item for the flight controller's record `number`; 0: none is known."""
-        if self._fc_store is None or self.held is None:
+        if self.fc_store is None or self.held is None:
             return 0
-        return self._fc_store.seq_of(self.held.records, number)
+        return self.fc_store.seq_of(self.held.records, number)
 
     def occupied(self) -> Refusal | None:
         """The reason that no list can be written now, if there is one."""
@@ -170,7 +167,7 @@ class MissionService:
 
     def armed_refusal(self) -> Refusal | None:
         """The refusal if the craft is known to be armed; saves a request to a busy board."""
-        return ARMED if self._fc_store is not None and self._vehicle.armed else None
+        return ARMED if self.fc_store is not None and self._vehicle.armed else None
 
     def close(self) -> None:
         """Accept no more transfers: the bridge is stopping."""
@@ -187,10 +184,10 @@ class MissionService:
             return armed
         waited_s = 0.0
         while True:
-            if self._fc_store is None:
+            if self.fc_store is None:
                 return self._refusal
-            yield from self._fc_store.reload()
-            report = yield from self._fc_store.report()
+            yield from self.fc_store.reload()
+            report = yield from self.fc_store.report()
             if report is None:
                 return NO_LINK
             if report.state is StoreState.READY:
@@ -204,9 +201,9 @@ class MissionService:
 
     def rules(self) -> Conversation[MissionRules | Refusal]:
         """The rules of the current flight controller, armed or not."""
-        if self._fc_store is None:
+        if self.fc_store is None:
             return self._refusal
-        report = yield from self._fc_store.report()
+        report = yield from self.fc_store.report()
         return NO_LINK if report is None else report.rules
 
     def deliver(
@@ -230,7 +227,7 @@ class MissionService:
             cancelled = verdict.ack is MissionResult.OPERATION_CANCELLED
             outcome = Outcome.CANCELLED if cancelled else Outcome.REJECTED
             return (yield from self._conclude(number, outcome, verdict.ack, reason))
-        fc_store = self._fc_store
+        fc_store = self.fc_store
         if fc_store is None:
             return (yield from self._conclude(number, Outcome.FAILED, self._refusal.ack, self._refusal.text))
         if not (yield from self._copy_erased(fc_store, verdict.records)):
@@ -239,37 +236,28 @@ class MissionService:
         result = yield from self._push(fc_store, arrived, progress)
         if result.failure is PushFailure.UNCERTAIN:
             self._pending.append(PendingMission(number, identify(verdict.records), before))
-            self._is_settled, self.held = False, None
+            self.is_settled, self.held = False, None
             return DeliveryResult(MissionResult.DENIED, result.failure.value, number)
         if result.failure is not None:
             if result.failure in LIST_IS_GONE:
-                self.held = None
-                self._is_settled = False
-            return (
-                yield from self._conclude(
-                    number,
-                    Outcome.FAILED,
-                    _ACKS.get(result.failure, MissionResult.DENIED),
-                    result.failure.value,
-                )
-            )
+                self.is_settled, self.held = False, None
+            ack = _ACKS.get(result.failure, MissionResult.DENIED)
+            return (yield from self._conclude(number, Outcome.FAILED, ack, result.failure.value))
         self.held = HeldMission(identify(verdict.records), verdict.records, verdict.items)
+        is_erased = verdict.result is Result.CLEARED
         lossy = summary(len(arrived.items), verdict)
         if lossy is not None:
             text = lossy
-        elif verdict.result is not Result.CLEARED:
+        elif not is_erased:
             text = f"Mission verified: {len(verdict.records)} records" + (", unchanged" if result.unchanged else "")
         elif result.unchanged:
             text = "The flight controller already held no mission"
         else:
             text = "Mission on the flight controller cleared"
-        is_erased = verdict.result is Result.CLEARED
-        change = (
-            "" if result.unchanged else "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
-        )
         delivery = yield from self._conclude(number, Outcome.VERIFIED, MissionResult.ACCEPTED, text)
         if result.unchanged:
             return replace(delivery, is_lossy=lossy is not None)
+        change = "Mission erased" if is_erased else f"New mission, {len(verdict.items)} items"
         return replace(delivery, is_lossy=lossy is not None or is_erased, change=change)
 
     def _push(
@@ -289,7 +277,7 @@ class MissionService:
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
         """The flight controller's list; a cached copy is used only if the checksum is the same."""
-        fc_store = self._fc_store
+        fc_store = self.fc_store
         if fc_store is None:
             return self._refusal
         report = yield from fc_store.report()
@@ -307,38 +295,33 @@ class MissionService:
             return self._refreshed(fc_store, self.held)
         sent_as = yield from recall(identity)
         held = HeldMission(identity, records, fc_store.items(records, sent_as or {}))
-        if fc_store is self._fc_store:
+        if fc_store is self.fc_store:
             # By the time the store answers, another flight controller may be connected.
             self.held = held
         return held
-
-    @property
-    def is_settled(self) -> bool:
-        """False until the current flight controller's list was read, and after an interrupted push."""
-        return self._is_settled
 
     def is_outdated(self) -> Conversation[bool]:
         """True if the list must be read, because it is unknown or was changed on the board."""
         if not self._has_asked_store:
             self._has_asked_store = True
             self._pending += yield from find_pending()
-        if self._fc_store is None:
+        if self.fc_store is None:
             return False
-        return not self._is_settled or bool(self._pending) or not (yield from self._fc_store.is_current())
+        return not self.is_settled or bool(self._pending) or not (yield from self.fc_store.is_current())
 
     def catch_up(self) -> Conversation[MissionChange | None]:
         """Read the list; returns the text for the pilot if it is another one.
 
         After connecting or an interrupted push, the flight controller loads its saved mission if it holds none.
         """
-        fc_store, is_first, before = self._fc_store, not self._is_settled, self.held
+        fc_store, is_first, before = self.fc_store, not self.is_settled, self.held
         if fc_store is None:
             return None
         is_reloaded = (yield from fc_store.reload()) if is_first else False
         held = yield from self.read_back()
         if held is NO_LINK:
             return None
-        self._is_settled = is_reloaded is not None
+        self.is_settled = is_reloaded is not None
         if isinstance(held, HeldMission) and (news := (yield from self._settle(held))) is not None:
             return news
         if is_reloaded is None:

@@ -6,9 +6,9 @@ import math
 from bridge.gcs.flash_budget import TOO_MANY_WRITES
 from bridge.gcs.station import Severity, Station
 from bridge.line.conversation import LinkLost
-from bridge.missions.fc_mission_store import PushFailure
+from bridge.missions.fc_mission_store import AnyFcMissionStore, PushFailure
 from bridge.vehicle.mission_context import MissionContext
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import messages
 from protocols.msp.mission import MAX_RADIUS_CM
 
 _REAL32 = 9
@@ -42,40 +42,39 @@ class Parameters:
     def set(self, station: Station, name: str, value: float, now: float) -> None:
         """PARAM_SET: answered with the value then in force, as the protocol requires."""
         fc_store = self._missions.fc_store
-        if name != WP_RADIUS or fc_store is None or fc_store.wp_radius_cm is None:
-            if name == WP_RADIUS:
-                self._ground.say(Severity.ERROR, f"{WP_RADIUS} cannot be set on this flight controller now", station)
-            self._send(station, name)
-            return
-        if not (math.isfinite(value) and 0 <= value <= MAX_RADIUS_CM):
-            self._ground.say(Severity.ERROR, f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm", station)
-            self._send(station, name)
-            return
+        radius_cm = None if fc_store is None else fc_store.wp_radius_cm
         # Mission Planner keeps metres as text: 2.10 m comes as 209.99998 cm.
-        wanted_cm = round(value)
-        if wanted_cm == fc_store.wp_radius_cm:
+        wanted_cm = round(value) if math.isfinite(value) else -1
+        if name != WP_RADIUS or wanted_cm == radius_cm:
             # An equal value is not written: that would erase and rewrite the board's whole configuration.
             self._send(station, name)
             return
-        if self._is_setting:
+        if fc_store is None or radius_cm is None:
+            refusal = f"{WP_RADIUS} cannot be set on this flight controller now"
+        elif not 0 <= wanted_cm <= MAX_RADIUS_CM:
+            refusal = f"{WP_RADIUS} must be 0..{MAX_RADIUS_CM} cm"
+        elif self._is_setting:
             # A change is pending; a station that requested another value repeats its request.
             return
-        if self._missions.armed_refusal() is not None:
-            self._ground.say(Severity.ERROR, _stays(fc_store.wp_radius_cm, PushFailure.ARMED), station)
-            self._send(station, name)
+        elif self._missions.armed_refusal() is not None:
+            refusal = f"{WP_RADIUS} stays {radius_cm}: {PushFailure.ARMED.value}"
+        elif not self._ground.flash.allows(station.peer, now):
+            refusal = TOO_MANY_WRITES
+        else:
+            self._write(fc_store, wanted_cm, station, now)
             return
-        if not self._ground.flash.allows(station.peer, now):
-            self._ground.say(Severity.ERROR, TOO_MANY_WRITES, station)
-            self._send(station, name)
-            return
+        self._ground.say(Severity.ERROR, refusal, station)
+        self._send(station, name)
 
+    def _write(self, fc_store: AnyFcMissionStore, wanted_cm: int, station: Station, now: float) -> None:
         def done(failure: PushFailure | LinkLost | None, _at: float) -> None:
             self._is_setting = False
             if failure is PushFailure.NO_ANSWER or isinstance(failure, LinkLost):
                 self._ground.say(Severity.ERROR, f"{WP_RADIUS} was not set: no answer", station)
             elif failure is not None:
-                self._ground.say(Severity.ERROR, _stays(fc_store.wp_radius_cm, failure), station)
-            self._send(station, name)
+                text = f"{WP_RADIUS} stays {fc_store.wp_radius_cm}: {failure.value}"
+                self._ground.say(Severity.ERROR, text, station)
+            self._send(station, WP_RADIUS)
 
         self._is_setting = True
         self._runner.start(fc_store.set_wp_radius(wanted_cm), done, now)
@@ -90,14 +89,6 @@ class Parameters:
     def _send(self, station: Station, name: str) -> None:
         values = self._values()
         if name in values:
-            self._ground.to(station, self._message(values, name))
-
-    @staticmethod
-    def _message(values: dict[str, float], name: str) -> Message:
-        return messages.MAVLink_param_value_message(
-            name.encode(), values[name], _REAL32, len(values), list(values).index(name)
-        )
-
-
-def _stays(radius_cm: int | None, failure: PushFailure) -> str:
-    return f"{WP_RADIUS} stays {radius_cm}: {failure.value}"
+            index = list(values).index(name)
+            message = messages.MAVLink_param_value_message(name.encode(), values[name], _REAL32, len(values), index)
+            self._ground.to(station, message)
