@@ -2,6 +2,7 @@
 """Events and reports survive outages; late subscribers and recorders get them; storages answer for absent vehicles."""
 
 import signal
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from tests.support.plan import plain_plan
 from tests.support.programs import until
 from tests.support.zenoh_bench import I_KNOW, Reader, ask, ask_surely, body, endpoint, key, session, zenoh_bench
 from tests.support.zenoh_router import running_router
+
+DAY = timedelta(days=1)
 
 
 def recovering(opened: zenoh.Session, suffix: str, heard: list[Any]) -> ext.AdvancedSubscriber[None]:
@@ -70,10 +73,15 @@ def test_past_events_can_be_queried(start: Starter) -> None:
     bench = zenoh_bench(start, f'listen = ["{where}"]')
     bench.daemon.push(plain_plan(7))
     with session(connect=where) as opened:
-        past = ask_surely(opened, "history?_time=[now(-10m)..]")
+        began = datetime.now(UTC) - timedelta(minutes=10)
+        past = ask_surely(opened, f"history?_time=[{began:%Y-%m-%dT%H:%M:%SZ}..{began + DAY:%Y-%m-%dT%H:%M:%SZ}]")
         assert [each["record_count"] for each in past["missions"]] == [7]
         assert [each["seq"] for each in past["events"]] == list(range(len(past["events"])))
         assert {"fc.found", "mission.push_ended"} <= {each["event"] for each in past["events"]}
+        assert (
+            ask_surely(opened, f"history?_time=[{began - DAY:%Y-%m-%dT%H:%MZ}..{began:%Y-%m-%dT%H:%MZ}]")["events"]
+            == []
+        )
         assert (before := ask_surely(opened, "history?_time=[..now(-10m)]"))["events"] == before["missions"] == []
         assert "not a time range" in ask_surely(opened, "history?_time=lately")["error"]
         assert "positions" in ask_surely(opened, "history?positions=0")["error"]

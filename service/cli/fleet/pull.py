@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import zenoh
 
 from protocols.mission_item import MissionItem
-from service.cli.fleet.payload import decode, part, text, whole
-from service.cli.fleet.session import ask
-from service.cli.fleet.vehicle import BridgeState, replier
-from service.daemon.mission_data import mission_items
+from service.cli.fleet.payload import part, text, whole
+from service.cli.fleet.roll_call import replies_of
+from service.cli.fleet.vehicle import BridgeState
+from service.daemon.mission_data import Json, mission_items
 from service.zenoh_link.keys import MISSION_CURRENT, full
 
 #: The bridge may have to read the mission first: some seconds at 9600 baud.
@@ -31,17 +31,12 @@ class Held:
 
 def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeState]) -> list[Held]:
     """Read the missions; one result per vehicle, sorted by name. Replies of storages are ignored."""
-    used = Counter(bridge.vehicle for bridge in bridges)
-    held: dict[str, Held] = {}
+    meant = [bridge for bridge in bridges if bridge.vehicle in names]
+    used = Counter(bridge.vehicle for bridge in meant)
     # One query to all takes no longer than one to the slowest.
     only = next(iter(names)) if len(names) == 1 else "*"
-    for reply in ask(session, full(prefix, only, MISSION_CURRENT.suffix), timeout_s=_TIMEOUT_S):
-        bridge = replier(reply)
-        if reply.ok is None or bridge is None or bridge not in bridges or bridge.vehicle not in names:
-            continue
-        held[bridge.vehicle] = _held(bridge.vehicle, reply.ok)
-        if len(held) == len(names):
-            break
+    replies = replies_of(session, full(prefix, only, MISSION_CURRENT.suffix), meant, _TIMEOUT_S)
+    held = {bridge.vehicle: _held(bridge.vehicle, data) for bridge, data in replies.items()}
     for name in names:
         if used[name] > 1:
             held[name] = Held(name, error="several bridges use this name: give each its own (zenoh.vehicle)")
@@ -49,8 +44,7 @@ def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: C
     return [held.get(name) or Held(name, error=silent) for name in names]
 
 
-def _held(name: str, sample: zenoh.Sample) -> Held:
-    data = decode(sample)
+def _held(name: str, data: Json | None) -> Held:
     if data is None:
         return Held(name, error="this version does not understand its reply")
     count, checksum, items = whole(data, "count"), text(data, "checksum"), part(data, "items")

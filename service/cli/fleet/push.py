@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import zenoh
 
 from service.cli.fleet.payload import decode, part, text, whole
-from service.cli.fleet.session import NO_COMMANDS, ask, ask_each
-from service.cli.fleet.vehicle import BridgeState, replier
+from service.cli.fleet.roll_call import replies_of
+from service.cli.fleet.session import NO_COMMANDS, ask_each
+from service.cli.fleet.vehicle import BridgeState
 from service.daemon.mission_data import Json
 from service.zenoh_link.keys import STATE, UPLOAD, full
 
@@ -124,8 +125,9 @@ def push(
             if reply is None:
                 if not fleet.vehicles[name].is_done:
                     # Neither its token nor a storage's reply proves that it is alive.
-                    state = ask(session, full(prefix, name, STATE.suffix), timeout_s=_STATE_TIMEOUT_S)
-                    fleet.ended(name, is_alive=any(replier(each) in bridges for each in state))
+                    own = [bridge for bridge in bridges if bridge.vehicle == name]
+                    state = replies_of(session, full(prefix, name, STATE.suffix), own, _STATE_TIMEOUT_S)
+                    fleet.ended(name, is_alive=bool(state))
             elif reply.ok is not None:
                 fleet.replied(name, decode(reply.ok))
             elif reply.err is not None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The vehicles that are alive, and their states: one query to the whole fleet."""
 
+from collections.abc import Collection
+
 import zenoh
 
 from service.cli.fleet.payload import decode
@@ -28,16 +30,24 @@ def alive(session: zenoh.Session, prefix: str) -> set[BridgeState]:
 def roll_call(session: zenoh.Session, prefix: str) -> list[FleetVehicle]:
     """The fleet by name. Takes as long as the slowest bridge, two seconds at most."""
     bridges = alive(session, prefix)
-    states: dict[BridgeState, Json] = {}
-    # Without bridges there is no reply to wait for.
-    if bridges:
-        for reply in ask(session, full(prefix, "*", STATE.suffix), timeout_s=_TIMEOUT_S):
-            bridge = replier(reply)
-            if reply.ok is not None and bridge in bridges and (state := decode(reply.ok)) is not None:
-                states[bridge] = state
-                if len(states) == len(bridges):
-                    break
+    states = replies_of(session, full(prefix, "*", STATE.suffix), bridges, _TIMEOUT_S)
     return as_fleet(vehicle_of(bridge, states.get(bridge)) for bridge in bridges)
+
+
+def replies_of(
+    session: zenoh.Session, selector: str, bridges: Collection[BridgeState], timeout_s: float
+) -> dict[BridgeState, Json | None]:
+    """What these bridges reply, None for a payload that cannot be read. Ends when all have. A storage is ignored."""
+    found: dict[BridgeState, Json | None] = {}
+    # Without bridges there is no reply to wait for.
+    replies = ask(session, selector, timeout_s=timeout_s) if bridges else ()
+    for reply in replies:
+        bridge = replier(reply)
+        if reply.ok is not None and bridge is not None and bridge in bridges:
+            found[bridge] = decode(reply.ok)
+            if len(found) == len(bridges):
+                break
+    return found
 
 
 def chosen(bridges: set[BridgeState], names: tuple[str, ...], prefix: str) -> list[str]:
