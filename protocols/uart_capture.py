@@ -23,7 +23,7 @@ _VERSION = 1
 _PAUSE_S = 1.0
 
 
-class UartDeed(Enum):
+class UartAction(Enum):
     """An event at the port."""
 
     OPEN = "open"
@@ -32,7 +32,7 @@ class UartDeed(Enum):
     CLOSE = "close"
 
 
-_DEEDS = {deed.value.encode(): deed for deed in UartDeed}
+_ACTIONS = {action.value.encode(): action for action in UartAction}
 #: A complete line as written here: there may be millions, and matching costs a tenth of parsing JSON. A time above ten
 #: years is damage.
 _LINE = re.compile(
@@ -41,7 +41,7 @@ _LINE = re.compile(
     rb'(?:"(?P<bytes>read|write)":"(?P<hex>(?:[0-9a-f]{2})*)"|"(?P<other>open|close)":(?P<text>".*"))\})$',
     re.MULTILINE,
 )
-_WITH_DATA = frozenset({UartDeed.READ, UartDeed.WRITE})
+_WITH_DATA = frozenset({UartAction.READ, UartAction.WRITE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class UartEvent:
 
     at: float
     speed: int | None
-    deed: UartDeed
+    action: UartAction
     data: bytes = b""
     text: str = ""
 
@@ -64,8 +64,8 @@ def capture_line(event: UartEvent) -> bytes:
     """Return an event's line."""
     speed = "null" if event.speed is None else event.speed
     # Hex needs no escapes, and there are many such lines.
-    content = f'"{event.data.hex()}"' if event.deed in _WITH_DATA else json.dumps(event.text)
-    return f'{{"t":{event.at:.6f},"baud":{speed},"{event.deed.value}":{content}}}\n'.encode()
+    content = f'"{event.data.hex()}"' if event.action in _WITH_DATA else json.dumps(event.text)
+    return f'{{"t":{event.at:.6f},"baud":{speed},"{event.action.value}":{content}}}\n'.encode()
 
 
 def is_capture(beginning: bytes) -> bool:
@@ -101,15 +101,15 @@ def read_capture(data: bytes) -> list[UartEvent]:
 
 def _end(events: list[UartEvent]) -> None:
     last = events[-1]
-    if last.deed is not UartDeed.CLOSE:
-        events.append(UartEvent(last.at, last.speed, UartDeed.CLOSE, text="the recording ended"))
+    if last.action is not UartAction.CLOSE:
+        events.append(UartEvent(last.at, last.speed, UartAction.CLOSE, text="the recording ended"))
 
 
 def _event(line: re.Match[bytes], at: float) -> UartEvent | None:
     speed = None if line["baud"] == b"null" else int(line["baud"])
     if line["hex"] is not None:
-        return UartEvent(at, speed, _DEEDS[line["bytes"]], bytes.fromhex(line["hex"].decode()))
+        return UartEvent(at, speed, _ACTIONS[line["bytes"]], bytes.fromhex(line["hex"].decode()))
     try:
-        return UartEvent(at, speed, _DEEDS[line["other"]], text=json.loads(line["text"]))
+        return UartEvent(at, speed, _ACTIONS[line["other"]], text=json.loads(line["text"]))
     except ValueError:
         return None

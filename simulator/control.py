@@ -54,7 +54,7 @@ class Control:
             self._server.close()
             self._path.unlink(missing_ok=True)
 
-    def obey(self, line: str) -> str:
+    def execute(self, line: str) -> str:
         """Execute a line; returns the answer."""
         now = self._loop.time()
         match line.split():
@@ -99,5 +99,5 @@ class Control:
 
     async def _converse(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         while line := await reader.readline():
-            writer.write(f"{self.obey(line.decode(errors='replace'))}\n".encode())
+            writer.write(f"{self.execute(line.decode(errors='replace'))}\n".encode())
         writer.close()

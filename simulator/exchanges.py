@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from protocols.uart_capture import UartDeed, UartEvent
+from protocols.uart_capture import UartAction, UartEvent
 
 #: The reply deadline: even a flight controller that is writing its flash is faster.
 _LONGEST_WAIT_S = 5.0
@@ -51,11 +51,11 @@ def take_apart(events: Sequence[UartEvent]) -> Conversation:
     answered_by, frame, pieces = next(answers, _NO_MORE)
     requests = MspParser()
     for number, event in enumerate(events):
-        if event.deed in (UartDeed.OPEN, UartDeed.CLOSE):
+        if event.action in (UartAction.OPEN, UartAction.CLOSE):
             requests = MspParser()
             unknown |= _cut_short(waiting, event.at)
             waiting = []
-        elif event.deed is UartDeed.WRITE:
+        elif event.action is UartAction.WRITE:
             asked = []
             for found in requests.feed(event.data):
                 if found.direction is Direction.REQUEST:
@@ -111,11 +111,11 @@ def _stretches(events: Sequence[UartEvent]) -> Iterator["_Stretch"]:
     reads: list[tuple[int, UartEvent]] = []
     offset = 0
     for number, event in enumerate(events):
-        if reads and (event.speed != reads[-1][1].speed or event.deed in (UartDeed.OPEN, UartDeed.CLOSE)):
+        if reads and (event.speed != reads[-1][1].speed or event.action in (UartAction.OPEN, UartAction.CLOSE)):
             yield _Stretch(reads, offset)
             offset += sum(len(read.data) for _, read in reads)
             reads = []
-        if event.deed is UartDeed.READ and event.data:
+        if event.action is UartAction.READ and event.data:
             reads.append((number, event))
     if reads:
         yield _Stretch(reads, offset)

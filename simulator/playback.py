@@ -18,7 +18,7 @@ from itertools import pairwise
 from math import inf
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from protocols.uart_capture import UartDeed, UartEvent
+from protocols.uart_capture import UartAction, UartEvent
 from simulator.exchanges import Exchange, take_apart
 
 #: A speed for lines without one.
@@ -163,7 +163,7 @@ def _outages(events: Sequence[UartEvent]) -> list[tuple[float, float]]:
     found: list[tuple[float, float]] = []
     closed_at: float | None = None
     for event in events:
-        if event.deed is UartDeed.CLOSE:
+        if event.action is UartAction.CLOSE:
             closed_at = event.at
         elif closed_at is not None:
             found.append((closed_at, event.at))

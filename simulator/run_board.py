@@ -44,15 +44,15 @@ async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive
         assert running.link is not None
         plug = PtyLink(board, running.link, loop)
         place = f"{running.link}, {board.baud} baud"
-    obedience = Control(board, plug, loop)
+    control = Control(board, plug, loop)
     if running.hang_after is not None:
-        loop.call_later(running.hang_after, obedience.obey, "hang 1")
+        loop.call_later(running.hang_after, control.execute, "hang 1")
     if running.power_cut_after is not None:
-        loop.call_later(running.power_cut_after, obedience.obey, "power off")
+        loop.call_later(running.power_cut_after, control.execute, "power off")
     try:
         plug.plug()
         if running.control:
-            await obedience.listen(running.control)
+            await control.listen(running.control)
         click.echo(f"Simulated {name} at {place}. Ctrl-C ends it.")
         await stop.wait()
     except PlugError as error:
@@ -61,4 +61,4 @@ async def run_board(board: SimulatedBoard, name: str, running: Running, is_alive
         raise click.ClickException(f"{running.control} cannot be created: {error.strerror}") from error
     finally:
         plug.unplug()
-        obedience.close()
+        control.close()

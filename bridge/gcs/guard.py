@@ -186,7 +186,7 @@ class Guard:
         if frame.msgid == m.MAVLINK_MSG_ID_SETUP_SIGNING:
             return self._refuse(peer, frame, _SETUP)
         if check is not Check.VALID and was_signing:
-            # The network's second copy of a frame, or another sender in this peer's name.
+            # A duplicate made by the network, or another sender posing as this peer.
             return self._refuse(peer, frame, str(check.value), is_forged=True)
         if only_reads(frame):
             return None

@@ -267,7 +267,7 @@ class MspLink:
         return replies
 
     def _settle(self, reply: MspFrame, now: float) -> None:
-        """Match a reply with its request. Earlier requests will not be answered any more."""
+        """Match a reply with its request. Earlier requests will no longer be answered."""
         command = reply.command
         earlier = next((number for number, sent in enumerate(self._sent) if sent.command == command), None)
         if earlier is None:

@@ -83,7 +83,7 @@ class OwnVehicle:
         self._announced: tuple[bool | None, FlightMode | str | None, bool] | None = None
 
     def newcomer(self, peer: Peer) -> None:
-        """Send a new ground station faster heartbeats, so that it connects sooner, and soon home."""
+        """Send a new ground station faster heartbeats, so that it connects sooner, and HOME_POSITION soon."""
         self._is_news_wanted = True
         self._newcomers[peer] = self._now + _NEWCOMER_S
         self._newcomers_due = min(self._newcomers_due, self._now + _NEWCOMER_INTERVAL_S)

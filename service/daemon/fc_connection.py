@@ -7,7 +7,7 @@ from collections.abc import Callable
 import structlog
 
 from bridge.bridge import Bridge
-from protocols.uart_capture import UartDeed
+from protocols.uart_capture import UartAction
 from service.links.fc_device import device_opener
 from service.links.fc_port import MOVED_ON, STOPPED, FcPort
 from service.links.port_finder import PortFinder
@@ -99,7 +99,7 @@ class FcConnection:
         if output := bridge.take_fc_output():
             data = b"".join(output)
             if self.capture is not None:
-                self.capture.note(UartDeed.WRITE, self._speed, data)
+                self.capture.note(UartAction.WRITE, self._speed, data)
             self._port.write(data)
             self._traffic.sent(data)
 
@@ -114,14 +114,14 @@ class FcConnection:
 
     def _opened(self) -> None:
         if self.capture is not None:
-            self.capture.note(UartDeed.OPEN, self._speed)
+            self.capture.note(UartAction.OPEN, self._speed)
         self._bridge.session.opened(self._loop.time())
         self._flush()
         self._report_search()
 
     def _received(self, data: bytes) -> None:
         if self.capture is not None:
-            self.capture.note(UartDeed.READ, self._speed, data)
+            self.capture.note(UartAction.READ, self._speed, data)
         self._traffic.received(data)
         bridge = self._bridge
         if self._finder is not None:
@@ -134,7 +134,7 @@ class FcConnection:
 
     def _closed(self, why: str) -> None:
         if self.capture is not None:
-            self.capture.note(UartDeed.CLOSE, self._speed, text=why)
+            self.capture.note(UartAction.CLOSE, self._speed, text=why)
         self._bridge.session.closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
         self._flush()
 

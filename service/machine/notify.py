@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Messages to systemd, and its watchdog interval: sd_notify(3).
 
-Own code, because the protocol is one datagram: the packages for it that have a wheel lack STOPPING and RELOADING, and
+The protocol is one datagram; the packages for it that have a wheel lack STOPPING and RELOADING, and
 may block on a slow systemd, which the links' loop must not.
 """
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import structlog
 
-from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, is_capture
+from protocols.uart_capture import UartAction, UartEvent, capture_header, capture_line, is_capture
 from service.recording.disk_writer import DiskWriter
 from service.settings import SettingsError
 
@@ -31,10 +31,10 @@ class UartRecorder:
         started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
         self._put(capture_header(started))
 
-    def note(self, deed: UartDeed, speed: int | None, data: bytes = b"", text: str = "") -> None:
+    def note(self, action: UartAction, speed: int | None, data: bytes = b"", text: str = "") -> None:
         """Record an event with the current time."""
         if not self._over_because:
-            self._put(capture_line(UartEvent(time.monotonic() - self._began_at, speed, deed, data, text)))
+            self._put(capture_line(UartEvent(time.monotonic() - self._began_at, speed, action, data, text)))
 
     def describe(self) -> str:
         """The file in use, or the reason why recording stopped, for the status."""

@@ -80,7 +80,7 @@ def read_key(path: Path) -> bytes:
             if not stat.S_ISREG(status.st_mode):
                 raise WriteAccessError(f"key_file {path} is not a file")
             if status.st_mode & stat.S_IRWXO:
-                raise WriteAccessError(f"key_file {path} is readable for other users: run chmod 600 {path}")
+                raise WriteAccessError(f"key_file {path} is readable by other users: run chmod 600 {path}")
             passphrase = file.read(_MAX_PASSPHRASE + 1).decode()
     except OSError as error:
         raise WriteAccessError(f"key_file {path} cannot be read: {error.strerror}") from error

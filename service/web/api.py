@@ -42,10 +42,10 @@ from service.settings.web import WebSettings
 from service.web.access import MAX_FILE, check_token, guarded
 from service.web.comparison import difference, shown, stored_mission
 from service.web.connect_help import connect_help, page_urls, qr_code
-from service.web.kept_answers import KeptAnswers
 from service.web.link_history import LinkHistory
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.mission_files import MissionFiles, MissionWriter
+from service.web.response_cache import ResponseCache
 from service.web.telemetry_logs import TelemetryLogs
 from service.web.token import Token, TokenError
 from storage.store_error import StoreError
@@ -62,7 +62,7 @@ class Api:
         self._api = DaemonApi(daemon)
         self._token = token
         self._metrics = Metrics(daemon)
-        self._kept = KeptAnswers()
+        self._cache = ResponseCache()
         self._held_text: tuple[HeldMission, str] | None = None
         self._writer = MissionWriter()
         self._files = MissionFiles(self._api, self._writer)
@@ -162,7 +162,7 @@ class Api:
             text = await asyncio.to_thread(lambda: to_json(stored_mission(mission)))
             return text, mission["outcome"] != Outcome.PENDING.value
 
-        return _text(await self._kept.get(str(number), make))
+        return _text(await self._cache.get(str(number), make))
 
     async def _difference(self, request: Request) -> Response:
         number, other = _number(request, "number"), _number(request, "other")
@@ -175,7 +175,7 @@ class Api:
 
             return await asyncio.to_thread(compare), True
 
-        return _text(await self._kept.get(f"{number} {other}", make))
+        return _text(await self._cache.get(f"{number} {other}", make))
 
     async def _restore(self, request: Request) -> Response:
         check_token(request, self._token)

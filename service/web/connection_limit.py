@@ -24,7 +24,7 @@ MAX_IN_A_SECOND_FROM_ONE = 50
 _TURN_S = 0.1
 
 
-class Door:
+class ConnectionLimit:
     """Counts connections; each is cut off after `lifetime_s`."""
 
     def __init__(self, lifetime_s: float = LIFETIME_S) -> None:
@@ -66,9 +66,9 @@ class Door:
 class BoundedConnection(H11Protocol):
     """uvicorn's side of a connection, which begins when its turn comes."""
 
-    def __init__(self, door: Door, config: Config, state: ServerState) -> None:
+    def __init__(self, limit: ConnectionLimit, config: Config, state: ServerState) -> None:
         super().__init__(config, state, {})
-        self._door = door
+        self._limit = limit
         self._address = ""
         self._admitted: asyncio.Transport | None = None
         self._end: asyncio.TimerHandle | None = None
@@ -78,18 +78,18 @@ class BoundedConnection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Wait for its turn; abort it if there is no room."""
         peer = transport.get_extra_info("peername")
-        if peer is None or not self._door.admit(peer[0]):
+        if peer is None or not self._limit.admit(peer[0]):
             transport.abort()
             return
         self._address = peer[0]
         self._admitted = transport
-        self._door.transports.add(transport)
-        self._end = self.loop.call_later(self._door.lifetime_s, transport.abort)
+        self._limit.transports.add(transport)
+        self._end = self.loop.call_later(self._limit.lifetime_s, transport.abort)
         transport.pause_reading()
         self._await_turn(transport)
 
     def _await_turn(self, transport: asyncio.Transport) -> None:
-        if not self._door.take_turn(self._address, self.loop.time()):
+        if not self._limit.take_turn(self._address, self.loop.time()):
             self._turn = self.loop.call_later(_TURN_S, self._await_turn, transport)
             return
         self._is_served = True
@@ -102,7 +102,7 @@ class BoundedConnection(H11Protocol):
             if timer is not None:
                 timer.cancel()
         if self._admitted is not None:
-            self._door.transports.discard(self._admitted)
-            self._door.leave(self._address)
+            self._limit.transports.discard(self._admitted)
+            self._limit.leave(self._address)
         if self._is_served:
             super().connection_lost(exc)

@@ -16,7 +16,7 @@ from service.daemon.daemon import Daemon
 from service.settings.web import WebSettings
 from service.web.access import SafeHeaders, failed, guarded, refused
 from service.web.api import Api
-from service.web.connection_limit import BoundedConnection, Door
+from service.web.connection_limit import BoundedConnection, ConnectionLimit
 from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
 
@@ -38,7 +38,7 @@ class WebServer:
         self._api = Api(daemon, settings, _token(daemon, settings))
         self._config = _config(self._api, settings.hosts)
         self._state = ServerState()
-        self._door = Door()
+        self._limit = ConnectionLimit()
         self._listening: asyncio.Task[None] | None = None
         self._server: asyncio.Server | None = None
 
@@ -56,7 +56,7 @@ class WebServer:
         if self._server is not None:
             self._server.close()
         await self._api.close()
-        self._door.close()
+        self._limit.close()
         answers = list(self._state.tasks)
         for answer in answers:
             answer.cancel()
@@ -68,7 +68,7 @@ class WebServer:
         while self._server is None:
             try:
                 self._server = await loop.create_server(
-                    lambda: BoundedConnection(self._door, self._config, self._state),
+                    lambda: BoundedConnection(self._limit, self._config, self._state),
                     self._address.host,
                     self._address.port,
                     backlog=_BACKLOG,

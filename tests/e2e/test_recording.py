@@ -14,7 +14,7 @@ from pymavlink import mavutil
 
 from protocols.mavlink.dialect import messages
 from protocols.tlog import TlogRecord, read_tlog
-from protocols.uart_capture import UartDeed, read_capture
+from protocols.uart_capture import UartAction, read_capture
 from tests.support.benches import Starter
 from tests.support.programs import Daemon, run_naze_bridge, until
 
@@ -205,16 +205,16 @@ def test_a_recorded_flight_controller_is_found_in_the_replay(start: Starter, con
     listener = connect(recorded)
     until(lambda: listener.has_heard(HEARTBEAT, 3), "telemetry")
     # The last second may be lost, which in such a short run includes the beginning.
-    until(lambda: UartDeed.READ in [event.deed for event in read_capture(capture.read_bytes())], "a capture")
+    until(lambda: UartAction.READ in [event.action for event in read_capture(capture.read_bytes())], "a capture")
     recorded.kill_and_restart()
     recorded.wait()
     assert recorded.end() == 0
     events = read_capture(capture.read_bytes())
-    assert [event.deed for event in events if event.deed in (UartDeed.OPEN, UartDeed.CLOSE)] == [
-        UartDeed.OPEN,
-        UartDeed.CLOSE,
-        UartDeed.OPEN,
-        UartDeed.CLOSE,
+    assert [event.action for event in events if event.action in (UartAction.OPEN, UartAction.CLOSE)] == [
+        UartAction.OPEN,
+        UartAction.CLOSE,
+        UartAction.OPEN,
+        UartAction.CLOSE,
     ]
 
     link = start.directory / "played"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, MspParser, request
-from protocols.uart_capture import UartDeed, UartEvent
+from protocols.uart_capture import UartAction, UartEvent
 from simulator.playback import CapturePlayer
 
 STATUS, IDENT = request(Msp.STATUS), request(Msp.IDENT)
@@ -20,19 +20,19 @@ def reply(command: int, *payload: int) -> bytes:
 
 
 def wrote(at: float, data: bytes, speed: int | None = 115200) -> UartEvent:
-    return UartEvent(at, speed, UartDeed.WRITE, data)
+    return UartEvent(at, speed, UartAction.WRITE, data)
 
 
 def read(at: float, data: bytes, speed: int | None = 115200) -> UartEvent:
-    return UartEvent(at, speed, UartDeed.READ, data)
+    return UartEvent(at, speed, UartAction.READ, data)
 
 
 def opened(at: float) -> UartEvent:
-    return UartEvent(at, 115200, UartDeed.OPEN)
+    return UartEvent(at, 115200, UartAction.OPEN)
 
 
 def closed(at: float) -> UartEvent:
-    return UartEvent(at, 115200, UartDeed.CLOSE)
+    return UartEvent(at, 115200, UartAction.CLOSE)
 
 
 class Listener:
@@ -170,24 +170,24 @@ def test_a_closed_port_is_silent_and_its_times_are_reported() -> None:
 def test_recorded_data_is_replayed_byte_for_byte(data: st.DataObject) -> None:
     """With the same requests at the same times: noise, truncated frames, bursts."""
     frames = st.sampled_from([reply(Msp.STATUS, 1), reply(Msp.IDENT), reply(Msp.STATUS, 2), b"$M>", b"$", b"\xfe\x09"])
-    deeds = st.one_of(
-        st.sampled_from([STATUS, IDENT, STATUS + IDENT]).map(lambda asked: (UartDeed.WRITE, asked)),
-        st.one_of(frames, st.binary(min_size=1, max_size=12)).map(lambda heard: (UartDeed.READ, heard)),
+    actions = st.one_of(
+        st.sampled_from([STATUS, IDENT, STATUS + IDENT]).map(lambda asked: (UartAction.WRITE, asked)),
+        st.one_of(frames, st.binary(min_size=1, max_size=12)).map(lambda heard: (UartAction.READ, heard)),
     )
-    drawn = data.draw(st.lists(st.tuples(st.integers(1, 200), deeds), max_size=30))
+    drawn = data.draw(st.lists(st.tuples(st.integers(1, 200), actions), max_size=30))
     events, at = [opened(0.0)], 0.0
-    for pause_ms, (deed, content) in drawn:
+    for pause_ms, (action, content) in drawn:
         at += pause_ms / 1000
-        events.append(UartEvent(at, 115200, deed, content))
+        events.append(UartEvent(at, 115200, action, content))
     events.append(closed(at + 1.0))
     listener = Listener(events)
     heard = b""
     for event in events:
-        if event.deed is UartDeed.WRITE:
+        if event.action is UartAction.WRITE:
             listener.ask(event.at, event.data)
             heard += b"".join(piece for _, piece in listener.heard)
     heard += b"".join(piece for _, piece in listener.listen(at + 10))
-    assert heard == b"".join(event.data for event in events if event.deed is UartDeed.READ)
+    assert heard == b"".join(event.data for event in events if event.action is UartAction.READ)
 
 
 @pytest.mark.parametrize("rest", [[], [closed(2.002)], [closed(2.002), opened(2.5), wrote(2.6, IDENT)]])

@@ -9,28 +9,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 from structlog.testing import capture_logs
 
-from protocols.uart_capture import UartDeed, UartEvent, capture_header, capture_line, read_capture
+from protocols.uart_capture import UartAction, UartEvent, capture_header, capture_line, read_capture
 from service.recording.uart_recorder import UartRecorder
 from service.settings import SettingsError
 
 HEADER = capture_header("2026-11-21T06:33:06Z")
 SPEEDS = st.sampled_from([None, 1200, 57600, 115200])
-DEEDS = st.sampled_from([UartDeed.READ, UartDeed.WRITE])
+ACTIONS = st.sampled_from([UartAction.READ, UartAction.WRITE])
 
 
-def event(at: float, deed: UartDeed = UartDeed.READ, data: bytes = b"$M", text: str = "") -> UartEvent:
-    return UartEvent(at, 115200, deed, data if deed in (UartDeed.READ, UartDeed.WRITE) else b"", text)
+def event(at: float, action: UartAction = UartAction.READ, data: bytes = b"$M", text: str = "") -> UartEvent:
+    return UartEvent(at, 115200, action, data if action in (UartAction.READ, UartAction.WRITE) else b"", text)
 
 
 @st.composite
 def recordings(draw: st.DrawFn) -> list[UartEvent]:
     """Events of one run of a daemon: from the opening of the port, at 0, with times in microseconds."""
     at, speed = 0, draw(SPEEDS)
-    found = [UartEvent(0.0, speed, UartDeed.OPEN)]
+    found = [UartEvent(0.0, speed, UartAction.OPEN)]
     for _ in range(draw(st.integers(0, 20))):
         at += draw(st.integers(0, 10**7))
-        found.append(UartEvent(at / 1e6, draw(SPEEDS), draw(DEEDS), draw(st.binary(min_size=1, max_size=80))))
-    return [*found, UartEvent(at / 1e6, speed, UartDeed.CLOSE, text=draw(st.text()))]
+        found.append(UartEvent(at / 1e6, draw(SPEEDS), draw(ACTIONS), draw(st.binary(min_size=1, max_size=80))))
+    return [*found, UartEvent(at / 1e6, speed, UartAction.CLOSE, text=draw(st.text()))]
 
 
 def written(events: list[UartEvent]) -> bytes:
@@ -92,13 +92,13 @@ def test_an_excerpt_begins_at_0() -> None:
 
 
 def test_recordings_in_one_file_follow_each_other_after_a_pause() -> None:
-    first = [event(0.0, UartDeed.OPEN), event(2.0), event(3.0, UartDeed.CLOSE, text="the daemon stops")]
-    killed = [event(5.0, UartDeed.OPEN), event(6.0)]
+    first = [event(0.0, UartAction.OPEN), event(2.0), event(3.0, UartAction.CLOSE, text="the daemon stops")]
+    killed = [event(5.0, UartAction.OPEN), event(6.0)]
     found = read_capture(written(first) + written(killed) + written(first))
-    assert [(entry.at, entry.deed) for entry in found] == [
-        (0.0, UartDeed.OPEN), (2.0, UartDeed.READ), (3.0, UartDeed.CLOSE),
-        (4.0, UartDeed.OPEN), (5.0, UartDeed.READ), (5.0, UartDeed.CLOSE),
-        (6.0, UartDeed.OPEN), (8.0, UartDeed.READ), (9.0, UartDeed.CLOSE),
+    assert [(entry.at, entry.action) for entry in found] == [
+        (0.0, UartAction.OPEN), (2.0, UartAction.READ), (3.0, UartAction.CLOSE),
+        (4.0, UartAction.OPEN), (5.0, UartAction.READ), (5.0, UartAction.CLOSE),
+        (6.0, UartAction.OPEN), (8.0, UartAction.READ), (9.0, UartAction.CLOSE),
     ]  # fmt: skip
 
 
@@ -109,11 +109,11 @@ def test_a_truncated_capture_is_appended_to(tmp_path: Path) -> None:
     path = tmp_path / "naze.uart"
     for number in range(3):
         recorder = UartRecorder(path)
-        recorder.note(UartDeed.READ, 115200, bytes((number,)))
+        recorder.note(UartAction.READ, 115200, bytes((number,)))
         recorder.close()
         with path.open("ab") as file:
             file.write(b'{"t":0.5,"ba')
-    assert [found.data for found in read_capture(path.read_bytes()) if found.deed is UartDeed.READ] == [
+    assert [found.data for found in read_capture(path.read_bytes()) if found.action is UartAction.READ] == [
         b"\0",
         b"\1",
         b"\2",
@@ -127,7 +127,7 @@ def test_a_captures_total_size_is_limited(tmp_path: Path) -> None:
         with capture_logs() as events:
             recorder = UartRecorder(path, max_size=2000)
             for _ in range(20):
-                recorder.note(UartDeed.WRITE, 115200, bytes(10))
+                recorder.note(UartAction.WRITE, 115200, bytes(10))
             recorder.close()
         ends += len([entry for entry in events if entry["event"] == "uart.recording_ended"])
     assert ends == 2

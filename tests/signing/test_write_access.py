@@ -112,7 +112,7 @@ def test_invalid_tables(tmp_path: Path, entry: str, said: str) -> None:
 @pytest.mark.parametrize("mode", [0o604, 0o602, 0o644, 0o777])
 def test_a_key_file_readable_by_others_is_refused(key_file: Path, mode: int) -> None:
     key_file.chmod(mode)
-    with pytest.raises(AddressError, match="is readable for other users: run chmod 600"):
+    with pytest.raises(AddressError, match="is readable by other users: run chmod 600"):
         read_key(key_file)
 
 

@@ -102,8 +102,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
 
     yield make
     for simulator in started:
-        if simulator.process.poll() is None:
-            simulator.end(signal.SIGKILL)
+        simulator.end(signal.SIGKILL)  # also closes the pipe of one that has already ended
 
 
 def ask(port: serial.Serial, frame: bytes, seconds: float = PATIENCE) -> MspFrame | None:

@@ -44,7 +44,7 @@ _BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
 #: Restarts of one push (after a reset, damaged line, flash error) before it is given up.
 _MAX_BEGINS = 3
-#: A push may take this long, and twice the time of its bytes on the line: Mission Planner waits 4.9 s for the ack.
+#: A push may take this long, plus twice the time of its bytes on the line: Mission Planner waits 4.9 s for the ack.
 _PUSH_S = 3.8
 #: How long to ask for the outcome of a COMMIT without a reply.
 _LOOK_S = 0.6
@@ -211,7 +211,7 @@ class HarakiriMissions(HarakiriStore):
             waited_s += _BUSY_INTERVAL_S
 
     def _transfer(self, records: Sequence[WpRecord], begun: Staged, progress: PushProgress) -> Conversation[None]:
-        """Keep the window full and send COMMIT right behind the last chunk: the line never waits for a reply.
+        """Keep the window full and send COMMIT right after the last chunk: the line never waits for a reply.
 
         After a loss, continue at the first record that the flight controller lacks. It answers INCOMPLETE to a COMMIT
         that arrives before the lost chunk.

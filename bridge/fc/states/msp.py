@@ -19,7 +19,7 @@ from protocols.mavlink.heartbeat import is_disarmed_heartbeat
 from protocols.msp.echo import EchoWatch
 from protocols.msp.frame import MspFrame
 
-#: A flight controller that answers nothing for this long is gone: unplugged, reset, or switched to another protocol.
+#: A flight controller that sends no reply for this long is gone: unplugged, reset, or switched to another protocol.
 MSP_SILENCE_S = 2.0
 #: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now. On a slow line a Harakiri's
 #: MAVLink is torn, and a whole frame takes longer to come.

@@ -65,13 +65,13 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
             return problem("disk", f"{state_dir} cannot be created, because {folder} is a file", remedy)
         free = free_of(folder)
     except PermissionError:
-        return note("disk", f"{state_dir} is not readable for you", "run doctor with sudo")
+        return note("disk", f"no permission to read {state_dir}", "run doctor with sudo")
     if not os.access(folder, os.W_OK):
         read_only = os.statvfs(folder).f_flag & os.ST_RDONLY
         if read_only:
             remedy = "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /"
             return problem("disk", f"{folder} is on a disk that is read-only", remedy)
-        return note("disk", f"{folder} is not writable for you", "run doctor with sudo")
+        return note("disk", f"no permission to write to {folder}", "run doctor with sudo")
     told = f"{free >> 20} MB free for {state_dir}"
     if free < _LEAST_FREE:
         return problem("disk", told, f"remove unneeded files, such as old logs: ls -l {state_dir}/logs")
@@ -86,7 +86,7 @@ def check_database(state_dir: Path) -> list[Checked]:
         exists = path.exists()
         aside = sorted(state_dir.glob(f"{DATABASE_NAME}.corrupt-*[0-9]"))
     except PermissionError:
-        return [note("missions", f"{path} is not readable for you", "run doctor with sudo")]
+        return [note("missions", f"no permission to read {path}", "run doctor with sudo")]
     if not exists:
         found.append(ok("missions", f"none stored yet in {state_dir}"))
     else:

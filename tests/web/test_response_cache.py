@@ -3,7 +3,7 @@
 
 import asyncio
 
-from service.web.kept_answers import KeptAnswers
+from service.web.response_cache import ResponseCache
 
 
 class _Maker:
@@ -25,16 +25,16 @@ class _Maker:
 
 
 async def test_a_final_response_is_computed_once() -> None:
-    kept, maker = KeptAnswers(), _Maker(is_final=True)
-    answers = await asyncio.gather(*(kept.get("1", maker.make) for _ in range(5)))
+    cache, maker = ResponseCache(), _Maker(is_final=True)
+    answers = await asyncio.gather(*(cache.get("1", maker.make) for _ in range(5)))
     assert answers == ["answer 1"] * 5
     for other in range(2, 12):
-        await kept.get(str(other), maker.make)
-    assert await kept.get("1", maker.make) == "answer 12"  # but not cached forever
+        await cache.get(str(other), maker.make)
+    assert await cache.get("1", maker.make) == "answer 12"  # but not cached forever
 
 
 async def test_a_changing_response_is_computed_each_time_one_at_a_time() -> None:
-    kept, maker = KeptAnswers(), _Maker(is_final=False)
-    answers = await asyncio.gather(*(kept.get(str(number % 2), maker.make) for number in range(4)))
+    cache, maker = ResponseCache(), _Maker(is_final=False)
+    answers = await asyncio.gather(*(cache.get(str(number % 2), maker.make) for number in range(4)))
     assert sorted(answers) == [f"answer {number}" for number in range(1, 5)]
     assert maker.at_once == 1

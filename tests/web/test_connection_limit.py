@@ -17,7 +17,7 @@ from service.web.connection_limit import (
     MAX_IN_A_SECOND,
     MAX_IN_A_SECOND_FROM_ONE,
     BoundedConnection,
-    Door,
+    ConnectionLimit,
 )
 
 visits = st.lists(
@@ -29,17 +29,17 @@ visits = st.lists(
 @settings(deadline=None)
 @given(visits)
 def test_the_limits_are_never_exceeded(visits: list[tuple[str, float, bool]]) -> None:
-    door, now = Door(), 100.0
+    limit, now = ConnectionLimit(), 100.0
     inside: Counter[str] = Counter()
     served: list[tuple[float, str]] = []
     for address, wait_s, leaves in visits:
         now += wait_s
         if leaves and inside[address]:
-            door.leave(address)
+            limit.leave(address)
             inside[address] -= 1
-        elif door.admit(address):
+        elif limit.admit(address):
             inside[address] += 1
-            if door.take_turn(address, now):
+            if limit.take_turn(address, now):
                 served.append((now, address))
         lately = [one for at, one in served if at > now - 1]
         assert inside.total() <= MAX_CONNECTIONS
@@ -48,15 +48,15 @@ def test_the_limits_are_never_exceeded(visits: list[tuple[str, float, bool]]) ->
         assert lately.count(address) <= MAX_IN_A_SECOND_FROM_ONE
     for address, count in inside.items():
         for _ in range(count):
-            door.leave(address)
-    assert door.admit("a")
-    assert door.take_turn("a", now + 2)
+            limit.leave(address)
+    assert limit.admit("a")
+    assert limit.take_turn("a", now + 2)
 
 
 _REQUEST = b"GET / HTTP/1.1\r\nHost: pi\r\nConnection: close\r\n\r\n"
 
 
-async def _listen(door: Door, body: bytes) -> tuple[asyncio.Server, int]:
+async def _listen(limit: ConnectionLimit, body: bytes) -> tuple[asyncio.Server, int]:
     """A server that answers each request with `body`; its port."""
 
     async def serve(_scope: Scope, _receive: Receive, send: Send) -> None:
@@ -65,13 +65,13 @@ async def _listen(door: Door, body: bytes) -> tuple[asyncio.Server, int]:
         await send({"type": "http.response.body", "body": body})
 
     config, state = Config(serve, lifespan="off", ws="none", log_config=None), ServerState()
-    make = partial(BoundedConnection, door, config, state)
+    make = partial(BoundedConnection, limit, config, state)
     server = await asyncio.get_running_loop().create_server(make, "127.0.0.1", 0)
     return server, server.sockets[0].getsockname()[1]
 
 
 async def test_connections_over_the_rate_wait_and_are_served() -> None:
-    server, port = await _listen(Door(), b"!")
+    server, port = await _listen(ConnectionLimit(), b"!")
     room = asyncio.Semaphore(6)  # as many as a browser opens
 
     async def ask() -> bytes:
@@ -91,7 +91,7 @@ async def test_connections_over_the_rate_wait_and_are_served() -> None:
 _VISITORS = 3
 
 
-class _NoticedDoor(Door):
+class _NoticedLimit(ConnectionLimit):
     """Reports when all connections are closed."""
 
     def __init__(self) -> None:
@@ -108,15 +108,15 @@ class _NoticedDoor(Door):
 
 async def _is_cut_off(request: bytes) -> None:
     """Connect, send a request and stay idle; return once no connection is counted."""
-    door = _NoticedDoor()
-    server, port = await _listen(door, bytes(16 << 20))
+    limit = _NoticedLimit()
+    server, port = await _listen(limit, bytes(16 << 20))
     connections = [await asyncio.open_connection("127.0.0.1", port, limit=1024) for _ in range(_VISITORS)]
     for _, writer in connections:
         writer.write(request)
     try:
         async with asyncio.timeout(30):
-            await door.emptied.wait()
-        assert not door.transports
+            await limit.emptied.wait()
+        assert not limit.transports
     finally:
         for _, writer in connections:
             writer.close()

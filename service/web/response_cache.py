@@ -14,7 +14,7 @@ _KEPT = 8
 _PAUSE_S = 0.05
 
 
-class KeptAnswers:
+class ResponseCache:
     """Caches responses that are final."""
 
     def __init__(self) -> None:
