@@ -2,7 +2,7 @@
 """The daemon of `naze-bridge run`, with its control socket, page and zenoh node."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,8 +16,7 @@ from service.links.gcs_links import LinkError
 from service.machine.log_setup import set_up_logging
 from service.machine.notify import Notifier
 from service.settings import Settings, SettingsError
-from service.settings.web import WebSettings
-from service.settings.zenoh import ZenohSettings, ZenohSettingsError
+from service.settings.zenoh import ZenohSettingsError
 from storage.state_lock import StateLock, StateUnusableError
 from storage.store_error import StoreError
 
@@ -47,30 +46,24 @@ def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
 async def _main(settings: Settings, load: Callable[[], Settings], socket_path: Path) -> None:
     daemon = Daemon(settings)
     control = ControlServer(daemon, socket_path)
-    zenoh_node = None if settings.zenoh is None else _zenoh_node(settings.zenoh, daemon)
-    page = None if settings.web is None else _web_server(settings.web, daemon)
+    parts = list(_parts(settings, daemon))
     await control.start()
-    if zenoh_node is not None:
-        zenoh_node.start()
-    if page is not None:
-        page.start()
+    for part in parts:
+        part.start()
     try:
         await run_until_signal(daemon, Notifier(), load)
     finally:
-        await control.close()
-        if page is not None:
-            await page.close()
-        if zenoh_node is not None:
-            await zenoh_node.close()
+        for each in (control, *reversed(parts)):
+            await each.close()
 
 
-def _zenoh_node(settings: ZenohSettings, daemon: Daemon) -> "Node":
-    from service.zenoh_link.node import Node  # 10 MB that only its users pay for
+def _parts(settings: Settings, daemon: Daemon) -> "Iterator[Node | WebServer]":
+    """The parts that are configured. Only then are they imported: they take 10 and 20 MB."""
+    if settings.zenoh is not None:
+        from service.zenoh_link.node import Node
 
-    return Node(settings, daemon)
+        yield Node(settings.zenoh, daemon)
+    if settings.web is not None:
+        from service.web.server import WebServer
 
-
-def _web_server(settings: WebSettings, daemon: Daemon) -> "WebServer":
-    from service.web.server import WebServer  # 20 MB that only its users pay for
-
-    return WebServer(daemon, settings)
+        yield WebServer(daemon, settings.web)

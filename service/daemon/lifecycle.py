@@ -49,23 +49,15 @@ async def run_until_signal(daemon: Daemon, notifier: Notifier, load: Callable[[]
     loop.add_signal_handler(signal.SIGHUP, told_to_reload.set)
     reloading = loop.create_task(_reload_when_told(told_to_reload, daemon, notifier, load))
     reporting = _Reporting(daemon, notifier)
-    ready = loop.create_task(_tell_ready(daemon, notifier))
     try:
         with suppress(asyncio.CancelledError):
             await running
     finally:
         reporting.end()
-        ready.cancel()
         reloading.cancel()
         if stopping is not None:
             stopping.cancel()
         notifier.close()
-
-
-async def _tell_ready(daemon: Daemon, notifier: Notifier) -> None:
-    """Ready when ground stations can connect: the flight controller may appear at any time."""
-    await daemon.started.wait()
-    notifier.ready()
 
 
 class _Reporting:
@@ -108,6 +100,9 @@ async def _reload_when_told(
     told: asyncio.Event, daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]
 ) -> None:
     """Apply the result of `load` each time `told` is set; invalid settings change nothing."""
+    # Ready when ground stations can connect: the flight controller may appear at any time.
+    await daemon.started.wait()
+    notifier.ready()
     while await told.wait():
         told.clear()
         notifier.reloading()

@@ -8,7 +8,7 @@ not opened, and one that turned out to be a GPS receiver or a radio is not opene
 import asyncio
 import os
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -60,16 +60,19 @@ class PortFinder:
         self._leave()
         for port in self._in_turn():
             self._tried.add(port.key)
-            device = await self._try(port)
-            if device is not None:
-                self._present = port
-                self._watch = OtherDeviceWatch()
-                self._wait(_RETURN_S if port.key == self._memory.flight_controller else _SEARCH_S)
-                return device
+            try:
+                device = await self._try(port)
+            except PortError as error:
+                self._pass_over(port, str(error))
+                continue
+            self._present = port
+            self._watch = OtherDeviceWatch()
+            self._wait(_RETURN_S if port.key == self._memory.flight_controller else _SEARCH_S)
+            return device
         self._tried.clear()
         await asyncio.sleep(_RETRY_S)
         if self._passed:
-            raise PortError("; ".join(self._reasons()))
+            raise PortError("; ".join(self.status()["ports_passed_over"]))
         raise PortError("there is no serial port: plug the flight controller in, or enable the UART on the header")
 
     def received(self, data: bytes) -> None:
@@ -77,7 +80,8 @@ class PortFinder:
         if self._watch is not None:
             self._watch.feed(data)
             if self._watch.what and self._present is not None:
-                self._leave_alone(self._present, self._watch.what)
+                self._memory.found_other(self._present.key, self._watch.what)
+                self._pass_over(self._present, f"{self._watch.what} was heard there")
                 self.move_on()
 
     def close(self) -> None:
@@ -100,17 +104,9 @@ class PortFinder:
 
     def status(self) -> dict[str, Any]:
         """The port in use, and the skipped ones with the reasons."""
-        return {
-            "port": None if self._present is None else self._present.path,
-            "ports_passed_over": self._reasons(),
-        }
-
-    def _reasons(self) -> list[str]:
-        return [f"{path}: {why}" for path, why in sorted(self._passed.items()) if path != self._path]
-
-    @property
-    def _path(self) -> str:
-        return "" if self._present is None else self._present.path
+        present = None if self._present is None else self._present.path
+        skipped = [f"{path}: {why}" for path, why in sorted(self._passed.items()) if path != present]
+        return {"port": present, "ports_passed_over": skipped}
 
     def _in_turn(self) -> list[SerialPort]:
         """The ports not tried in this round, the flight controller's last one first."""
@@ -123,34 +119,24 @@ class PortFinder:
             left = ports
         return sorted(left, key=lambda port: port.key != self._memory.flight_controller)
 
-    async def _try(self, port: SerialPort) -> serial.Serial | None:
-        other = self._memory.others.get(port.key)
-        if other is not None:
-            self._pass_over(port, f"{other} was heard there")
-            return None
-        user = find_user(self._host, port.path)
-        if user is not None:
-            self._pass_over(port, f"{user} uses it")
-            return None
-        try:
-            device = open_serial(str(self._host.path(port.path)))
-        except PortError as error:
-            self._pass_over(port, str(error))
-            return None
-        handed_on = False
-        try:
-            what = "" if port.key == self._memory.flight_controller else await self._listen(device)
+    async def _try(self, port: SerialPort) -> serial.Serial:
+        """Open a port that may have a flight controller; PortError says why it is skipped."""
+        if (other := self._memory.others.get(port.key)) is not None:
+            raise PortError(f"{other} was heard there")
+        if (user := find_user(self._host, port.path)) is not None:
+            raise PortError(f"{user} uses it")
+        device = open_serial(str(self._host.path(port.path)))
+        with ExitStack() as unless_used:
+            unless_used.callback(device.close)
+            try:
+                what = "" if port.key == self._memory.flight_controller else await self._listen(device)
+            except OSError as error:
+                raise PortError(error.strerror or str(error)) from error
             if what:
-                self._leave_alone(port, what)
-                return None
-            handed_on = True
-            return device
-        except OSError as error:
-            self._pass_over(port, error.strerror or str(error))
-            return None
-        finally:
-            if not handed_on:
-                device.close()
+                self._memory.found_other(port.key, what)
+                raise PortError(f"{what} was heard there")
+            unless_used.pop_all()
+        return device
 
     async def _listen(self, device: serial.Serial) -> str:
         """The other device recognised on the port; empty if none. Sends nothing."""
@@ -174,10 +160,6 @@ class PortFinder:
         finally:
             self._loop.remove_reader(device.fileno())
         return listener.what
-
-    def _leave_alone(self, port: SerialPort, what: str) -> None:
-        self._memory.found_other(port.key, what)
-        self._pass_over(port, f"{what} was heard there")
 
     def _pass_over(self, port: SerialPort, why: str) -> None:
         if self._passed.get(port.path) != why:
