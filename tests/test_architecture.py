@@ -34,11 +34,11 @@ SERVICE = {
     "service.machine": set[str](),
     "service.settings": set[str](),
     "service.links": {"service.machine", "service.settings"},
-    "service.recording": {"service.links", "service.settings"},
+    "service.recording": {"service.settings"},
 }
 SERVICE["service.daemon"] = {*SERVICE}
-SERVICE["service.web"] = SERVICE["service.zenoh_link"] = {*SERVICE}
-SERVICE["service.cli"] = {*SERVICE}
+SERVICE["service.web"] = SERVICE["service.zenoh_link"] = {*SERVICE, "service.daemon"} - {"service.links"}
+SERVICE["service.cli"] = {*SERVICE} - {"service.recording"}
 INSIDE = BRIDGE | SERVICE
 #: Only service/ and simulator/ may use a clock, a port or an event loop.
 IMPURE = {"asyncio", "selectors", "serial", "socket", "subprocess", "threading", "time"}

@@ -10,12 +10,11 @@ from service.cli.doctor.checked import Checked, note, ok, problem
 from service.links.serial_ports import serial_ports
 from service.machine.host import LOGIN_PROGRAMS, Host, Process
 from service.machine.package import page
-from service.machine.raspberry_pi import pi_model
+from service.machine.raspberry_pi import boot_file, pi_model
 from service.settings.addresses import FcAddress, SerialFc
 
 _PORTS = ("serial0", "naze", "ttyUSB*", "ttyACM*")
 _GROUP = "dialout"
-_CMDLINES = ("/boot/firmware/cmdline.txt", "/boot/cmdline.txt")
 _RULES = ("/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d")
 _RULE = "60-naze-bridge.rules"
 
@@ -81,24 +80,19 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     # The firmware's name for the header's UART.
     names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
     found, remedies = [], []
-    if host.has_login(device.name):
-        found.append(f"serial-getty@{device.name} runs there")
-        remedies.append(f"sudo systemctl disable --now serial-getty@{device.name}.service")
-    elif host.names("/etc/systemd/system/getty.target.wants", f"serial-getty@{device.name}.service"):
-        found.append(f"serial-getty@{device.name} is enabled")
-        remedies.append(f"sudo systemctl disable --now serial-getty@{device.name}.service")
+    getty = f"serial-getty@{device.name}"
+    is_running = host.has_login(device.name)
+    if is_running or host.names("/etc/systemd/system/getty.target.wants", f"{getty}.service"):
+        found.append(f"{getty} {'runs there' if is_running else 'is enabled'}")
+        remedies.append(f"sudo systemctl disable --now {getty}.service")
     words = re.compile(rf"\bconsole=({'|'.join(map(re.escape, sorted(names)))})(?:,\S*)?(?=\s|$)")
-    for file in _CMDLINES:
-        named = words.search(host.read(file))
-        if named:
-            found.append(f"{named[0]} is in {file}")
-            remedies.append(f"sudo sed -i 's/console={named[1]}[^ ]* *//' {file} && sudo reboot")
-            break
-    else:
-        booted = words.search(host.read("/proc/cmdline"))
-        if booted:
-            found.append(f"the kernel was started with {booted[0]}")
-            remedies.append("remove that word from the boot loader's command line, and reboot")
+    file = boot_file(host, "cmdline.txt")
+    if file is not None and (named := words.search(host.read(file))):
+        found.append(f"{named[0]} is in {file}")
+        remedies.append(f"sudo sed -i 's/console={named[1]}[^ ]* *//' {file} && sudo reboot")
+    elif named := words.search(host.read("/proc/cmdline")):
+        found.append(f"the kernel was started with {named[0]}")
+        remedies.append("remove that word from the boot loader's command line, and reboot")
     if not found:
         return ok("console", f"no login console on {device}")
     return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies))
