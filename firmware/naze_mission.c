@@ -145,7 +145,7 @@ static bool seal_slot(nm_t *m, nm_list_t list)
     return true;
 }
 
-/* Is this list stored, and intact in flash? */
+/* True if this list is stored, and intact in flash. */
 static bool is_stored(const nm_t *m, nm_list_t list)
 {
     return same(list, m->stored) &&
@@ -154,7 +154,7 @@ static bool is_stored(const nm_t *m, nm_list_t list)
 
 /* ---- commands --------------------------------------------------------------------------------------------------------- */
 
-/* May the stored list or the configuration be changed now? */
+/* NM_OK if the stored list and the configuration may be changed now. */
 static nm_status_t may_write(const nm_t *m)
 {
     if (m->board->armed(m->self))

@@ -94,7 +94,7 @@ void sim_arm(sim_t *s, bool armed);
  */
 int sim_receive(sim_t *s, uint8_t byte, uint8_t *reply);
 
-/* Is the configuration page as sim_init() filled it? */
+/* True if the configuration page is as sim_init() filled it. */
 bool sim_config_intact(const sim_t *s);
 
 /* For callers without access to the struct. */

@@ -32,7 +32,7 @@ from service.settings.zenoh import DEFAULT_PREFIX, ZenohSettingsError
 def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None:
     """Add a vehicle or a person to a fleet: makes the login and the router's access control.
 
-    The router reads both at its start. Names that are enrolled again keep their login.
+    Restart the router afterwards: it reads both only at its start. A name enrolled again keeps its login.
     """
     fleet = FleetFolder(folder.absolute(), prefix, router)
     try:
