@@ -8,7 +8,7 @@ from simulator.flight import FlightState
 from simulator.msp_firmware import Boot, MspFirmware, PortHabits, error, reply
 from simulator.msp_sensors import MspCommand, SensorReplies
 from simulator.multiwii_mission import MultiWiiMission
-from simulator.multiwii_navigation import HIGHEST_M, SAFE_DISTANCE_M, MultiWiiNavigation
+from simulator.multiwii_navigation import HIGHEST_M, SAFE_DISTANCE_M, WP_RADIUS_M, MultiWiiNavigation
 from simulator.nav_status import Error, Mode, State
 from simulator.nav_waypoint import WAYPOINT_SIZE, NavWaypoint, unpack_waypoint
 from simulator.waypoint_craft import WaypointCraft
@@ -124,7 +124,7 @@ class MultiWiiFirmware(MspFirmware):
             case MspCommand.NAV_STATUS:
                 return self._navigation.status().pack()
             case MspCommand.NAV_CONFIG:
-                speeds = (200, SAFE_DISTANCE_M, HIGHEST_M, 400, 100)
+                speeds = (100 * WP_RADIUS_M, SAFE_DISTANCE_M, HIGHEST_M, 400, 100)
                 limits = (40, 3000, 20, 100, 600)
                 return struct.pack("<BB5HBHHBHBB", 0x83, 3, *speeds, *limits, self._options.capacity, 0)
         return _SENSORS.payload(command, self.craft_at(self._clock))

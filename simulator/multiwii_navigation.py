@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii 2.4's return home, and its mission mode (GPS.cpp): it fetches one step after the other from the EEPROM.
 
-Not simulated: the fence, the settling before a landing, and resuming an interrupted mission.
+Not simulated: the fence, the settling before a landing, creeping to a waypoint that is held from afar, and resuming an
+interrupted mission.
 """
 
 import math
@@ -19,6 +20,8 @@ _RTH_HEIGHT_M = 20.0
 _NO_JUMP = -10
 #: NAV_CONFIG's safe_wp_distance and nav_max_altitude: longer legs are not begun, greater heights not flown.
 SAFE_DISTANCE_M, HIGHEST_M = 500, 100
+#: NAV_CONFIG's wp_radius: a waypoint counts as reached at this distance.
+WP_RADIUS_M = 2
 
 
 class MultiWiiNavigation:
@@ -32,6 +35,7 @@ class MultiWiiNavigation:
         self._jumps = _NO_JUMP
         self._held_s = self._rth_height_m = 0.0
         self._leg_from = craft.position
+        self._poi: tuple[int, int] | None = None
         self.home = craft.position
         self.mode = Mode.NONE
         self.state = State.NONE
@@ -42,6 +46,7 @@ class MultiWiiNavigation:
         """Stop: disarmed, or the switch is off."""
         self.mode, self.state = Mode.NONE, State.NONE
         self._error = error
+        self._poi = None
 
     def status(self) -> NavStatus:
         """The content of MSP_NAV_STATUS."""
@@ -97,6 +102,7 @@ class MultiWiiNavigation:
             case Action.WAYPOINT | Action.POSHOLD_TIME | Action.POSHOLD_UNLIM | Action.LAND:
                 self._begin_leg()
             case Action.RTH:
+                self._poi = None
                 height_m = max(self._craft.height_m, self.step.alt_cm / 100 or _RTH_HEIGHT_M)
                 self._rth_height_m = min(height_m, HIGHEST_M)
                 self.state = State.RTH_START
@@ -105,8 +111,10 @@ class MultiWiiNavigation:
                 self.state = State.DO_JUMP
             case Action.JUMP:
                 self._abort(Error.INVALID_JUMP)
-            case Action.SET_HEAD | Action.SET_POI:
-                pass
+            case Action.SET_HEAD:
+                self._poi = None
+            case Action.SET_POI:
+                self._poi = (self.step.lat_e7, self.step.lon_e7)
             case _:
                 self._abort(Error.INVALID_DATA)
         self._next_step += 1
@@ -131,7 +139,10 @@ class MultiWiiNavigation:
 
     def _fly_leg(self, seconds: float) -> None:
         target = (self.step.lat_e7, self.step.lon_e7)
-        if not self._craft.fly_to(target, min(self.step.alt_cm / 100, HIGHEST_M), _CRUISE_MS, seconds):
+        arrived = self._craft.fly_to(target, min(self.step.alt_cm / 100, HIGHEST_M), _CRUISE_MS, seconds)
+        # With a point of interest set, its distance replaces the waypoint's (GPS_adjust_heading); a waypoint that was
+        # passed still counts.
+        if not arrived and (self._poi is None or _distance_m(self._craft.position, self._poi) > WP_RADIUS_M):
             return
         if self.step.action == Action.LAND:
             self.state = State.LAND_IN_PROGRESS

@@ -43,6 +43,16 @@ def distance_m(start: Place, end: Place) -> float:
     return math.hypot(*north_east_m(start, end))
 
 
+def passing_distance_m(start: Place, end: Place, place: Place) -> float:
+    """Metres between a place and the straight line between two others."""
+    north, east = north_east_m(start, end)
+    place_north, place_east = north_east_m(start, place)
+    length2 = north * north + east * east
+    share = (north * place_north + east * place_east) / length2 if length2 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(place_north - share * north, place_east - share * east)
+
+
 def bearing_deg(start: Place, end: Place) -> float:
     """Direction from one place to another, 0 up to 360."""
     north, east = north_east_m(start, end)

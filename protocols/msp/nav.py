@@ -19,7 +19,7 @@ WP_SIZE = _WP.size
 INFO_SIZE = _INFO.size
 #: MSP_NAV_CONFIG in MultiWii 2.4, and its limits, behind two bytes of flags and the waypoint radius.
 NAV_CONFIG_SIZE = 22
-_LIMITS_AT, _LIMITS = 4, struct.Struct("<HH")
+_LIMITS_AT, _LIMITS = 2, struct.Struct("<HHH")
 _HIGHEST_NUMBER = 254
 
 #: The flag of the last record of a mission, and of a leg that INAV flies to home instead.
@@ -52,6 +52,8 @@ class NavAction(IntEnum):
 
 #: Actions that fly to a place.
 LEGS = frozenset((NavAction.WAYPOINT, NavAction.POSHOLD_UNLIM, NavAction.POSHOLD_TIME, NavAction.LAND))
+#: Actions that only turn the craft.
+TURNS = frozenset((NavAction.SET_POI, NavAction.SET_HEAD))
 
 
 class UnsafeRecord(ValueError):
@@ -171,12 +173,12 @@ def decode_nav_config(payload: bytes) -> int | None:
     return payload[-2] if len(payload) >= 2 else None
 
 
-def decode_nav_limits(payload: bytes) -> tuple[int, int] | None:
-    """Read the limits of a leg from MultiWii's MSP_NAV_CONFIG, metres: safe_wp_distance and nav_max_altitude."""
+def decode_nav_limits(payload: bytes) -> tuple[int, int, int] | None:
+    """Read MultiWii's MSP_NAV_CONFIG: wp_radius in cm, safe_wp_distance and nav_max_altitude in metres."""
     if len(payload) < _LIMITS_AT + _LIMITS.size:
         return None
-    distance_m, height_m = _LIMITS.unpack_from(payload, _LIMITS_AT)
-    return distance_m, height_m
+    radius_cm, distance_m, height_m = _LIMITS.unpack_from(payload, _LIMITS_AT)
+    return radius_cm, distance_m, height_m
 
 
 def decode_nav_status(payload: bytes) -> NavStatus | None:

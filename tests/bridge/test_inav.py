@@ -185,15 +185,17 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
     _, station = found(multiwii)
     sent = plan(10)
     sent[5] = replace(sent[5], lat_e7=453848000)  # 110 m away
+    sent[6] = replace(sent[6], command=201, lon_e7=84734000)  # a ROI, 11 m away
     assert Upload(station, sent).run() is ACCEPTED
     assert not [text for text in station.texts() if "WP" in text]
-    multiwii.answers = {**multiwii.answers, 122: nav_config(60, safe_wp_distance=100, nav_max_altitude=25)}
+    multiwii.answers = {**multiwii.answers, 122: nav_config(60, 100, 25, wp_radius=900)}
     assert Upload(station, sent).run() is ACCEPTED
     told = " ".join(station.texts())
     assert "WP 9: flown at 25 m" in told
     assert "WP 4: flown" not in told
     assert "WP 5: 100 m or more from the waypoint before: the mission stops there" in told
     assert "WP 4: 100 m" not in told
+    assert "WP 7: passes the ROI at less than 14 m: the board may end this leg there" in told
 
 
 def test_a_multiwii_that_arms_during_a_read_gets_no_write() -> None:

@@ -175,6 +175,28 @@ def test_a_warning_for_legs_at_which_a_multiwii_stops() -> None:
     assert said(*legs) == []
 
 
+def test_a_warning_for_legs_that_a_multiwii_ends_at_a_region_of_interest() -> None:
+    """By default within 1 m of it, and a craft strays by 5 m."""
+
+    def north(metres: float, command: int = C.NAV_WAYPOINT, east: float = 0.0) -> MissionItem:
+        return item(command, lat_e7=LAT + round(metres * 90), lon_e7=LON + round(east * 128))
+
+    def warned(*items: MissionItem, rules: NavRules = MULTIWII) -> list[int | None]:
+        return [finding.seq for finding in verdict_on(*items, rules=rules).findings if finding.news is News.WARNING]
+
+    roi, aside, none = north(50, C.NAV_ROI), north(50, C.NAV_ROI, east=7), item(C.DO_SET_ROI_NONE, at=False)
+    assert warned(north(0), roi, north(100), north(200)) == [3]
+    assert warned(north(0), north(50, C.NAV_ROI, east=5), north(100)) == [3]
+    assert warned(north(0), aside, north(100)) == []
+    assert warned(north(0), roi, north(100), rules=INAV) == []
+    assert warned(north(0), roi, none, north(100)) == []
+    assert warned(north(0), roi, item(C.CONDITION_YAW, at=False, p1=90), north(100)) == []
+    assert warned(roi, north(50)) == [2]
+    # After the jump, the ROI is in force on the earlier legs, too.
+    assert warned(north(0), north(100), roi, north(120), north(140), jump(1), north(160)) == [2, 6]
+    assert warned(north(0), north(100), roi, north(120), north(140), none, jump(1), north(160)) == []
+
+
 def test_a_jump_to_a_merged_or_dropped_item_goes_to_the_next() -> None:
     assert kept(WP, speed(5), WP, WP, jump(2, -1))[3] == NavRecord(A.JUMP, p1=2, p2=-1, flag=LAST)
     takeoff = item(C.NAV_TAKEOFF, at=False, alt_m=5.0)

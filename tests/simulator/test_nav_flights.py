@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from bridge.model.ground_track import distance_m
 from bridge.model.verdict import Result
 from protocols.mission_item import Command
-from protocols.msp.nav import NavRecord
+from protocols.msp.nav import LEGS, NavRecord
 from simulator.inav_boxes import BOXES, NAV_WP
 from simulator.nav_waypoint import Action, unpack_waypoint
 from simulator.options import Faults
@@ -20,7 +21,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "inav.md"
 SWITCH = {"inav": 1 << BOXES["9.1.0"].index(NAV_WP), "multiwii": 1 << 10}
 LONGEST_S = 600.0
 TOO_FAR, FINISHED, HOVERS_AT_HOME, LANDED, HOLDS, HOLDS_FOR_EVER, LANDING = 1, 4, 13, 10, 4, 3, 9
-USUAL_MS, USUAL_M = 3.0, 20.0
+USUAL_MS, USUAL_M, SHORT_M = 3.0, 20.0, 5.0
 
 
 @dataclass
@@ -42,6 +43,7 @@ class Flight:
             # The previous list was longer; its last records are still in the EEPROM.
             self.bench.upload([waypoint(90 + number) for number in range(12)])
         self.bench.upload([unpack_waypoint(b"\0" + record.pack())[1] for record in records])
+        self._last = records[-1]
         self.bench.faults.armed, self.bench.faults.boxes = True, SWITCH[kind]
         self.legs: list[Leg] = []
         self.end = self._fly()
@@ -101,7 +103,12 @@ class Flight:
             if speed > USUAL_MS + 0.1:
                 words.append(f"({speed:g} m/s)")
         at = f" at {self._height():g} m" if self.end == "hovers" and abs(self._height() - USUAL_M) > 0.5 else ""
-        return " ".join([*words, self.end]) + at
+        return " ".join([*words, self.end]) + at + " short of it" * (self.end == "hovers" and self._is_short())
+
+    def _is_short(self) -> bool:
+        truth = self.bench.board.truth(self.bench.now)
+        assert truth is not None
+        return self._last.action in LEGS and distance_m(truth.flight, self._last) > SHORT_M
 
 
 @pytest.mark.parametrize("kind", ["inav", "multiwii"])

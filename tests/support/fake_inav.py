@@ -126,9 +126,9 @@ class FakeMultiwii(FakeInav):
         return flown
 
 
-def nav_config(capacity: int, safe_wp_distance: int = 500, nav_max_altitude: int = 100) -> bytes:
-    """MSP_NAV_CONFIG, with metres."""
-    return struct.pack("<4xHH12xBx", safe_wp_distance, nav_max_altitude, capacity)
+def nav_config(capacity: int, safe_wp_distance: int = 500, nav_max_altitude: int = 100, wp_radius: int = 200) -> bytes:
+    """MSP_NAV_CONFIG; the radius is in cm, the others in m."""
+    return struct.pack("<2xHHH12xBx", wp_radius, safe_wp_distance, nav_max_altitude, capacity)
 
 
 def lossy(rate: float, seed: int) -> Callable[[MspFrame], str]:

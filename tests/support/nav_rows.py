@@ -90,6 +90,12 @@ ROWS = (
     Row("LAND without a position", (ONE, act(Command.NAV_LAND)), "1 2 lands", "1 2 lands"),
     Row("TAKEOFF", (act(Command.NAV_TAKEOFF), ONE, TWO), "1 2 hovers", "1 2 hovers"),
     Row("ROI", (ONE, leg(4, Command.NAV_ROI), TWO), "1 3 hovers", "1 3 hovers"),
+    Row(
+        "ROI on the next leg",
+        (ONE, leg(3, Command.NAV_ROI), leg(5), leg(7)),
+        "1 3 4 hovers",
+        "1 3 4 hovers short of it",
+    ),
     Row("DO_SET_ROI", (ONE, leg(4, Command.DO_SET_ROI), TWO), "1 3 hovers", "1 3 hovers"),
     Row("DO_SET_ROI_LOCATION", (ONE, leg(4, Command.DO_SET_ROI_LOCATION), TWO), "1 3 hovers", "1 3 hovers"),
     Row("DO_SET_ROI_LOCATION, last", (ONE, TWO, leg(4, Command.DO_SET_ROI_LOCATION)), "1 2 hovers", "1 2 hovers"),

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
+from bridge.controllers.nav.rules import LegLimits
 from bridge.line.conversation import Conversation, LinkLost, ask
 from bridge.missions.fc_mission_store import PushProgress, PushResult, StoreReport
 from protocols.msp.frame import request
@@ -35,7 +36,7 @@ class MultiwiiMissions(NavMissions):
         config = yield from ask(request(Nav.NAV_CONFIG), Nav.NAV_CONFIG, NAV_CONFIG_SIZE)
         limits = None if config is None else decode_nav_limits(config.payload)
         if limits is not None:
-            self._profile = replace(self._profile, stops_at_m=limits[0], highest_m=limits[1])
+            self._profile = replace(self._profile, limits=LegLimits(*limits))
         return (yield from super().report())
 
     def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult]:

@@ -9,6 +9,7 @@ from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, land
 from bridge.controllers.nav.items import home_item, items_from_records, leg_speed
 from bridge.controllers.nav.jumps import Jumps
 from bridge.controllers.nav.landing import placed_landing
+from bridge.controllers.nav.leg_limits import limited_legs
 from bridge.controllers.nav.leg_speed import LegSpeed
 from bridge.controllers.nav.rules import (
     HOLD,
@@ -34,16 +35,14 @@ from bridge.missions.list_check import (
     refuse_position,
 )
 from bridge.model.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
-from bridge.model.ground_track import distance_m
 from bridge.model.verdict import Result, Verdict
 from protocols.float32 import is_single
 from protocols.mission_item import Command, MissionItem, MissionResult
-from protocols.msp.nav import LAST, LEGS, NavAction, NavRecord
+from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
 
 #: The greatest height at which single precision still resolves a centimetre.
 _MAX_HEIGHT_CM = 3_276_700
 _FULL_CIRCLE = 360
-_TURNS = (NavAction.SET_POI, NavAction.SET_HEAD)
 #: DO_CHANGE_SPEED's param3 without a throttle: none, no change, as set.
 _NO_THROTTLE = (0, -1, -2)
 
@@ -236,7 +235,7 @@ class NavCheck(ListCheck):
         if lost := self._speed.waiting:
             self._drop(lost, "command", lost.command, "no leg follows")
         if not self._profile.ends_on_any_record:
-            legs = [place for place, record in enumerate(self._records) if record.action not in _TURNS]
+            legs = [place for place, record in enumerate(self._records) if record.action not in TURNS]
             self._cut(legs[-1] + 1, "the mission would not end after it")
         self._cut(flown_size(self._records), "never flown: the RTL before it ends the mission")
         return self._refuse_without_legs() or self._refuse_as_flown()
@@ -259,7 +258,9 @@ class NavCheck(ListCheck):
         if self._profile.jumps_back_only and (place := jump_within_jump(self._records)) is not None:
             why = "a jump inside another jump's loop never ends"
             return reject(MissionResult.INVALID_PARAM1, self._sent[place], "p1", why)
-        self._warn_of_limits()
+        if self._profile.limits is not None:
+            for place, name, why in limited_legs(self._records, self._profile.limits):
+                self._warn(self._sent[place], name, why)
         for item, record in zip(self._sent, self._records, strict=True):
             lands = record.p1 > 0
             if record.action != NavAction.RTH or self._profile.own_rth_landing:
@@ -271,21 +272,6 @@ class NavCheck(ListCheck):
             if place < len(self._records) and self._speed_differs(place, item):
                 self._warn(item, "p1", "later legs are flown at their own speeds again")
         return None
-
-    def _warn_of_limits(self) -> None:
-        """Warn about legs that are too high or too long for the board's settings."""
-        highest_m, stops_at_m = self._profile.highest_m, self._profile.stops_at_m
-        before: NavRecord | None = None
-        for item, record in zip(self._sent, self._records, strict=True):
-            target = self._records[record.p1 - 1] if record.action == NavAction.JUMP else record
-            if highest_m is not None and record.action not in _TURNS and record.alt_cm > 100 * highest_m:
-                self._warn(item, "alt_m", f"flown at {highest_m} m, the board's nav_max_altitude")
-            if target.action not in LEGS:
-                continue
-            if stops_at_m is not None and before is not None and distance_m(before, target) >= stops_at_m:
-                self._warn(item, "lat_e7", f"{stops_at_m} m or more from the waypoint before: the mission stops there")
-            if record is target:
-                before = record
 
     def _speed_differs(self, place: int, jump: MissionItem) -> bool:
         """True if a pilot expects another speed after a JUMP than its target's own."""

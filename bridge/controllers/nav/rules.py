@@ -23,6 +23,15 @@ ROI_COMMANDS = (Command.NAV_ROI, Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI
 
 
 @dataclass(frozen=True, slots=True)
+class LegLimits:
+    """MultiWii's wp_radius, safe_wp_distance (it stops before a leg of this length) and nav_max_altitude."""
+
+    radius_cm: int
+    stops_at_m: int
+    highest_m: int
+
+
+@dataclass(frozen=True, slots=True)
 class NavProfile:
     """The differences between INAV and MultiWii NAV.
 
@@ -30,8 +39,7 @@ class NavProfile:
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
     must go back, and its loop contain no other; else it may go to any leg not next to it. longest_hold: seconds.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
-    decides if it lands; else the last record's p1 does. stops_at_m: a mission stops before a leg of this length,
-    metres. highest_m: it flies no higher above home, metres. None: unlimited.
+    decides if it lands; else the last record's p1 does. limits: of its legs; None: unlimited.
     """
 
     name: str
@@ -44,8 +52,7 @@ class NavProfile:
     longest_hold: Range
     ends_on_any_record: bool
     own_rth_landing: bool
-    stops_at_m: int | None = None
-    highest_m: int | None = None
+    limits: LegLimits | None = None
 
     @property
     def max_items(self) -> int:
@@ -84,8 +91,7 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         ends_on_any_record=False,
         own_rth_landing=True,
         # Its defaults; a board reports its own (NAV_CONFIG).
-        stops_at_m=500,
-        highest_m=100,
+        limits=LegLimits(radius_cm=100, stops_at_m=500, highest_m=100),
     )
 
 
