@@ -51,7 +51,7 @@ class NorFlash:
         self._end(self.read(offset, len(data)) == data)
 
     def take_busy_seconds(self) -> float:
-        """The time for which the chip has stalled the CPU since the last call."""
+        """How long the chip has stalled the CPU since the last call."""
         seconds, self._busy_seconds = self._busy_seconds, 0.0
         return seconds
 

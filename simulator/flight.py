@@ -58,7 +58,7 @@ class Craft:
 
 
 def fly(uptime: float, flown: float, armed: bool) -> FlightState:
-    """The state `uptime` seconds after boot, of which the craft was armed for `flown`."""
+    """The state `uptime` seconds after boot, after `flown` seconds armed."""
     # Metres north and east of the field's centre, on a circle that starts and ends there.
     angle = flown * _CRUISE_SPEED_MS / _CIRCLE_RADIUS_M
     north = _CIRCLE_RADIUS_M * math.sin(angle)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two flash slots for the mission, of which the newest valid one is used, and the configuration's page.
+"""Two flash slots for the mission, the newest valid one in use, and the configuration's page.
 
 The layout is that of firmware/naze_mission.h: a header, then the records. The header is programmed after them, its
 seal last: until then the other slot is the list. Staging needs no RAM.

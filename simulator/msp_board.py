@@ -23,7 +23,7 @@ _UNKNOWN_COMMAND = b"### ERROR: Unknown command, try 'help'"
 _CLI_LEFT = b"\r\nLeaving CLI mode, unsaved changes lost.\r\nRebooting"
 _CLI_LINE_SIZE = 64
 _NO_SPEED = 115200
-#: The interval at which the pilot retries a refused arming.
+#: How often the pilot retries a refused arming.
 _ARM_RETRY_S = 0.1
 
 

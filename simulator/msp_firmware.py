@@ -77,7 +77,7 @@ class MspFirmware(ABC):
         """The reply frame, or None for silence."""
 
     def take_busy_seconds(self) -> float:
-        """The time for which the firmware has been blocked since the last call."""
+        """How long the firmware has been blocked since the last call."""
         busy, self._busy = self._busy, 0.0
         return busy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii's commands and telemetry replies, in which INAV, Betaflight and baseflight differ only in details."""
+"""MultiWii's commands and telemetry replies; INAV's, Betaflight's and baseflight's differ only in details."""
 
 import struct
 from collections.abc import Mapping

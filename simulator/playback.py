@@ -93,7 +93,7 @@ class CapturePlayer:
 
     @property
     def outages(self) -> list[tuple[float, float]]:
-        """The times at which the port was closed and opened again, in seconds from the start of the replay."""
+        """When the port was closed and opened again, in seconds from the start of the replay."""
         return [(closed / self._tempo, opened / self._tempo) for closed, opened in self._outages]
 
     def power_on_booted(self, now: float) -> None:

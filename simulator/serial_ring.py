@@ -39,5 +39,5 @@ class SerialRing(ReceiveRing):
         return bytes(out)
 
     def next_departure(self) -> float | None:
-        """The time at which the next frame is completely sent."""
+        """When the next frame is completely sent."""
         return self._leaving[0][0] if self._leaving else None

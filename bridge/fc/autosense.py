@@ -52,7 +52,7 @@ class Phase(Enum):
 
 
 class Spoken(Enum):
-    """The protocols that a flight controller may speak, and its command line, in which it answers none of them."""
+    """The protocols that a flight controller may speak; in its command line it answers none of them."""
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
@@ -77,7 +77,7 @@ class Found:
 def visit_order(
     speeds: Sequence[int | None], good: Sequence[int | None], first: Sequence[int | None]
 ) -> Iterator[int | None]:
-    """Yield speeds forever: `first` once, then the good ones, to which a board returns, before each of the others."""
+    """Yield speeds forever: `first` once, then the good ones, as a board returns to them, before each of the others."""
     yield from first
     others = cycle(speed for speed in speeds if speed not in good)
     while True:

@@ -39,7 +39,7 @@ class TokenBucket:
 
 
 class Shares:
-    """A budget for many accounts, in which uses are forgotten exponentially.
+    """A budget for many accounts; uses decay exponentially.
 
     `rate.burst` uses at once; of these, at most `rate.per_s` are regained in a second.
     """

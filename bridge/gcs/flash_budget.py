@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits the writes to the flight controller's flash, a page of which endures 10,000. Sans-IO.
+"""Limits the writes to the flight controller's flash, whose pages endure 10,000 each. Sans-IO.
 
 All ground stations on open links together get 160 writes at once and 12 an hour: to wear out a page, strangers would
 have to write for three weeks. A Harakiri with the mission extension has a limit of its own (docs/msp-mission.md).

@@ -84,7 +84,7 @@ class MspLink:
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
         self._parser = MspParser()
         self._waiting: deque[Send] = deque()
-        self._sent: list[_Request] = []  # in the order in which they went out
+        self._sent: list[_Request] = []  # in sending order
         if owed:
             self._sent.append(
                 _Request(_NO_COMMAND, owed, now, now + owed * self.byte_s, exclusive=False, awaited=False)
@@ -185,7 +185,7 @@ class MspLink:
         return replies
 
     def reply_deadline(self, commands: frozenset[int], now: float) -> float:
-        """The time at which a reply to one of `commands` counts as lost."""
+        """When a reply to one of `commands` counts as lost."""
         deadlines = [sent.deadline for sent in self._sent if sent.awaited and sent.command in commands]
         queued = any(message.command in commands for message in self._waiting)
         return max(deadlines, default=now + self._timeout_s() if queued else now)

@@ -110,7 +110,7 @@ class _Slot:
         self.due = self.asked_at + self.interval_s
 
     def may_be_asked_at(self, link: MspLink, room: int) -> float:
-        """The time at which the link would take it; infinity if the link must change first."""
+        """When the link would take it; infinity if the link must change first."""
         if self.is_asked and link.awaits(self.commands):
             return inf
         if self.size <= room:

@@ -45,7 +45,7 @@ class Task(Generic[T]):
 
 
 class Runner:
-    """Runs conversations in the order in which they were started. Time is passed in.
+    """Runs conversations in the order they were started. Time is passed in.
 
     Effects for the store are kept for `take_store_effects`; the reply comes back through `store_answered`.
     """
@@ -67,7 +67,7 @@ class Runner:
 
     @property
     def needs_line(self) -> bool:
-        """True while a conversation runs or waits for which telemetry should make room."""
+        """True while a conversation that telemetry should make room for runs or waits."""
         return self._current is not None and (not self._current.in_background or bool(self._queue))
 
     def start(

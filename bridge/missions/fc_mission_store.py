@@ -86,7 +86,7 @@ class FcMissionStore(ABC, Generic[RecordT]):
 
     #: True if its list can be read while the craft is armed.
     reads_armed: bool = False
-    #: The interval at which `is_current` should be asked.
+    #: How often to ask `is_current`, s.
     watch_s: float = 1.0
     #: Further missions in its store, as last read. Only one mission at a time is loaded and flown.
     others: tuple[tuple[RecordT, ...], ...] = ()

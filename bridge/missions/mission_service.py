@@ -143,7 +143,7 @@ class MissionService:
 
     @property
     def watch_s(self) -> float:
-        """The interval at which `is_outdated` should be asked; infinity without a store."""
+        """How often to ask `is_outdated`, s; infinity without a store."""
         return inf if self.fc_store is None else self.fc_store.watch_s
 
     def seq_of(self, number: int) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kind of aircraft, by which ground stations choose their screens and mode names."""
+"""The kind of aircraft; ground stations choose their screens and mode names by it."""
 
 from collections.abc import Mapping
 from enum import IntEnum

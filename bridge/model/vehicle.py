@@ -28,7 +28,7 @@ _EARLIEST_UNIX_S = 1_577_836_800
 
 
 class Source(Enum):
-    """The protocol in which a reading was heard."""
+    """The protocol of a reading."""
 
     MSP = "MSP"
     MAVLINK = "MAVLink"

@@ -32,7 +32,7 @@ _TICK_S = 1.0
 _POLLS_INTERVAL_S = 0.25
 #: Mission Planner needs two heartbeats to connect.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
-#: The minimum interval at which home and arming blockers are repeated for newcomers.
+#: Home and arming blockers are repeated for newcomers at most this often, s.
 _REPEAT_S = 5.0
 #: Without a reading for this long, SYS_STATUS is sent anyway, to report that nothing is known.
 _SILENT_S = 3.0
@@ -279,7 +279,7 @@ class OwnVehicle:
 
 
 def _stale_ages_s(line_interval_s: Callable[[Msp], float]) -> dict[type[Reading], float]:
-    """The ages from which readings are stale, where the line is too slow to ask for them every second."""
+    """The maximum ages of readings, where the line is too slow to ask for them every second."""
     intervals = {reading: line_interval_s(poll) for reading, poll in POLL_FOR.items()}
     return {reading: STALE_S * interval_s for reading, interval_s in intervals.items() if interval_s > 1.0}
 

@@ -67,7 +67,7 @@ class VehicleReporter:
         self._missions = missions
         self._ground = ground
         self._want = want
-        #: The time to which ages refer, monotonic s.
+        #: Ages count up to this time, monotonic s.
         self.now = 0.0
         #: Groups updated since the last `take_fresh`, some of which may no longer be watched.
         self.fresh: set[Group] = set()

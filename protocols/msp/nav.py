@@ -92,14 +92,14 @@ class NavInfo:
 
 
 class NavMode(IntEnum):
-    """The modes in MSP_NAV_STATUS in which a mission is flown."""
+    """The modes in MSP_NAV_STATUS while a mission is flown."""
 
     RTH = 2
     MISSION = 3
 
 
 class NavState(IntEnum):
-    """The states in MSP_NAV_STATUS in which the craft has arrived; in the others it is on its way."""
+    """The states in MSP_NAV_STATUS after the craft has arrived; in the others it is on its way."""
 
     HOLD_TIMED = 4
     LAND_IN_PROGRESS = 9

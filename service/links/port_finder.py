@@ -90,7 +90,7 @@ class PortFinder:
         self._memory.close()
 
     def event(self, event: str) -> None:
-        """Remember the port on which a flight controller was found; wait for a lost one to come back."""
+        """Remember the flight controller's port; wait for a lost one to come back."""
         if self._present is None:
             return
         if event in ("fc.found", "fc.in_command_line"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The serial ports on which `fc = "auto"` looks for a flight controller."""
+"""The serial ports that `fc = "auto"` searches for a flight controller."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ class SerialPort:
 
 
 def serial_ports(host: Host) -> list[SerialPort]:
-    """The candidates present, in the order in which they are tried: header first, then USB."""
+    """The candidates present, in the order they are tried: header first, then USB."""
     found = []
     model = pi_model(host)
     header = model.header_uart if model else "/dev/serial0"

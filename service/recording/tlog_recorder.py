@@ -83,5 +83,5 @@ class TlogRecorder:
         return found
 
     def _present_epoch_us(self) -> int:
-        """The time at which the monotonic clock was 0, microseconds since the Unix epoch."""
+        """When the monotonic clock was 0, microseconds since the Unix epoch."""
         return (self._read_clock() - time.monotonic_ns()) // 1000

@@ -103,7 +103,7 @@ def _flat(tables: Mapping[str, Any]) -> Iterable[tuple[tuple[str, ...], Any]]:
 
 
 def key_lines(text: str) -> Mapping[Keys, int]:
-    """The lines, from 1, in which tables and the keys in them are first named in a valid file.
+    """The line, from 1, that first names each table and each key in a valid file.
 
     The parser of the standard library does not provide them.
     """

@@ -39,7 +39,7 @@ class MissionWriter:
         self.state: Json | None = None
 
     def begin(self, what: str, write: Callable[[Progress], Awaitable[Json]]) -> str:
-        """Start writing; returns the write's id, by which the page knows its own result. Refused while one runs."""
+        """Start writing; returns the write's id: the page finds its own result by it. Refused while one runs."""
         if self._task is not None and not self._task.done():
             raise HTTPException(HTTPStatus.CONFLICT, "Another mission is being written: wait until it has finished.")
         state: Json = {"id": secrets.token_hex(8), "what": what, "records": 0, "done": False, "ok": False, "text": ""}

@@ -2,7 +2,7 @@
 """A cache of long responses, made in a thread, one at a time.
 
 That thread holds the interpreter for some milliseconds. So there is a pause after each response, however many
-connections ask for one, in which the loop can serve the links.
+connections ask for one, so that the loop can serve the links.
 """
 
 import asyncio

@@ -40,7 +40,7 @@ class CommandQueries:
 
     async def _upload(self, question: Question) -> Json:
         items = await _items(question)
-        # A file of which nothing can be stored must not erase the missions of a fleet.
+        # A file without a storable item must not erase the missions of a fleet.
         return _end(await self._api.push(items, "zenoh upload", _teller(question, len(items)), may_erase=False))
 
     async def _check(self, question: Question) -> Json:

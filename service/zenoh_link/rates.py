@@ -28,7 +28,7 @@ _CHANGES: Mapping[Group, Mapping[str, float]] = {
 }
 #: Changes that are sent at once.
 _AT_ONCE = {Group.STATUS: ("armed", "mode"), Group.GPS: ("fix",), Group.LINK: ("state", "flight_controller")}
-#: Groups with this interval or more share packets, each of which costs 100 bytes of headers.
+#: Groups with this interval or more share packets: each packet costs 100 bytes of headers.
 GATHERED_FROM_S = 1.0
 #: A subscriber's request expires, because the owner pays for the data.
 MAX_REQUEST_S = 3600.0

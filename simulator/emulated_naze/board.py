@@ -16,7 +16,7 @@ from simulator.simulated_board import Power, SimulatedBoard
 
 #: From power on to the main loop, without a GPS module.
 BOOT_S = 8.0
-#: The interval at which a client's bytes are exchanged.
+#: How often a client's bytes are exchanged.
 _STEP_S = 0.002
 _STICK_LOW_US, _STICK_HIGH_US = 1000, 2000
 
@@ -54,7 +54,7 @@ class EmulatedNaze(SimulatedBoard):
         self._chip.flash_controller.on_power_cut = self._on_power_cut
         self._memory = HarakiriMemory(image, self._chip.cpu, flash)
         self._longest_step_s = longest_step_s
-        # The callers' time at which the chip's clock was zero.
+        # The callers' time when the chip's clock was zero.
         self._offset_s = 0.0
         self._lost_power = False
 

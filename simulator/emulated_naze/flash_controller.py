@@ -37,7 +37,7 @@ class FlashController:
         self._tear = tear
         self._faults = faults
         self._counters = counters
-        #: Called in the middle of the operation in which the power fails.
+        #: Called in the middle of the operation that a power failure interrupts.
         self.on_power_cut: Callable[[], None] = lambda: None
         self.reset()
 

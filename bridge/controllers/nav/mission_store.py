@@ -62,7 +62,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
     #: True if storing a record stalls it.
     _stores_slowly = False
     watch_s = 0.25
-    #: The list that was compared last, the ones before it, and the records by which they differ from it.
+    #: The list that was compared last, the ones before it, and the records that differ between them.
     _watched: tuple[NavRecord, ...] = ()
     _former: tuple[tuple[NavRecord, ...], ...] = ()
     _telling: frozenset[int] = frozenset()

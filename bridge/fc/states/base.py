@@ -70,7 +70,7 @@ class Port:
     polls: PollSchedule = field(default_factory=PollSchedule)
     vehicle: Vehicle = field(default_factory=Vehicle)
     output: list[bytes] = field(default_factory=list)
-    #: The last two speeds at which the board was found, the older first: a Harakiri that arms may change its speed,
+    #: The speeds of the last two finds of the board, the older first: a Harakiri that arms may change its speed,
     #: and disarmed it comes back.
     good_speeds: deque[int | None] = field(default_factory=lambda: deque(maxlen=2))
     #: The family of the board that was last identified over MSP on this port.

@@ -37,7 +37,7 @@ _LAST_CHECK_S = 64.0
 
 
 class MspLine(State):
-    """A line on which MSP is answered: common to identifying and to the time after it."""
+    """A line with MSP replies: common to identifying and to the time after it."""
 
     link: MspLink
 

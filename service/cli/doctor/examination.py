@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of checks, in the order in which their problems should be fixed."""
+"""The checks, in the order to fix their problems."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence

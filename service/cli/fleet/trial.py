@@ -79,7 +79,7 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
 
 
 def _finding(data: object) -> Finding:
-    """Read a finding, of which a vehicle's newer version may have more fields."""
+    """Read a finding, which may have more fields if the vehicle's version is newer."""
     found = data if isinstance(data, dict) else {}
     was, becomes = (text(found, name) or number(found, name) for name in ("was", "becomes"))
     news = next((each for each in News if each == part(found, "news")), News.NOTICE)

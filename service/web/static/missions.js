@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The stored missions: the latest upload, and a list in which each mission opens below its own row.
+// The stored missions: the latest upload, and a list; each mission opens below its own row.
 import "./compare.js";
 import { byId, make, setClass, setText } from "./dom.js";
 import { ask, tell } from "./daemon.js";
