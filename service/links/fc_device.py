@@ -6,6 +6,7 @@ import os
 import socket
 import termios
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Protocol
 
 import serial
@@ -41,7 +42,7 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
 
         return open_path
     if isinstance(address, TcpFc):
-        return lambda: _open_tcp(address.host, address.port)
+        return partial(_open_tcp, address)
     # Imported only here: a daemon on a real flight controller does not need a simulator in memory.
     from simulator.naze import SimulatedNaze
     from simulator.pipe_link import SimLink
@@ -70,19 +71,19 @@ def open_serial(path: str) -> serial.Serial:
     return port
 
 
-async def _open_tcp(host: str, port: int) -> socket.socket:
-    family = family_of(host)
+async def _open_tcp(address: TcpFc) -> socket.socket:
+    family = family_of(address.host)
     connection = socket.socket(family, socket.SOCK_STREAM)
     connection.setblocking(False)
     loop = asyncio.get_running_loop()
     try:
         async with asyncio.timeout(_TCP_TIMEOUT_S):
-            found = await loop.getaddrinfo(host, port, family=family, type=socket.SOCK_STREAM)
+            found = await loop.getaddrinfo(address.host, address.port, family=family, type=socket.SOCK_STREAM)
             await loop.sock_connect(connection, found[0][4])
     except (OSError, TimeoutError) as error:
         connection.close()
         reason = error.strerror or str(error) or "no answer"
         hint = f"; {UNKNOWN_HOST_HINT}" if isinstance(error, socket.gaierror) else ""
-        raise PortError(f"tcp:{host}:{port} cannot be reached: {reason}{hint}") from error
+        raise PortError(f"{address} cannot be reached: {reason}{hint}") from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return connection

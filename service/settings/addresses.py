@@ -41,7 +41,7 @@ class TcpFc:
     port: int
 
     def __str__(self) -> str:
-        return f"tcp:{self.host}:{self.port}"
+        return f"tcp:{host_port(self.host, self.port)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +64,7 @@ class GcsAddress:
     port: int
 
     def __str__(self) -> str:
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"{self.kind}:{host}:{self.port}"
+        return f"{self.kind}:{host_port(self.host, self.port)}"
 
 
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
@@ -167,6 +166,11 @@ def client_hosts(listening: str, own: Sequence[str]) -> Sequence[str]:
 def is_any_address(host: str) -> bool:
     """True for the addresses that stand for all of a machine's own."""
     return host in ("", "0.0.0.0", "::")  # noqa: S104
+
+
+def host_port(host: str, port: int) -> str:
+    """The text that `parse_host_port` reads: an IPv6 address is in brackets."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:

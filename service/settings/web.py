@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.settings.addresses import parse_host_port
+from service.settings.addresses import host_port, parse_host_port
 
 DEFAULT_LISTEN = "127.0.0.1:8080"
 _FORMS = 'write "0.0.0.0:8080" for the whole network, "127.0.0.1:8080" for this machine only'
@@ -18,8 +18,7 @@ class ListenAddress:
     port: int = 8080
 
     def __str__(self) -> str:
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"{host}:{self.port}"
+        return host_port(self.host, self.port)
 
 
 @dataclass(frozen=True, slots=True)
