@@ -7,6 +7,7 @@ Neither the event loop nor the end of the process waits for the disk.
 import asyncio
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import suppress
 from queue import SimpleQueue
 from typing import TypeVar, TypeVarTuple
@@ -35,27 +36,17 @@ class DiskThread:
 
     async def ask(self, work: Callable[[], T]) -> T:
         """Queue a job that may raise, and return its result. Called on an event loop."""
-        loop = asyncio.get_running_loop()
-        answered: asyncio.Future[T] = loop.create_future()
-
-        def settle(answer: T | None, error: Exception | None) -> None:
-            if answered.done():
-                return
-            if error is None:
-                answered.set_result(answer)  # type: ignore[arg-type]
-            else:
-                answered.set_exception(error)
+        answer: Future[T] = Future()
 
         def run() -> None:
-            answer, failure = None, None
-            try:
-                answer = work()
-            except Exception as error:
-                failure = error
-            post(loop, settle, answer, failure)
+            if answer.set_running_or_notify_cancel():  # the asker still waits
+                try:
+                    answer.set_result(work())
+                except Exception as error:
+                    answer.set_exception(error)
 
         self.submit(run)
-        return await answered
+        return await asyncio.wrap_future(answer)
 
     def close(self, timeout_s: float) -> bool:
         """Run the remaining jobs and end; False on timeout."""

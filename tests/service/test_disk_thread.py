@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Work on a disk that hangs."""
 
+import asyncio
 import threading
+
+import pytest
 
 from service.machine.threads import DiskThread
 
@@ -22,3 +25,22 @@ def test_the_end_does_not_wait_for_a_hung_disk() -> None:
     assert not thread.close(timeout_s=0.05)
     hangs.set()
     assert thread.close(timeout_s=10)
+
+
+async def test_a_question_gets_its_answer_or_its_error() -> None:
+    thread = DiskThread("test")
+    assert await thread.ask(lambda: 7) == 7
+    with pytest.raises(ZeroDivisionError):
+        await thread.ask(lambda: 1 / 0)
+    thread.close(timeout_s=10)
+
+
+async def test_a_cancelled_question_does_not_end_the_thread() -> None:
+    hangs = threading.Event()
+    thread = DiskThread("test")
+    for _ in range(2):  # one runs, one waits
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(thread.ask(hangs.wait), 0.01)
+    hangs.set()
+    assert await thread.ask(lambda: 7) == 7
+    thread.close(timeout_s=10)
