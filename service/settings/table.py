@@ -2,12 +2,13 @@
 """The table of all settings, used by the reader, the sample file, the reference page and the environment."""
 
 import re
+from functools import partial
 from pathlib import Path
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.model.autopilot import Autopilot
 from service.settings.addresses import parse_fc
-from service.settings.key import Key, Reader, Unfit, choice, file_name, several, table, text, whole, yes_no
+from service.settings.key import Key, Unfit, choice, file_name, several, table, text, whole, yes_no
 from service.settings.settings import (
     DEFAULT_GCS,
     DEFAULT_LOG_LEVEL,
@@ -22,14 +23,6 @@ from service.settings.zenoh import DEFAULT_PREFIX, I_KNOW, PayloadEncoding, Zeno
 
 LOG_LEVELS = ("debug", "info", "warning", "error")
 _LIMITS = TlogLimits()
-
-
-def _name(key: str) -> Reader:
-    def parse(name: str) -> str:
-        check_name(key, name)
-        return name
-
-    return text(parse=parse)
 
 
 def _endpoint(entry: object, _folder: Path) -> str:
@@ -118,10 +111,15 @@ KEYS = (
         f'"{DEFAULT_LOG_LEVEL}"',
         is_live=True,
     ),
-    Key("zenoh.prefix", _name("prefix"), "First chunk of all zenoh keys.", f'"{DEFAULT_PREFIX}"'),
+    Key(
+        "zenoh.prefix",
+        text(parse=partial(check_name, "prefix")),
+        "First chunk of all zenoh keys.",
+        f'"{DEFAULT_PREFIX}"',
+    ),
     Key(
         "zenoh.vehicle",
-        _name("vehicle"),
+        text(parse=partial(check_name, "vehicle")),
         "This vehicle's name, the second chunk; unique within a fleet. By default the host's name.",
         example='"naze-1"',
     ),

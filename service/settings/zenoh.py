@@ -66,10 +66,6 @@ class ZenohSettings:
     commands_without_authentication: str = ""
     mavlink_in: bool = False
 
-    def __post_init__(self) -> None:
-        check_name("prefix", self.prefix)
-        check_name("vehicle", self.vehicle)
-
 
 def check_rates(rates: object) -> dict[str, float]:
     """Read rates in Hz by the groups' names, and "state"; ZenohSettingsError."""
@@ -83,8 +79,8 @@ def check_rates(rates: object) -> dict[str, float]:
     return {name: float(hz) for name, hz in rates.items()}
 
 
-def check_name(setting: str, name: str) -> None:
-    """ZenohSettingsError if a name cannot be one chunk of a key."""
+def check_name(setting: str, name: str) -> str:
+    """The name; ZenohSettingsError if it cannot be one chunk of a key."""
     bad = _FORBIDDEN.search(name)
     if not name:
         wrong = "empty"
@@ -95,5 +91,5 @@ def check_name(setting: str, name: str) -> None:
     elif len(name) > _MAX_NAME:
         wrong = f"longer than {_MAX_NAME} letters"
     else:
-        return
+        return name
     raise ZenohSettingsError(f'zenoh.{setting} is {wrong}: make a name of letters, digits and dashes, as "naze-1"')
