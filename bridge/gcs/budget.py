@@ -4,12 +4,9 @@
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable
 from math import exp
-from typing import TypeVar
 
 from bridge.gcs.cost import LIMITS, Cost, Rate
 from bridge.gcs.station import Peer
-
-K = TypeVar("K", bound=Hashable)
 
 #: The number of accounts for hosts: forged ones cannot use more memory.
 _ACCOUNTS = 1024
@@ -89,8 +86,8 @@ class Budgets:
 
     def __init__(self, has_standing: Callable[[Peer], bool]) -> None:
         self._has_standing = has_standing
-        self._peers: dict[tuple[Cost, Peer], TokenBucket] = {}
-        self._hosts: dict[tuple[Cost, int], TokenBucket] = {}
+        #: By cost and peer, or the account of its host.
+        self._buckets: dict[tuple[Cost, Peer | int], TokenBucket] = {}
         #: The account of each host, the host heard least recently first.
         self._accounts: OrderedDict[Hashable, int] = OrderedDict()
         self._totals = {cost: Shares(limit.total) for cost, limit in LIMITS.items()}
@@ -99,11 +96,11 @@ class Budgets:
 
     def allows(self, cost: Cost, peer: Peer, now: float) -> bool:
         """Count one for a peer; False if that exceeds a limit."""
-        if self._has_standing(peer):
-            bucket, account = _bucket(self._peers, (cost, peer), cost), None
-        else:
-            account = self._account(peer.host)
-            bucket = _bucket(self._hosts, (cost, account), cost)
+        account = None if self._has_standing(peer) else self._account(peer.host)
+        key = cost, peer if account is None else account
+        bucket = self._buckets.get(key)
+        if bucket is None:
+            bucket = self._buckets[key] = TokenBucket(LIMITS[cost].each)
         total = self._totals[cost]
         if not (bucket.has(now) and (account is None or total.left(now) > total.used(account))):
             self.exceeded[cost] += 1
@@ -125,12 +122,6 @@ class Budgets:
     def keep(self, peers: Iterable[Peer]) -> None:
         """Forget peers that are gone."""
         present = set(peers)
-        for key in [key for key in self._peers if key[1] not in present]:
-            del self._peers[key]
-
-
-def _bucket(buckets: dict[K, TokenBucket], key: K, cost: Cost) -> TokenBucket:
-    bucket = buckets.get(key)
-    if bucket is None:
-        bucket = buckets[key] = TokenBucket(LIMITS[cost].each)
-    return bucket
+        gone = [key for key in self._buckets if isinstance(key[1], Peer) and key[1] not in present]
+        for key in gone:
+            del self._buckets[key]

@@ -94,22 +94,19 @@ class Ground:
     def everyone(self) -> Sequence[Peer]:
         """All peers that receive broadcasts."""
         if self._everyone is None:
-            self._everyone = self._count_everyone()
+            heard = self.stations.peers()
+            answered = {peer.link for peer in heard}
+            unheard = (
+                peer
+                for peer, until_answered in self._default_peers.items()
+                if peer not in heard and not (until_answered and peer.link in answered)
+            )
+            self._everyone = [*heard, *unheard]
         return self._everyone
 
     def unheard(self) -> list[Peer]:
         """The default peers that are not connected: nothing may be listening there."""
         return [peer for peer in self._default_peers if self.stations.is_unknown(peer)]
-
-    def _count_everyone(self) -> list[Peer]:
-        heard = self.stations.peers()
-        answered = {peer.link for peer in heard}
-        unheard = (
-            peer
-            for peer, until_answered in self._default_peers.items()
-            if peer not in heard and not (until_answered and peer.link in answered)
-        )
-        return [*heard, *unheard]
 
     def gone(self, peer: Peer) -> None:
         """A ground station's connection is closed."""

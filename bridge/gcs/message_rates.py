@@ -69,10 +69,9 @@ class MessageRates:
     def keep(self, peers: Iterable[Peer], with_standing: Collection[Peer]) -> None:
         """Forget all other peers. `with_standing`: those whose share does not depend on the number of the others."""
         present = set(peers)
-        for peer in [peer for peer in self._requested if peer not in present]:
-            del self._requested[peer]
-        for peer in [peer for peer in self._shares if peer not in present]:
-            del self._shares[peer]
+        for peer in (self._requested.keys() | self._shares) - present:
+            self._requested.pop(peer, None)
+            self._shares.pop(peer, None)
         for key in [key for key in self._due if key[0] not in present]:
             del self._due[key]
         share, self._newcomers_share = _share(len(with_standing)), _share(len(present) - len(with_standing))

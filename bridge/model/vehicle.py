@@ -300,8 +300,6 @@ class Vehicle:
 
     def take_news(self) -> Set[type[Reading]]:
         """The kinds of readings heard since the last call."""
-        if not self._news:
-            return _NO_NEWS
         news, self._news = self._news, set()
         return news
 
@@ -339,6 +337,3 @@ class Vehicle:
                 self.home = replace(self.home, altitude_m=position.altitude_m)
             elif self.armed and height is not None and position.altitude_m is not None:
                 self.home = replace(self.home, altitude_m=position.altitude_m - height.height_m)
-
-
-_NO_NEWS: frozenset[type[Reading]] = frozenset()

@@ -40,6 +40,10 @@ _OF_A_TRANSFER = frozenset(
     }
 )
 
+_ENDS_DOWNLOAD = frozenset(
+    {m.MAVLINK_MSG_ID_MISSION_COUNT, m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL, m.MAVLINK_MSG_ID_MISSION_ACK}
+)
+
 _Handler = Callable[[Station, Message, float], None]
 
 
@@ -60,11 +64,11 @@ class MessageRouter:
         self._uploads = uploads
         self._downloads = downloads
         self._handlers: dict[int, _Handler] = {
-            m.MAVLINK_MSG_ID_MISSION_COUNT: self._mission_count,
+            m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
             m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: self._item(s, msg, item_from_float_message(msg), now),
             m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: self._item(s, msg, item_from_int_message(msg), now),
-            m.MAVLINK_MSG_ID_MISSION_ACK: self._mission_ack,
-            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
+            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
+            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, _, now: uploads.clear_all(s, now),
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.partial_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
@@ -104,6 +108,8 @@ class MessageRouter:
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
         if mission_type == m.MAV_MISSION_TYPE_MISSION or clears_all:
+            if msgid in _ENDS_DOWNLOAD:
+                self._downloads.forget(station)
             self._handlers[msgid](station, message, now)
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
@@ -119,18 +125,6 @@ class MessageRouter:
             self._ack(station, MissionResult.DENIED, m.MAV_MISSION_TYPE_MISSION)
         else:
             self._uploads.item(station, item, now)
-
-    def _mission_count(self, station: Station, message: Message, now: float) -> None:
-        self._downloads.forget(station)
-        self._uploads.count(station, message.count, now)
-
-    def _mission_clear(self, station: Station, message: Message, now: float) -> None:
-        self._downloads.forget(station)
-        self._uploads.clear_all(station, now)
-
-    def _mission_ack(self, station: Station, message: Message, now: float) -> None:
-        self._downloads.forget(station)
-        self._uploads.ack(station, message.type, now)
 
     def _set_current(self, station: Station, _message: Message, _now: float) -> None:
         self._ground.say(Severity.ERROR, "The current waypoint cannot be set", station)

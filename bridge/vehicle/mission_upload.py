@@ -92,11 +92,6 @@ class MissionUploads:
         self._arriving_since = self._last_end = -inf
 
     @property
-    def state(self) -> type[UploadState] | None:
-        """The state of the first upload; None if there is none."""
-        return type(self._uploads[0].state) if self._uploads else None
-
-    @property
     def receiving(self) -> MissionTransfer | None:
         """The upload that receives items."""
         for upload in self._uploads:

@@ -40,7 +40,9 @@ def holding(options: SimOptions | None = None, faults: Faults | None = None) -> 
 
 
 def state(world: World) -> type[UploadState] | None:
-    return world.bridge._uploads.state
+    """The state of the first upload; None if there is none."""
+    uploads = world.bridge._uploads._uploads
+    return type(uploads[0].state) if uploads else None
 
 
 def receiving(world: World, station: GroundStation, items: list[MissionItem], sent: int) -> None:
