@@ -251,7 +251,7 @@ class Vehicle:
     def hear(self, reading: Reading) -> None:
         """Store a reading in place of the previous one of its kind."""
         kind = type(reading)
-        if kind is Power:
+        if isinstance(reading, Power):
             reading = self._estimated(reading)
         before = self._readings.get(kind)
         self._readings[kind] = reading
@@ -264,14 +264,13 @@ class Vehicle:
         elif kind is GlobalPosition or kind is Height:
             self._place_home(has_armed=False)
 
-    def _estimated(self, reading: Reading) -> Reading:
+    def _estimated(self, power: Power) -> Power:
         """Fill in cells and remaining charge if the flight controller does not report them."""
-        assert isinstance(reading, Power)
-        if reading.voltage_v is None or reading.remaining_percent is not None:
-            return reading
+        if power.voltage_v is None or power.remaining_percent is not None:
+            return power
         # Never fewer than before: a discharging battery does not lose cells.
-        self._cells = max(self._cells, reading.cells or least_cells(reading.voltage_v))
-        return replace(reading, cells=self._cells, remaining_percent=remaining_percent(reading.voltage_v, self._cells))
+        self._cells = max(self._cells, power.cells or least_cells(power.voltage_v))
+        return replace(power, cells=self._cells, remaining_percent=remaining_percent(power.voltage_v, self._cells))
 
     def hear_home(self, lat_e7: int, lon_e7: int, altitude_m: float | None = None) -> None:
         """Take the flight controller's own home, degrees * 1e7. It has none while these are 0 or 190 degrees."""

@@ -99,9 +99,9 @@ class CommandService:
         else:
             self._actions.start(action, lambda outcome: self._acted(station, command, outcome), now)
 
-    def refuse_mode(self, station: Station) -> None:
-        """SET_MODE has no acknowledgement, so only a text is sent."""
-        self._ground.say(Severity.ERROR, _REFUSED[messages.MAV_CMD_DO_SET_MODE], station)
+    def refuse(self, station: Station, command: int) -> None:
+        """Give the reason for refusing a message that does the same as `command` but is not acknowledged."""
+        self._ground.say(Severity.ERROR, _REFUSED[command], station)
 
     def _acknowledge(self, station: Station, command: int, result: CommandResult) -> None:
         self._ground.to(
@@ -132,7 +132,7 @@ class CommandService:
         if command in _ASKS_FOR:
             return self._send_once(station, _ASKS_FOR[command])
         if command in _REFUSED:
-            self._ground.say(Severity.ERROR, _REFUSED[command], station)
+            self.refuse(station, command)
             return CommandResult.DENIED
         return CommandResult.UNSUPPORTED
 

@@ -44,7 +44,7 @@ _ENDS_DOWNLOAD = frozenset(
     {m.MAVLINK_MSG_ID_MISSION_COUNT, m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL, m.MAVLINK_MSG_ID_MISSION_ACK}
 )
 
-_Handler = Callable[[Station, Message, float], None]
+_Handler = Callable[[Station, Message, float], object]
 
 
 class MessageRouter:
@@ -61,6 +61,7 @@ class MessageRouter:
     ) -> None:
         self._ground = ground
         self._vehicle = vehicle
+        self._commands = commands
         self._uploads = uploads
         self._downloads = downloads
         self._handlers: dict[int, _Handler] = {
@@ -73,7 +74,9 @@ class MessageRouter:
             m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
             m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
             m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
-            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
+            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda s, _msg, _now: commands.refuse(
+                s, m.MAV_CMD_DO_SET_MISSION_CURRENT
+            ),
             m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
                 s,
                 msg.command,
@@ -84,8 +87,10 @@ class MessageRouter:
                 s, msg.command, (msg.param1, msg.param2, msg.param3, msg.param4, msg.x, msg.y, msg.z), now
             ),
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
-            m.MAVLINK_MSG_ID_SET_MODE: lambda s, _msg, _now: commands.refuse_mode(s),
-            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: self._autopilot_version,
+            m.MAVLINK_MSG_ID_SET_MODE: lambda s, _msg, _now: commands.refuse(s, m.MAV_CMD_DO_SET_MODE),
+            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, _now: vehicle.send_once(
+                s, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            ),
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: lambda s, _msg, _now: parameters.send_all(s),
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: lambda s, msg, _: parameters.send_one(
                 s, msg.param_id, msg.param_index
@@ -121,20 +126,14 @@ class MessageRouter:
 
     def _item(self, station: Station, message: Message, item: MissionItem, now: float) -> None:
         if message.current in _GUIDED and not self._uploads.is_writing(station):
-            self._ground.say(Severity.ERROR, "It is flown with the transmitter", station)
+            self._commands.refuse(station, m.MAV_CMD_NAV_WAYPOINT)
             self._ack(station, MissionResult.DENIED, m.MAV_MISSION_TYPE_MISSION)
         else:
             self._uploads.item(station, item, now)
 
-    def _set_current(self, station: Station, _message: Message, _now: float) -> None:
-        self._ground.say(Severity.ERROR, "The current waypoint cannot be set", station)
-
     def _data_stream(self, station: Station, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
         self._vehicle.set_stream(station.peer, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
-
-    def _autopilot_version(self, station: Station, _message: Message, _now: float) -> None:
-        self._vehicle.send_once(station, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
 
     def _ftp(self, station: Station, message: Message, _now: float) -> None:
         answer = refuse(message.payload)

@@ -108,10 +108,9 @@ class MissionUploads:
 
     def count(self, station: Station, count: int, now: float) -> None:
         """MISSION_COUNT: an upload is announced."""
-        self._follow(station, now)
-        present = self._of(station)
-        answer = self._answers.to(station, now)
-        if present is None and not count and answer is not None and now < answer.cancelled_until:
+        present = self._find(station, now)
+        answer = None if present is not None or count else self._answers.to(station, now)
+        if answer is not None and now < answer.cancelled_until:
             # A repeated Cancel, whose answer was lost: it must not clear the mission on the craft.
             self._context.ack(station, answer.ack)
         elif present is None or not self._is_for(present, count, now):
@@ -119,8 +118,7 @@ class MissionUploads:
 
     def clear_all(self, station: Station, now: float) -> None:
         """MISSION_CLEAR_ALL."""
-        self._follow(station, now)
-        present = self._of(station)
+        present = self._find(station, now)
         if present is not None and not isinstance(present.state, Delivering):
             self._forget(present, now)
         elif present is not None and present.count == 0:
@@ -129,8 +127,7 @@ class MissionUploads:
 
     def item(self, station: Station, item: MissionItem, now: float) -> None:
         """MISSION_ITEM or MISSION_ITEM_INT."""
-        self._follow(station, now)
-        upload = self._of(station)
+        upload = self._find(station, now)
         if upload is None:
             self._late_item(station, item.seq, now)
             return
@@ -166,8 +163,7 @@ class MissionUploads:
 
     def ack(self, station: Station, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
-        self._follow(station, now)
-        upload = self._of(station)
+        upload = self._find(station, now)
         if upload is None or isinstance(upload.state, Delivering):
             return
         if result != MissionResult.ACCEPTED:
@@ -435,17 +431,17 @@ class MissionUploads:
     def _undelivered(self) -> list[_Upload]:
         return [upload for upload in self._uploads if not isinstance(upload.state, Delivering)]
 
-    def _follow(self, station: Station, now: float) -> None:
-        """Continue the upload of a ground station whose address has changed (Wi-Fi roaming).
+    def _find(self, station: Station, now: float) -> _Upload | None:
+        """The newest upload of a ground station; it continues if its address has changed (Wi-Fi roaming).
 
         Not if it was answered at this address: then it has announced another list, and lists must never be mixed.
         """
-        if self._of(station) is not None or self._answers.was_said_to(station, now):
-            return
-        for upload in self._uploads:
-            if self._ground.stations.has_moved(upload.station, station, now):
-                self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
-                upload.station = station
+        if self._of(station) is None and not self._answers.was_said_to(station, now):
+            for upload in self._uploads:
+                if self._ground.stations.has_moved(upload.station, station, now):
+                    self._note("mission.station_moved", upload, before=str(upload.station), after=str(station))
+                    upload.station = station
+        return self._of(station)
 
     def _late_item(self, station: Station, seq: int, now: float) -> None:
         """Answer an item of an upload that has ended, or that was lost when the daemon was killed.
