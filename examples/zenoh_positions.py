@@ -17,6 +17,7 @@ def main(endpoint: str) -> None:
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     newest: dict[str, int] = {}
+    least_delay_s: dict[str, float] = {}
 
     def heard(sample: zenoh.Sample) -> None:
         if not str(sample.encoding).startswith("application/json"):
@@ -27,8 +28,13 @@ def main(endpoint: str) -> None:
         # The sequence numbers of a key have no gaps: a missing one was lost on the way, which telemetry permits.
         lost = position["seq"] - newest.get(key, position["seq"] - 1) - 1
         newest[key] = position["seq"]
+        # After a stall, samples from queues arrive late. The least delay seen is the difference between the clocks.
+        delay_s = time.time() - position["time_s"]
+        least_delay_s[key] = min(delay_s, least_delay_s.get(key, delay_s))
+        late_s = delay_s - least_delay_s[key]
         place = (position["lat_deg"], position["lon_deg"], position["height_m"])
-        print(f"{vehicle}: lat, lon, height {place}" + (f", {lost} lost before" if lost > 0 else ""), flush=True)
+        remarks = [f", {lost} lost before"] * (lost > 0) + [f", {late_s:.0f} s old"] * (late_s > 1)
+        print(f"{vehicle}: lat, lon, height {place}{''.join(remarks)}", flush=True)
 
     with zenoh.open(config) as session, session.declare_subscriber("fleet/*/v1/telemetry/position", heard):
         try:
