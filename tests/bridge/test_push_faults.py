@@ -214,12 +214,20 @@ def test_a_power_cut_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
 
 
 def test_a_port_lost_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
+    """The push ends with the line, and never continues on the next one."""
+
     def inject(world: World, draw: random.Random) -> None:
+        def unplug() -> None:
+            world.unplug()
+            world.after(0, lambda: busy.append(world.bridge.runner.is_busy))
+
         begin = draw.random() * 0.4
-        world.after(begin, world.unplug)
+        world.after(begin, unplug)
         world.after(begin + draw.random() * draw.choice((0.1, 3)), world.plug)
 
+    busy: list[bool] = []
     assert len(outcomes(inject, 24)) > 1
+    assert busy == [False] * 24
 
 
 def test_a_power_cut_at_every_flash_operation_leaves_a_whole_list() -> None:

@@ -82,6 +82,8 @@ SCREEN = {
     "climb": Shown("GLOBAL_POSITION_INT", lambda msg: -msg.vz, lambda c: c.flight.climb_ms * 100, 1.1),
     "heading": Shown("GLOBAL_POSITION_INT", lambda msg: msg.hdg / 100, lambda c: c.flight.heading, 0.6, circle=True),
     "raw lat": Shown("GPS_RAW_INT", lambda msg: msg.lat, lambda c: c.flight.lat_e7, 1),
+    "raw lon": Shown("GPS_RAW_INT", lambda msg: msg.lon, lambda c: c.flight.lon_e7, 1),
+    "raw altitude": Shown("GPS_RAW_INT", lambda msg: msg.alt, lambda c: c.flight.altitude_m * 1e3, 501),
     "satellites": Shown("GPS_RAW_INT", lambda msg: msg.satellites_visible, lambda c: c.flight.satellites, 0),
     "speed": Shown("GPS_RAW_INT", lambda msg: msg.vel, lambda c: c.flight.speed_ms * 100, 1),
     "ground speed": Shown("VFR_HUD", lambda msg: msg.groundspeed, lambda c: c.flight.speed_ms, 0.01),
@@ -230,7 +232,10 @@ def test_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
         assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
         home = screen.station.said("HOME_POSITION")[-1]
         assert (home.latitude, home.longitude) == FIELD
-        assert screen.world.bridge.report.whole().position.home_lat_deg == home.latitude / 1e7
+        place = screen.world.bridge.report.whole().position
+        assert (place.home_lat_deg, place.home_lon_deg) == (home.latitude / 1e7, home.longitude / 1e7)
+        shown = [screen.shown[name][1] / 1e7 for name in ("lat", "lon")]
+        assert (place.lat_deg, place.lon_deg) == pytest.approx(shown)
     assert max(of_home(craft) for _, craft in screen.past) > 20
     assert set(screen.shown) == shown_by(board)
 
