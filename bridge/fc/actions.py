@@ -15,7 +15,7 @@ from bridge.line.runner import Runner
 from bridge.missions.mission_service import MissionService
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, request
-from protocols.msp.telemetry import Sensor, StatusReport, decode_status
+from protocols.msp.telemetry import Sensor, decode_status
 
 _STATUS_PAYLOAD = 11
 _STATUS_CHECKS = 2
@@ -92,7 +92,8 @@ class FcActions:
 
 def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:
     for _ in range(_STATUS_CHECKS):
-        status = yield from _ask_status()
+        reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD)
+        status = None if reply is None else decode_status(reply.payload)
         if status is None:
             return ActionResult.NO_ANSWER
         if status.box_flags & arm_mask:
@@ -103,8 +104,3 @@ def _act(action: FcAction, arm_mask: int) -> Conversation[ActionResult]:
     if reply is None:
         return ActionResult.NO_ANSWER
     return ActionResult.DONE if reply.direction is Direction.REPLY else ActionResult.REFUSED
-
-
-def _ask_status() -> Conversation[StatusReport | None]:
-    reply = yield from ask(request(Msp.STATUS), Msp.STATUS, _STATUS_PAYLOAD)
-    return None if reply is None else decode_status(reply.payload)

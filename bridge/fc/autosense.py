@@ -4,16 +4,16 @@
 A disarmed Harakiri sends MAVLink heartbeats until it receives something, and answers both protocols; armed, it may
 speak MAVLink only. So the search listens for both, but probes for MSP and prefers it.
 
-Each visit to a speed runs through the phases below. Evidence is two matching MSP replies to our own probes, or a
-heartbeat with plausible fields; noise produces neither (tests/bridge/test_autosense_noise.py). A board that echoes our
-probes is in its command line.
+Each visit to a speed first only listens, then probes as well; an MSP reply is confirmed by a second one. Evidence is
+two equal replies to our own probes, a heartbeat with plausible fields, or two MAVLink frames of one sender; noise
+produces none of them (tests/bridge/test_autosense_noise.py). A board that echoes our probes is in its command line.
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives different bytes;
 tests/bridge/test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from enum import Enum, auto
+from enum import Enum
 from itertools import cycle, islice
 
 from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE
@@ -40,15 +40,6 @@ _ANSWER_SIZE = 13
 _FRSKY_EVIDENCE = 6
 #: A command line's echo of one probe: `$M<dd`.
 _ECHO_SIZE = 5
-
-
-class Phase(Enum):
-    """The phases of a visit to one speed."""
-
-    LISTEN = auto()  # nothing is sent
-    PROBE = auto()  # IDENT is sent, listening continues
-    CONFIRM = auto()  # one MSP reply was heard; a second, equal one is needed
-    FOUND = auto()
 
 
 class Spoken(Enum):
@@ -114,7 +105,6 @@ class Autosense:
     ) -> None:
         self._order = visit_order(speeds, good, first)
         self.speed = next(self._order)
-        self.phase = Phase.LISTEN
         self.found: Found | None = None
         self.pending = pending or PendingReplies()
         self._output: list[bytes] = []
@@ -125,9 +115,9 @@ class Autosense:
         output, self._output = self._output, []
         return output
 
-    def next_deadline(self) -> float | None:
-        """The time of the next `tick`; None once something is found."""
-        return None if self.found else min(self._visit.phase_ends, self._visit.ends)
+    def next_deadline(self) -> float:
+        """The time of the next `tick`."""
+        return min(self._visit.phase_ends, self._visit.ends)
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at the present `speed`."""
@@ -155,11 +145,9 @@ class Autosense:
                 self._conclude(Spoken.MAVLINK, f"heard {sender}, no answer to {visit.probes} MSP probes")
             else:
                 self.speed = next(self._order)
-                self.phase = Phase.LISTEN
                 self._visit = self._new_visit(now)
         elif now >= visit.phase_ends:
             visit.answer = None
-            self.phase = Phase.PROBE
             visit.phase_ends = now + self._probe(now)
 
     def _new_visit(self, now: float) -> _Visit:
@@ -206,7 +194,6 @@ class Autosense:
             self._conclude(Spoken.MSP, f"two equal answers to IDENT ({frame.direction.name.lower()})")
             return
         visit.answer = frame
-        self.phase = Phase.CONFIRM
         # Without room for one more, the pending replies must do.
         has_room = self.pending.room(self.speed, now) >= _ANSWER_SIZE
         visit.phase_ends = now + (self._ask(PROBE, _ANSWER_SIZE, now) if has_room else 0.0) + _CONFIRM_S
@@ -223,11 +210,10 @@ class Autosense:
             visit.ends = max(visit.ends, now + _FULL_VISIT_S)
         if is_plausible_heartbeat(frame) or (before is not None and before.sender == frame.sender):
             visit.heartbeat = frame
-            if self.phase is Phase.LISTEN:
+            if not visit.probes and visit.answer is None:
                 visit.phase_ends = now
             # MSP keeps its chance, and a reply that is being confirmed its full time.
             visit.ends = max(now + self._two_probes_s(), visit.phase_ends)
 
     def _conclude(self, spoken: Spoken, why: str) -> None:
-        self.phase = Phase.FOUND
         self.found = Found(spoken, self.speed, why, self._visit.heartbeat, self.pending)

@@ -12,7 +12,7 @@ from bridge.fc.states.base import Closed, Event, Identified, Lost, Port, PortClo
 from bridge.fc.states.cli import Cli
 from bridge.fc.states.frsky import Frsky
 from bridge.fc.states.mavlink import Mavlink
-from bridge.fc.states.msp import Identifying, MspLine, Polling
+from bridge.fc.states.msp import Identifying, Polling
 from bridge.fc.states.searching import Searching
 from bridge.line.runner import Runner
 from bridge.model.autopilot import Autopilot
@@ -138,15 +138,10 @@ class FcSession:
     def _leave(self, state: State, event: Event, now: float) -> None:
         """Forget the flight controller and end its conversations."""
         self.state = Closed(self._port, event, now)
-        if state.trouble:
-            self._on_change(None, now)
-        if not isinstance(state, MspLine) and state.controller is None:
-            return
         self._port.runner.link_down(now)
-        if state.controller is None:
-            return
-        self._on_change(None, now)
-        if isinstance(event, Lost):
+        if state.trouble or state.controller is not None:
+            self._on_change(None, now)
+        if state.controller is not None and isinstance(event, Lost):
             self._log_event(
                 "warning", "fc.lost", why=event.why, speed_baud=state.speed, incident=self._follow_incident()
             )

@@ -13,22 +13,19 @@ from dataclasses import dataclass
 from math import inf
 
 from bridge.line.conversation import Send
+from bridge.line.pending_replies import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES, PendingReplies
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from protocols.msp.hazards import is_clean
 
-#: Harakiri's ring, less one heartbeat (25 bytes) that it may send unasked in AUTOSENSE, and a margin.
-MAX_OUTSTANDING_BYTES = 224
-#: The same at the speed of FrSky telemetry, which an armed Harakiri puts into the same ring: 13 bytes eight times a
+#: The limit at the speed of FrSky telemetry, which an armed Harakiri puts into the same ring: 13 bytes eight times a
 #: second, up to 85 with GPS, barometer and time. Two of these frames may join the ring while the replies leave it.
 _OUTSTANDING_BESIDE_FRSKY = 140
 MIN_TIMEOUT_S = 0.06
 MAX_TIMEOUT_S = 1.0
 #: BEGIN and COMMIT erase and write flash: the board stalls for 100 ms and more.
 EXCLUSIVE_TIMEOUT_S = 1.0
-#: After a longer stall, pending requests are assumed lost: the board was reset or lost power.
-LONGEST_STALL_S = 3.0
 #: The limit while the board may be stalled: the rest of the ring is kept for a resync and what follows.
 _OUTSTANDING_IN_DOUBT = 64
 _FIRST_GUESS_S = 0.03
@@ -79,6 +76,7 @@ class MspLink:
     """
 
     def __init__(self, baud: int | None, now: float, owed: int = 0) -> None:
+        self._baud = baud
         #: A byte's time on the line.
         self.byte_s = 10 / baud if baud else 0.0
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
@@ -114,9 +112,12 @@ class MspLink:
         """The total size of the pending replies, bytes."""
         return sum([sent.reply_size for sent in self._sent])
 
-    def unanswered(self) -> list[tuple[float, int]]:
-        """The pending replies: when each was requested, and its size."""
-        return [(sent.sent_at, sent.reply_size) for sent in self._sent]
+    def unanswered(self) -> PendingReplies:
+        """Replies that may still arrive."""
+        pending = PendingReplies()
+        for sent in self._sent:
+            pending.add(self._baud, sent.reply_size, sent.sent_at)
+        return pending
 
     @property
     def round_trip_s(self) -> float:

@@ -5,7 +5,10 @@ Harakiri's send ring has no overflow check (bridge.line.msp_link). While a silen
 answer each probe at its own speed later: together with earlier requests, these replies must fit the ring.
 """
 
-from bridge.line.msp_link import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES
+#: Harakiri's ring, less one heartbeat (25 bytes) that it may send unasked in AUTOSENSE, and a margin.
+MAX_OUTSTANDING_BYTES = 224
+#: After a longer stall, pending requests are assumed lost: the board was reset or lost power.
+LONGEST_STALL_S = 3.0
 
 
 class PendingReplies:

@@ -9,11 +9,15 @@ from typing import Any, Generic, TypeVar
 
 from bridge.line.conversation import (
     Await,
+    Conclude,
     Conversation,
+    FindPending,
     LinkLost,
     OutOfTime,
     Pause,
+    Recall,
     Receive,
+    Save,
     Send,
     Stopped,
     StoreEffect,
@@ -179,37 +183,30 @@ class Runner:
             while True:
                 effect = conversation.throw(answer) if isinstance(answer, LinkLost) else conversation.send(answer)
                 answer = None
-                if isinstance(effect, TimeLimit):
-                    line_s = effect.size * self._link.byte_s if self._link is not None else 0.0
-                    task.ends_at = now + effect.seconds + line_s
-                elif isinstance(effect, Send | Receive) and self._link is None:
-                    answer = LinkLost("there is no link to the flight controller")
-                elif isinstance(effect, Transmit | Await) and self._transmit is None:
-                    answer = LinkLost("the flight controller no longer speaks MAVLink")
-                elif isinstance(effect, Transmit):
-                    assert self._transmit is not None
-                    answer = self._transmit(effect.packed)
-                elif isinstance(effect, Await):
-                    self._awaited = effect
-                    self._deadline = now + effect.seconds
-                    return
-                elif isinstance(effect, Send):
-                    assert self._link is not None
-                    self._link.send(effect, now)
-                elif isinstance(effect, Receive):
-                    assert self._link is not None
-                    self._awaited = effect
-                    self._deadline = self._link.reply_deadline(effect.commands, now)
-                    return
-                elif isinstance(effect, Pause):
-                    self._awaited = effect
-                    self._deadline = now + effect.seconds
-                    return
-                else:
-                    self._awaited = effect
-                    self._deadline = now + _STORE_PATIENCE_S
-                    self._store_effects.append(effect)
-                    return
+                match effect:
+                    case TimeLimit(seconds, size):
+                        task.ends_at = now + seconds + (size * self._link.byte_s if self._link else 0.0)
+                        continue
+                    case Send() if self._link:
+                        self._link.send(effect, now)
+                        continue
+                    case Transmit(packed) if self._transmit:
+                        answer = self._transmit(packed)
+                        continue
+                    case Receive(commands) if self._link:
+                        deadline = self._link.reply_deadline(commands, now)
+                    case Await(_, seconds) if self._transmit:
+                        deadline = now + seconds
+                    case Send() | Transmit() | Receive() | Await():
+                        answer = LinkLost("the flight controller does not speak this protocol now")
+                        continue
+                    case Pause(seconds):
+                        deadline = now + seconds
+                    case Save() | Conclude() | Recall() | FindPending():
+                        self._store_effects.append(effect)
+                        deadline = now + _STORE_PATIENCE_S
+                self._awaited, self._deadline = effect, deadline
+                return
         except StopIteration as stop:
             result = stop.value
         except LinkLost as lost:

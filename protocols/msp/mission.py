@@ -5,6 +5,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
+from typing import Any
 
 from protocols.mission_record import ListIdentity, pack_records
 from protocols.msp.frame import request
@@ -60,7 +61,8 @@ _INFO = struct.Struct("<BBBBBBHHIHHHI")
 _PROGRESS = struct.Struct("<BHI")
 _STORED = struct.Struct("<BHI")
 _LIST = struct.Struct("<HI")
-_RADIUS_REPLY = struct.Struct("<BH")
+#: Of READ, ahead of the records: the first one's number. Of RADIUS: the radius.
+_SHORT = struct.Struct("<BH")
 
 #: Payload size of an INFO reply of version 1.
 INFO_SIZE = _INFO.size
@@ -136,7 +138,7 @@ class Records:
 
     def encode(self) -> bytes:
         """Return the reply's payload."""
-        return struct.pack("<BH", self.status, self.first) + pack_records(self.records)
+        return _SHORT.pack(self.status, self.first) + pack_records(self.records)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,84 +150,50 @@ class Radius:
 
     def encode(self) -> bytes:
         """Return the reply's payload."""
-        return _RADIUS_REPLY.pack(self.status, self.wp_radius_cm)
-
-
-def _status(value: int) -> ReplyStatus | None:
-    return ReplyStatus(value) if value <= max(ReplyStatus) else None
+        return _SHORT.pack(self.status, self.wp_radius_cm)
 
 
 def decode_info(payload: bytes) -> Info | None:
     """Read an INFO reply; None if it is shorter than version 1 or makes no sense."""
-    if len(payload) < _INFO.size:
+    reply = _reply(_INFO, payload)
+    if reply is None:
         return None
-    (
-        status,
-        version,
-        flags,
-        chunk_records,
-        chunk_window,
-        read_records,
-        capacity,
-        count,
-        checksum,
-        radius,
-        timeout,
-        staged,
-        writes,
-    ) = _INFO.unpack_from(payload)
-    if status != ReplyStatus.OK or not (version and chunk_records and chunk_window and read_records):
+    status, version, flags, chunk, window, read, capacity, count, checksum, *rest = reply
+    if status is not ReplyStatus.OK or not (version and chunk and window and read):
         return None
-    return Info(
-        version=version,
-        flags=InfoFlag(flags & 15),
-        chunk_records=chunk_records,
-        chunk_window=chunk_window,
-        read_records=read_records,
-        capacity=capacity,
-        stored=ListIdentity(count, checksum),
-        wp_radius_cm=radius,
-        inter_byte_timeout_ms=timeout,
-        staged=staged,
-        flash_writes=writes,
-    )
+    return Info(version, InfoFlag(flags & 15), chunk, window, read, capacity, ListIdentity(count, checksum), *rest)
 
 
 def decode_progress(payload: bytes) -> Staged | None:
     """Read the reply to BEGIN or CHUNK."""
-    if len(payload) < _PROGRESS.size:
-        return None
-    status, following, checksum = _PROGRESS.unpack_from(payload)
-    known = _status(status)
-    return None if known is None else Staged(known, following, checksum)
+    reply = _reply(_PROGRESS, payload)
+    return None if reply is None else Staged(*reply)
 
 
 def decode_stored(payload: bytes) -> Stored | None:
     """Read the reply to COMMIT."""
-    if len(payload) < _STORED.size:
-        return None
-    status, count, checksum = _STORED.unpack_from(payload)
-    known = _status(status)
-    return None if known is None else Stored(known, ListIdentity(count, checksum))
+    reply = _reply(_STORED, payload)
+    return None if reply is None else Stored(reply[0], ListIdentity(*reply[1:]))
 
 
 def decode_records(payload: bytes) -> Records | None:
     """Read the reply to READ."""
-    if len(payload) < 3:
-        return None
-    known = _status(payload[0])
-    if known is None:
-        return None
-    return Records(known, int.from_bytes(payload[1:3], "little"), unpack_records(payload[3:]))
+    reply = _reply(_SHORT, payload)
+    return None if reply is None else Records(reply[0], reply[1], unpack_records(payload[_SHORT.size :]))
 
 
 def decode_radius(payload: bytes) -> Radius | None:
     """Read the reply to RADIUS."""
-    if len(payload) < _RADIUS_REPLY.size:
+    reply = _reply(_SHORT, payload)
+    return None if reply is None else Radius(*reply)
+
+
+def _reply(layout: struct.Struct, payload: bytes) -> tuple[Any, ...] | None:
+    """The status and the other fields; None if the payload is too short or the status unknown."""
+    if len(payload) < layout.size or payload[0] > max(ReplyStatus):
         return None
-    status, radius = _RADIUS_REPLY.unpack_from(payload)
-    known = _status(status)
-    return None if known is None else Radius(known, radius)
+    status, *fields = layout.unpack_from(payload)
+    return ReplyStatus(status), *fields
 
 
 def _masked_request(command: MissionCommand, body: bytes) -> bytes | None:

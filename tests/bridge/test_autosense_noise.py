@@ -11,7 +11,7 @@ import random
 
 import pytest
 
-from bridge.fc.autosense import SPEEDS, Autosense, Phase
+from bridge.fc.autosense import SPEEDS, Autosense
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import Direction, MspFrame, request
 
@@ -77,17 +77,13 @@ def test_damaged_mavlink_and_foreign_msp_requests_give_no_verdict() -> None:
 
 def test_a_single_answer_is_not_enough() -> None:
     search = Autosense((115200,), (), 0.0)
-    now, visits = 0.0, 0
     for number in range(500):
-        now = search.next_deadline() or now
-        if search.phase is Phase.LISTEN:
-            visits += 1
+        now = search.next_deadline()
         # Each answer differs.
         answer = MspFrame(Direction.REPLY, 100, bytes((211, 3, 0, number % 256, number // 256, 0, 128)))
         search.receive(answer.encode(), now)
         search.tick(now)
     assert search.found is None
-    assert visits > 0
 
 
 def test_a_heartbeat_must_be_plausible_in_every_field() -> None:
@@ -99,5 +95,5 @@ def test_a_heartbeat_must_be_plausible_in_every_field() -> None:
         frame = bytes(messages.MAVLink_heartbeat_message(*fields).pack(mavlink))
         search.receive(frame, 0.0)
         for _ in range(6):
-            search.tick(search.next_deadline() or 0.0)
+            search.tick(search.next_deadline())
         assert (search.found is not None) is found

@@ -7,7 +7,8 @@ from itertools import pairwise
 import pytest
 
 from bridge.line.conversation import Send
-from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, RESYNC, MspLink
+from bridge.line.msp_link import RESYNC, MspLink
+from bridge.line.pending_replies import MAX_OUTSTANDING_BYTES
 from bridge.model.vehicle import Orientation
 from protocols.mavlink.dialect import messages
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request

@@ -108,10 +108,10 @@ class HarakiriMavlinkMissions(HarakiriStore):
         """Send the list, up to its MISSION_ACK."""
         answer = yield from self._ask(m.MAVLink_mission_count_message(*_TARGET, len(items)), 0)
         for seq, item in enumerate(items):
-            if answer.msgid == _ACK or self._seq_of(answer) != seq:
+            if answer.msgid == _ACK or self._field(answer, "seq") != seq:
                 raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
             answer = yield from self._ask(item, seq + 1)
-            if answer.msgid == _ACK and self._result_of(answer) == m.MAV_MISSION_ACCEPTED:
+            if answer.msgid == _ACK and self._field(answer, "type") == m.MAV_MISSION_ACCEPTED:
                 if len(items) - seq > 1 and items is not _NOTHING:
                     raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
                 return
@@ -130,12 +130,12 @@ class HarakiriMavlinkMissions(HarakiriStore):
                 if answer is None:
                     break
                 if answer.msgid == _ACK:
-                    result = self._result_of(answer)
+                    result = self._field(answer, "type")
                     if result == m.MAV_MISSION_ACCEPTED:
                         return answer
                     failure = _FAILURES.get(result, PushFailure.NO_ANSWER)
                     raise PushFailed(failure, is_final=failure in (PushFailure.NO_SPACE, PushFailure.REFUSED))
-                if self._seq_of(answer) == expected:
+                if self._field(answer, "seq") == expected:
                     return answer
         raise PushFailed(PushFailure.NO_ANSWER, is_final=False)
 
@@ -145,7 +145,7 @@ class HarakiriMavlinkMissions(HarakiriStore):
         for _ in range(3):
             yield Transmit(pack(_message(_NO_SEQ, nowhere)))
             answer: MavlinkFrame | None = yield Await(frozenset((_ACK,)), _TIMEOUT_S)
-            if answer is not None and self._result_of(answer) != m.MAV_MISSION_ACCEPTED:
+            if answer is not None and self._field(answer, "type") != m.MAV_MISSION_ACCEPTED:
                 return True
         return False
 
@@ -168,15 +168,9 @@ class HarakiriMavlinkMissions(HarakiriStore):
             if not is_safe:
                 return None
             answer: MavlinkFrame | None = yield Await(frozenset((answer_id,)), _TIMEOUT_S)
-            if answer is not None and (seq is None or self._seq_of(answer) == seq):
+            if answer is not None and (seq is None or self._field(answer, "seq") == seq):
                 return answer
         return None
-
-    def _seq_of(self, frame: MavlinkFrame) -> int:
-        return self._field(frame, "seq")
-
-    def _result_of(self, frame: MavlinkFrame) -> int:
-        return self._field(frame, "type")
 
     def _field(self, frame: MavlinkFrame, name: str) -> int:
         message = self._decoder.decode(frame)

@@ -45,8 +45,10 @@ class MspLine(State):
         super().__init__(port, found, now)
         self.link = link
         self.found = found
-        self._foreign = _ForeignBytes()
+        self._foreign = _ForeignBytes(link)
         self._echo = EchoWatch()
+        #: The event that ends this state, once a conversation has found it.
+        self._end: Event | None = None
 
     @property
     def bad_checksums(self) -> int | None:
@@ -58,22 +60,25 @@ class MspLine(State):
         frames = self.link.receive(data, now)
         for frame in frames:
             self.take_frame(frame, now)
-        self._foreign.note(data, self.link, is_msp=bool(frames))
-        if not frames:
-            self._echo.feed(data)
-            if self._echo.is_echo():
-                return Found(Spoken.CLI, self.speed, "it echoes requests that it answered before")
-        return self.finished()
+        if frames:
+            if self._foreign.size:
+                self._foreign = _ForeignBytes(self.link)
+            return self._end
+        self._foreign.note(data)
+        self._echo.feed(data)
+        if self._echo.is_echo():
+            return Found(Spoken.CLI, self.speed, "it echoes requests that it answered before")
+        return self._end
 
     def tick(self, now: float) -> Event | None:
         """Give up on lost requests, and on a silent board."""
         for frame in self.link.tick(now):
             self.take_frame(frame, now)
-        return self.finished() or self._silence(now)
+        return self._end or self._silence(now)
 
     def deadline(self) -> float:
         """The link's next deadline, or the end of its silence."""
-        if self.finished() is not None:
+        if self._end is not None:
             return 0.0
         return min(self.link.next_deadline(), self._silent_since() + self._silence_s)
 
@@ -86,18 +91,11 @@ class MspLine(State):
 
     def unanswered(self) -> PendingReplies:
         """The link's pending replies."""
-        pending = PendingReplies()
-        for sent_at, size in self.link.unanswered():
-            pending.add(self.speed, size, sent_at)
-        return pending
+        return self.link.unanswered()
 
     def take_frame(self, frame: MspFrame, now: float) -> None:
         """Take one reply."""
         self.port.runner.received(frame, now)
-
-    def finished(self) -> Event | None:
-        """The event that ends this state, if it has come."""
-        return None
 
     def _silent_since(self) -> float:
         """The time of the last sign of life, or of the first question after it."""
@@ -137,7 +135,6 @@ class Identifying(MspLine):
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, MspLink(event.speed, now, event.pending.size(event.speed, now)), now)
-        self._end: Event | None = None
         self._give_up_at = now + _IDENTIFY_TIMEOUT_S
         port.runner.link_up(self.link)
         self._task = port.runner.start(_identify(port.profiles), self._identified, now)
@@ -147,10 +144,6 @@ class Identifying(MspLine):
             self._end = Identified(who, self.found, self.link)
         else:
             self._end = Lost("fell silent while it was being identified", pending=self.unanswered())
-
-    def finished(self) -> Event | None:
-        """Set when the identification has ended."""
-        return self._end
 
     def tick(self, now: float) -> Event | None:
         """As on any MSP line, up to a deadline."""
@@ -187,7 +180,6 @@ class Polling(MspLine):
         port.meet(controller)
         self._check_interval_s = _FIRST_CHECK_S
         self._check_at = now + _FIRST_CHECK_S if isinstance(controller.profile.missions, Refusal) else inf
-        self._corrected: FlightController | None = None
 
     def take_frame(self, frame: MspFrame, now: float) -> None:
         """Replies belong to a conversation, to a poll, or to both."""
@@ -210,13 +202,9 @@ class Polling(MspLine):
         check_at = inf if self.port.runner.is_busy else self._check_at
         return min(super().deadline(), check_at, self.port.polls.next_deadline(self.link))
 
-    def finished(self) -> Event | None:
-        """Set when the board turned out to be another one."""
-        return None if self._corrected is None else Identified(self._corrected, self.found, self.link)
-
     def _checked(self, who: FlightController | LinkLost | None, now: float) -> None:
         if isinstance(who, FlightController) and who.profile is not self.controller.profile:
-            self._corrected = who
+            self._end = Identified(who, self.found, self.link)
             return
         self._check_interval_s = min(self._check_interval_s * 2, _LAST_CHECK_S)
         self._check_at = now + self._check_interval_s
@@ -225,25 +213,23 @@ class Polling(MspLine):
 class _ForeignBytes:
     """Bytes on an MSP line that are not MSP, since the last reply."""
 
-    def __init__(self) -> None:
-        self.size = 0
+    def __init__(self, link: MspLink) -> None:
         self.mavlink: MavlinkFrame | None = None
-        self._skipped_before = 0
+        self._link = link
+        self._skipped_before = link.skipped_bytes
         self._splitter = MavlinkSplitter()
 
-    def note(self, data: bytes, link: MspLink, *, is_msp: bool) -> None:
+    @property
+    def size(self) -> int:
+        """Their number."""
+        return self._link.skipped_bytes - self._skipped_before
+
+    def note(self, data: bytes) -> None:
         """Examine received bytes."""
-        skipped, self._skipped_before = link.skipped_bytes - self._skipped_before, link.skipped_bytes
-        if is_msp:
-            if self.size:
-                self.size, self.mavlink, self._splitter = 0, None, MavlinkSplitter()
-            return
-        self.size += skipped
-        if skipped:
-            for frame in self._splitter.feed(data):
-                # A disarmed Harakiri that hears no request sends heartbeats, and still answers MSP.
-                if not is_disarmed_heartbeat(frame):
-                    self.mavlink = frame
+        for frame in self._splitter.feed(data) if self.size else ():
+            # A disarmed Harakiri that hears no request sends heartbeats, and still answers MSP.
+            if not is_disarmed_heartbeat(frame):
+                self.mavlink = frame
 
 
 def _identify(profiles: Sequence[Profile]) -> Conversation[FlightController | None]:

@@ -30,8 +30,7 @@ class Searching(State):
 
     def deadline(self) -> float:
         """A search always has a next step."""
-        deadline = self._search.next_deadline()
-        return 0.0 if deadline is None else deadline
+        return self._search.next_deadline()
 
     def take_output(self) -> list[bytes]:
         """The search's probes."""
