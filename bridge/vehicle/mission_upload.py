@@ -139,13 +139,12 @@ class MissionUploads:
             text = f"WP {item.seq} is beyond the {upload.count} items announced"
             self._context.refuse(station, Refusal(MissionResult.INVALID_SEQUENCE, text))
             return
-        if state.announced_again:
-            state.announced_again = False
-            if item.seq == 0:
-                # Two lists must never be mixed: the previous one is discarded.
-                self._forget(upload, now)
-                self._begin(station, upload.count, now)
-                return
+        if state.is_of_another_list(item):
+            # Two lists must never be mixed: the previous one is discarded.
+            self._forget(upload, now)
+            self._begin(station, upload.count, now)
+            return
+        state.announced_again = False
         taken = state.take(item, now)
         if isinstance(taken, Judged):
             self._handle(upload, taken, now)

@@ -191,6 +191,15 @@ class Receiving(UploadState):
         """The time to repeat the request, or to give up."""
         return min(self.deadline, self.request.due)
 
+    def is_of_another_list(self, item: MissionItem) -> bool:
+        """True if the ground station has started again, perhaps with another list.
+
+        "Write Fast" does not wait for the request: its first items may be lost.
+        """
+        held = self.items.get(item.seq, item)
+        # As text, because NaN, "not given", differs from itself.
+        return self.announced_again and (item.seq == 0 or repr(held) != repr(item))
+
     def take(self, item: MissionItem, now: float) -> Judged | bool:
         """Keep an item; returns Judged at the end of the list, else True if the next item is to be requested."""
         if item.seq in self.items:

@@ -398,6 +398,23 @@ def test_the_same_station_restarts_while_items_arrive(sent: int, count: int) -> 
     assert world.stored == records_of(again)
 
 
+def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
+    """Mission Planner's "Write Fast" again, with another list of the same length."""
+    world, station = holding()
+    before, after = waypoints(12, 1), waypoints(12, 2)
+    receiving(world, station, before, 6)
+    station.send(count_message(12))
+    for seq in range(1, 10):
+        station.send(item_message(seq, after[seq]))
+    world.run(0.5)
+    assert requested(station)[-1] == 0
+    for seq in range(12):
+        station.send(item_message(seq, after[seq]))
+    world.run(2)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(after)
+
+
 def test_the_same_station_restarts_while_the_flight_controller_is_asked() -> None:
     world, station = holding()
     station.send(count_message(9))
