@@ -82,6 +82,7 @@ class FleetFolder:
         """The router's configuration: rules for each vehicle, nothing for unknown sessions."""
         scheme = self.router.partition("/")[0]
         port = self.router.rpartition(":")[2]
+        tls = self._tls({"listen_certificate": "router.pem", "listen_private_key": "router.key"}) if self.is_tls else {}
         return {
             "mode": "router",
             "listen": {"endpoints": [f"{scheme}/0.0.0.0:{port}"]},
@@ -89,17 +90,11 @@ class FleetFolder:
             "timestamping": {"enabled": True},
             "transport": {
                 "unicast": {"max_sessions": _MAX_SESSIONS, "accept_pending": _ACCEPT_PENDING},
-                "link": {"tcp": {"so_sndbuf": _BUFFER_BYTES, "so_rcvbuf": _BUFFER_BYTES}, **self._router_tls()},
+                "link": {"tcp": {"so_sndbuf": _BUFFER_BYTES, "so_rcvbuf": _BUFFER_BYTES}, **tls},
                 "auth": {} if self.is_tls else {"usrpwd": {"dictionary_file": str(self.path / "passwords.txt")}},
             },
             "access_control": access_control(self.prefix, members, by_certificate=self.is_tls),
         }
-
-    def _router_tls(self) -> Json:
-        if not self.is_tls:
-            return {}
-        files = {"listen_certificate": "router.pem", "listen_private_key": "router.key"}
-        return self._tls(files)
 
     def _tls(self, files: Mapping[str, str]) -> Json:
         files = {"root_ca_certificate": "ca.pem", **files}
