@@ -94,8 +94,8 @@ class MissionDownloads:
         if self._is_reading:
             return
         held = self._missions.held
-        if held is not None and (self._vehicle.armed or not self._ground.allows(question.station, Cost.BOARD)):
-            # While armed the list cannot change; a station that asks too often gets the copy, too.
+        if held is not None and not self._ground.allows(question.station, Cost.BOARD):
+            # A station that asks too often gets the copy.
             self._read(held, now)
         else:
             self._is_reading = True
@@ -137,20 +137,19 @@ class MissionDownloads:
         self._ground.to(station, item_message(item, station.sysid, station.compid, as_int=question.as_int))
 
     def _send_home(self, question: _Question, now: float) -> None:
-        """Item 0 while armed. Until a position is heard the first request waits for its repetition."""
-        if self._missions.home_item() is None and self._vehicle.home_or_position() is None:
+        """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it.
+
+        Until a position is heard the first request waits for its repetition.
+        """
+        known, home = self._missions.home_item(), self._vehicle.home_or_position()
+        if known is None and home is None:
             self._homeless_since = min(self._homeless_since, now)
             if now < self._homeless_since + _POSITION_WAIT_S:
                 return
-        self._send_item(question, self._present_home())
-
-    def _present_home(self) -> MissionItem:
-        """Item 0 as last read, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
-        known, home = self._missions.home_item(), self._vehicle.home_or_position()
-        if known is None:
-            return self._home_item()
-        altitude_m = None if home is None else home.altitude_m
-        return known if altitude_m is None else replace(known, alt_m=altitude_m)
+        item = known or self._home_item()
+        if home is not None and home.altitude_m is not None:
+            item = replace(item, alt_m=home.altitude_m)
+        self._send_item(question, item)
 
     def _home_item(self) -> MissionItem:
         """Item 0 of an empty list: home, or zeros if unknown."""

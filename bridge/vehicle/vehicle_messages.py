@@ -6,7 +6,6 @@ An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
@@ -133,8 +132,10 @@ class Moment:
         """The messages of these makers that are not Unknown."""
         made = []
         for maker in makers:
-            with suppress(Unknown):
+            try:
                 made.append(maker(self))
+            except Unknown:
+                continue
         return made
 
     def altitude_m(self, position: GlobalPosition) -> float | None:
