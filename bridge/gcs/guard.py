@@ -180,12 +180,11 @@ class Guard:
         access = self._links.get(peer.link, _OPEN)
         # Read requests are checked, too: each valid one invalidates older recordings.
         check = Check.VALID if access.signing is None else access.signing.check(frame)
-        was_signing = peer in self._signed
         if access.signing is not None and check is Check.VALID:
             self._signed.add(peer)
         if frame.msgid == m.MAVLINK_MSG_ID_SETUP_SIGNING:
             return self._refuse(peer, frame, _SETUP)
-        if check is not Check.VALID and was_signing:
+        if check is not Check.VALID and peer in self._signed:
             # A duplicate made by the network, or another sender posing as this peer.
             return self._refuse(peer, frame, str(check.value), is_forged=True)
         if only_reads(frame):

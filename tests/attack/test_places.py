@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.gcs.stations import MAX_PEERS
+from bridge.gcs.stations import MAX_LISTENERS, MAX_PEERS
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
 from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_uploads, m, sign
@@ -40,9 +40,10 @@ def guarded(start: Starter, key_file: Path) -> Bench:
 
 
 def crowd(bench: Bench, stack: ExitStack, *spoken: Message, size: int = CROWD, per_s: float = 30) -> Attack:
-    """Strangers, each with its own address; it sends a heartbeat, or something else, from time to time."""
+    """Strangers, each with its own address and ids; it sends a heartbeat, or something else, from time to time."""
     strangers = [
-        Stranger(bench.daemon.address, f"127.0.{1 + number // 200}.{1 + number % 200}") for number in range(size)
+        Stranger(bench.daemon.address, f"127.0.{1 + row}.{1 + number}", sysid=1 + number, compid=190 + row)
+        for row, number in (divmod(each, 200) for each in range(size))
     ]
     for stranger in strangers:
         stack.callback(stranger.close)
@@ -68,7 +69,10 @@ def test_a_crowd_neither_displaces_a_pilot_nor_locks_one_out(start: Starter, sta
         found: list[str] = bench.daemon.ask({"do": "status"})["ground_stations"]
         return found
 
-    with udp_station(bench.daemon.address) as first, udp_station(bench.daemon.address, sysid=254) as late:
+    with (
+        udp_station(bench.daemon.address, sysid=253) as first,
+        udp_station(bench.daemon.address, sysid=254, host="127.0.0.2") as late,
+    ):
         for _ in range(3):
             assert hears_heartbeats(first, 1)
         count = m.MAVLink_mission_count_message(1, 1, 9)
@@ -95,6 +99,8 @@ def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, sta
             assert listener.upload(plain_plan(3)) is MissionResult.DENIED
             listener.send(m.MAVLink_command_long_message(1, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             assert listener.wait_for("COMMAND_ACK").result == m.MAV_RESULT_DENIED
+            # Strangers share places of their own.
+            assert len(bench.daemon.ask({"do": "status"})["ground_stations"]) <= MAX_LISTENERS + 1
     # Texts to the pilot do not go to strangers, even if there is room.
     with udp_station(bench.daemon.address) as pilot, udp_station(bench.daemon.address) as listener:
         assert hears_heartbeats(listener, 2)

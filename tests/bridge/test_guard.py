@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bridge.controllers import other
 from bridge.gcs.guard import LinkAccess
+from bridge.gcs.station import Severity
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import CRC_EXTRA, Message
 from protocols.mavlink.signing import TICKS_PER_S, TOLERANCE, Check, Signing, Timestamps, key_from_passphrase, ticks
@@ -216,6 +217,46 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
     for station in stations:
         assert len(station.said("COMMAND_ACK")) == 5
         assert station.texts() == ["Refused: not signed"]
+
+
+def test_a_refused_request_for_rates_gets_no_text() -> None:
+    """Every ground station sends some when it connects."""
+    world = keyed()
+    station = GroundStation(world)
+    station.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
+    station.send(mavlink.MAVLink_command_long_message(1, 1, 511, 0, 30, 100_000, 0, 0, 0, 0, 0))
+    world.run(0.1)
+    assert refusals(world) == {"not signed": 2}
+    assert station.texts() == []
+    assert world.events("gcs.refused") == []
+
+
+@pytest.mark.parametrize("access", [LinkAccess(signing(), LINK_ID), LinkAccess(may_write=lambda peer: "pilot" in peer)])
+def test_a_listener_gets_no_texts_for_others(access: LinkAccess) -> None:
+    world = World(speeds=(115200,), links={"udp": access})
+    world.wait_ready()
+    pilot = signing_station(world, "pilot")
+    listener = GroundStation(world, "listener", sysid=250)
+    for station in (pilot, listener):
+        station.send(READS[0])
+    world.run(0.1)
+    world.bridge.ground.say(Severity.INFO, "for everyone")
+    world.run(0.1)
+    assert (pilot.texts(), listener.texts()) == (["for everyone"], [])
+
+
+def test_an_address_must_show_the_key_again_after_its_station_has_left() -> None:
+    world = keyed()
+    station, another = signing_station(world), GroundStation(world, sysid=250)
+    assert another.peer == station.peer
+    for times in (1, 2):
+        another.send(clear_message())
+        world.run(0.1)
+        assert [ack.type for ack in another.said("MISSION_ACK")] == [MissionResult.DENIED] * times
+        assert another.texts() == ["Refused: not signed"] * times
+        station.send(READS[0])
+        world.run(0.1)
+        world.bridge.gcs_gone(station.peer, world.now)
 
 
 def test_a_replayed_frame_is_refused() -> None:

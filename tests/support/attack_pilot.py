@@ -26,13 +26,11 @@ LONGEST_GAP_S = 1.1
 class Stranger:
     """An attacker's socket, which reads only on request."""
 
-    def __init__(self, address: tuple[str, int], host: str = "127.0.0.1", sysid: int = 99, key: bytes | None = None):
+    def __init__(self, address: tuple[str, int], host: str = "127.0.0.1", sysid: int = 99, compid: int = 190) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind((host, 0))
         self._socket.connect(address)
-        self._codec: Any = m.MAVLink(None, srcSystem=sysid, srcComponent=190)
-        if key is not None:
-            self._codec.signing.secret_key, self._codec.signing.sign_outgoing = key, True
+        self._codec: Any = m.MAVLink(None, srcSystem=sysid, srcComponent=compid)
 
     def send(self, *spoken: Message) -> None:
         for message in spoken:

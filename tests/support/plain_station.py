@@ -119,10 +119,15 @@ class PlainStation:
 
 
 def udp_station(
-    address: tuple[str, int], dialect: ModuleType | None = None, sysid: int = SYSID, compid: int = COMPID
+    address: tuple[str, int],
+    dialect: ModuleType | None = None,
+    sysid: int = SYSID,
+    compid: int = COMPID,
+    host: str = "127.0.0.1",
 ) -> PlainStation:
     """A station on a daemon's udpin."""
     connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    connection.bind((host, 0))
     connection.connect(address)
     return PlainStation(connection, dialect, sysid, compid)
 
