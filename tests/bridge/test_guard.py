@@ -245,6 +245,21 @@ def test_a_listener_gets_no_texts_for_others(access: LinkAccess) -> None:
     assert (pilot.texts(), listener.texts()) == (["for everyone"], [])
 
 
+def test_listeners_do_not_displace_a_station_with_the_key() -> None:
+    world = keyed()
+    pilot = signing_station(world, "pilot")
+    for number in range(40):
+        if number == 20:
+            pilot.send(READS[0])
+        listener = GroundStation(world, f"listener {number}", sysid=250)
+        for _ in range(2):
+            listener.send(READS[0])
+        world.run(0.1)
+    peers = world.bridge.ground.peers()
+    assert pilot.peer in peers
+    assert len(peers) < 20
+
+
 def test_an_address_must_show_the_key_again_after_its_station_has_left() -> None:
     world = keyed()
     station, another = signing_station(world), GroundStation(world, sysid=250)
