@@ -255,7 +255,7 @@ def test_listeners_do_not_displace_a_station_with_the_key() -> None:
         for _ in range(2):
             listener.send(READS[0])
         world.run(0.1)
-    peers = world.bridge.ground.peers()
+    peers = world.bridge.ground.stations.peers()
     assert pilot.peer in peers
     assert len(peers) < 20
 
