@@ -49,7 +49,7 @@ class InavMissions(NavMissions):
     _kept: tuple[Mission, ...] = ()
     #: Records in the store before the loaded mission's first.
     _before_loaded = 0
-    #: GETINFO's reply and the selected mission, as of the last read or write.
+    #: GETINFO's reply and the selected mission, as of the last read or write; None if it is being written.
     _seen: tuple[NavInfo, int] | None = None
     #: The same, as of the last check for changes, and whether the sticks were held for LOAD.
     _last_look: tuple[NavInfo, int] | None = None
@@ -95,11 +95,9 @@ class InavMissions(NavMissions):
             return True
         before, self._last_look = self._last_look, seen
         if not seen[0].is_valid and seen != before:
+            self._seen = None
             return True
-        was_written = before is not None and not before[0].is_valid and seen[0].is_valid
-        if was_written or (yield from self._sticks_load()):
-            return False
-        return (yield from self._is_unchanged(seen))
+        return not (yield from self._sticks_load()) and (yield from self._is_unchanged(seen))
 
     def _sticks_load(self) -> Conversation[bool]:
         """True, once, after the pilot may have loaded the saved missions with the sticks; INAV refuses it armed."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from bridge.controllers.nav.flown_path import flown_size, jump_within_jump, lands_after_rth
-from bridge.controllers.nav.items import home_item, items_from_records, leg_speed
+from bridge.controllers.nav.items import GROUND_SPEED, home_item, items_from_records, leg_speed
 from bridge.controllers.nav.jumps import Jumps
 from bridge.controllers.nav.landing import placed_landing
 from bridge.controllers.nav.leg_limits import limited_legs
@@ -156,28 +156,20 @@ class NavCheck(ListCheck):
         return self._fit(item, "p1", allowed, News.WARNING if is_cut else News.NOTICE)
 
     def _record(self, item: MissionItem, rule: NavRule, p1: int) -> NavRecord:
-        place = (item.lat_e7 or 0, item.lon_e7 or 0)
         alt_cm, datum = self._height(item, rule)
-        speed = self._speed.cms
-        match item.command:
-            case Command.NAV_RETURN_TO_LAUNCH:
-                return NavRecord(NavAction.RTH, 0, 0, alt_cm, p1)
-            case Command.NAV_LAND:
-                return NavRecord(NavAction.LAND, *place, alt_cm, speed, 0, datum)
-            case Command.NAV_LOITER_UNLIM:
-                action, p1 = self._profile.endless_hold
-                return NavRecord(action, *place, alt_cm, p1, speed, datum)
-            case Command.NAV_LOITER_TIME:
-                return NavRecord(NavAction.POSHOLD_TIME, *place, alt_cm, p1, speed, datum)
-            case Command.NAV_WAYPOINT if p1:
-                self._sent_as[len(self._records)] = int(Command.NAV_WAYPOINT)
-                return NavRecord(NavAction.POSHOLD_TIME, *place, alt_cm, p1, speed, datum)
-            case command if command in ROI_COMMANDS:
-                self._sent_as[len(self._records)] = command
-                return NavRecord(NavAction.SET_POI, *place, alt_cm, 0, 0, datum)
+        action, speed = rule.action, self._speed.cms
+        if action is NavAction.POSHOLD_UNLIM:
+            action, p1 = self._profile.endless_hold
+        elif action is NavAction.WAYPOINT and p1:
+            action = NavAction.POSHOLD_TIME
+        if item.command in ROI_COMMANDS or (item.command == Command.NAV_WAYPOINT and p1):
+            self._sent_as[len(self._records)] = item.command
         if item.command == Command.NAV_LOITER_TURNS:
             self._note(item, "command", item.command, int(Command.NAV_WAYPOINT), "circles not supported", News.WARNING)
-        return NavRecord(NavAction.WAYPOINT, *place, alt_cm, speed, 0, datum)
+        place = (item.lat_e7 or 0, item.lon_e7 or 0) if rule.position else (0, 0)
+        if action in (NavAction.WAYPOINT, NavAction.LAND):
+            return NavRecord(action, *place, alt_cm, speed, 0, datum)
+        return NavRecord(action, *place, alt_cm, p1, speed if action in LEGS else 0, datum)
 
     def _take_heading(self, item: MissionItem) -> RejectingFinding | None:
         """CONDITION_YAW becomes SET_HEAD: an absolute heading, turned to at the flight controller's own rate."""
@@ -217,8 +209,8 @@ class NavCheck(ListCheck):
         """DO_CHANGE_SPEED is the speed of the legs that follow."""
         if not self._profile.leg_speed:
             return self._drop(item, "command", item.command, "leg speeds are not supported")
-        if fault := self._speed.fault(item):
-            return self._drop(item, *fault)
+        if math.isfinite(item.p1) and item.p1 not in (0, GROUND_SPEED):
+            return self._drop(item, "p1", item.p1, "speed over ground only")
         if item.p3 not in _NO_THROTTLE:
             self._fit(item, "p3", UNUSED)
         if self._speed.leaves_it(item):

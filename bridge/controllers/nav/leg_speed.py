@@ -27,12 +27,6 @@ class LegSpeed:
     changed_at: list[int] = field(default_factory=list)
     at_jump: dict[int, int] = field(default_factory=dict)
 
-    def fault(self, item: MissionItem) -> tuple[str, float | None, str] | None:
-        """The fault of an invalid change of speed: field, value, reason."""
-        if math.isfinite(item.p1) and item.p1 not in (0, GROUND_SPEED):
-            return "p1", item.p1, "speed over ground only"
-        return None
-
     @staticmethod
     def leaves_it(item: MissionItem) -> bool:
         """True if a change of speed means "no change"."""

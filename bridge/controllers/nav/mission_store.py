@@ -138,8 +138,8 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
             if failure is PushFailure.NO_ANSWER:
                 self._known = before
             elif writing and not (yield from self._restore(before)):
-                is_gone = failure is PushFailure.INCOMPLETE
-                return PushResult(_UNRESTORED.get(failed.failure, failure) if is_gone else failure)
+                has_armed = failed.failure is PushFailure.ARMED and failure is PushFailure.INCOMPLETE
+                return PushResult(PushFailure.ARMED_WHILE_WRITING if has_armed else failure)
             return PushResult(failed.failure)
 
     @abstractmethod
@@ -279,7 +279,3 @@ def _frame(number: int, record: NavRecord) -> bytes:
         return encode_set_wp(number, record)
     except UnsafeRecord as unsafe:
         raise PushFailed(PushFailure.UNSAFE) from unsafe
-
-
-#: The failures to report instead if the old list is lost.
-_UNRESTORED = {PushFailure.ARMED: PushFailure.ARMED_WHILE_WRITING}

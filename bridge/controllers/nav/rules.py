@@ -115,21 +115,21 @@ REPEATS = Range(-1, 32767, "repeats -1..32767")
 class NavRule:
     """One row. p1: the range of the first parameter. position: required; if False, none is kept."""
 
-    name: str
+    action: NavAction
     p1: Range
     position: bool
     height: AltitudeUse
 
 
-_ROI = NavRule("ROI", UNUSED, True, AltitudeUse.POINT)
+_ROI = NavRule(NavAction.SET_POI, UNUSED, True, AltitudeUse.POINT)
 #: Commands that become one record with only these fields. nav/check.py handles the others:
 #: CONDITION_YAW, DO_SET_ROI_NONE, DO_JUMP, DO_CHANGE_SPEED.
 NAV_RULES: Mapping[int, NavRule] = {
-    Command.NAV_WAYPOINT: NavRule("WAYPOINT", HOLD, True, AltitudeUse.FLOWN),
-    Command.NAV_LOITER_UNLIM: NavRule("LOITER_UNLIM", UNUSED, True, AltitudeUse.FLOWN),
-    Command.NAV_LOITER_TURNS: NavRule("LOITER_TURNS", UNUSED, True, AltitudeUse.FLOWN),
-    Command.NAV_LOITER_TIME: NavRule("LOITER_TIME", HOLD, True, AltitudeUse.FLOWN),
-    Command.NAV_RETURN_TO_LAUNCH: NavRule("RTL", LANDS, False, AltitudeUse.RTH),
-    Command.NAV_LAND: NavRule("LAND", UNUSED, True, AltitudeUse.APPROACH),
+    Command.NAV_WAYPOINT: NavRule(NavAction.WAYPOINT, HOLD, True, AltitudeUse.FLOWN),
+    Command.NAV_LOITER_UNLIM: NavRule(NavAction.POSHOLD_UNLIM, UNUSED, True, AltitudeUse.FLOWN),
+    Command.NAV_LOITER_TURNS: NavRule(NavAction.WAYPOINT, UNUSED, True, AltitudeUse.FLOWN),
+    Command.NAV_LOITER_TIME: NavRule(NavAction.POSHOLD_TIME, HOLD, True, AltitudeUse.FLOWN),
+    Command.NAV_RETURN_TO_LAUNCH: NavRule(NavAction.RTH, LANDS, False, AltitudeUse.RTH),
+    Command.NAV_LAND: NavRule(NavAction.LAND, UNUSED, True, AltitudeUse.APPROACH),
     **dict.fromkeys(ROI_COMMANDS, _ROI),
 }
