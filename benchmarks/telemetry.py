@@ -4,7 +4,7 @@
 CPU: the daemon polls a simulated Naze that keeps the pace of a UART, and sends the 100 datagrams per second that one
 ground station requested, or only attitudes. Latency: the other end of the terminal is in this process and replies at
 once; each attitude is numbered, so that a datagram is matched with its reply. The floor of both is a bare loop that
-polls a board of its own at the same rates at the same time (benchmarks.floors). Noise needs no port: a bridge that has
+polls its own board at the same rates at the same time (benchmarks.floors). Noise needs no port: a bridge that has
 found a flight controller gets it in simulated time.
 """
 

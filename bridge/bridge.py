@@ -108,7 +108,7 @@ class Bridge:
         self._pass_on_news(now)
 
     def take_fc_output(self) -> list[bytes]:
-        """The bytes to be written to the port at the present `session.state.speed`."""
+        """The bytes to be written to the port at the current `session.state.speed`."""
         return self.session.take_output()
 
     # The ground stations' side.

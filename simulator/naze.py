@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated board: power, wires and flash around the firmware, without a clock of its own.
+"""The simulated board: power, wires and flash around the firmware, without its own clock.
 
 Time is passed in (seconds of any monotonic clock). Events between two calls are computed at their nominal times, so a
 late call changes only the time at which bytes are collected.
@@ -23,7 +23,7 @@ from simulator.uart import Uart
 class SimulatedNaze(SimulatedBoard):
     """A Naze32 with Harakiri.
 
-    `memory` is the flash chip, of `flash_size(options)` bytes; without it the board has a blank one of its own.
+    `memory` is the flash chip, of `flash_size(options)` bytes; without it the board has its own blank one.
     `boot_missions` makes the mission extension, at every boot.
     """
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Replays the flight controller of a UART capture, to reproduce field problems, or in simulated time in a test.
 
-Unsolicited data is sent at its recorded time, replies on request, because the present bridge may send different
+Unsolicited data is sent at its recorded time, replies on request, because the current bridge may send different
 requests, or the same ones sooner or later. Each request gets the reply that the same request got at this time of the
 recording, with the same delay, and none if it got none. Invented replies:
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The common part of all boards: a power switch, a reset line, and a serial line that damages bytes.
 
-No board has a clock of its own: `now` is in seconds of any monotonic clock.
+No board has its own clock: `now` is in seconds of any monotonic clock.
 """
 
 import random
@@ -43,7 +43,7 @@ class SimulatedBoard(ABC):
     @property
     @abstractmethod
     def baud(self) -> int:
-        """The present speed of its port."""
+        """The current speed of its port."""
 
     @property
     @abstractmethod

@@ -52,9 +52,9 @@ class StateLock:
         except OSError as error:
             holder = os.read(descriptor, 20).decode(errors="replace").strip()
             os.close(descriptor)
-            who = f"process {holder}" if holder else "another process"
+            owner = f"process {holder}" if holder else "another process"
             raise StoreError(
-                f"the state directory {self._directory} is in use by {who}; "
+                f"the state directory {self._directory} is in use by {owner}; "
                 f"stop it, or use another directory with --state-dir"
             ) from error
         self._descriptor = descriptor

@@ -120,7 +120,7 @@ class Autosense:
         return min(self._visit.phase_ends, self._visit.ends)
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that were read at the present `speed`."""
+        """Take bytes that were read at the current `speed`."""
         for msp_frame in self._visit.msp.feed(data):
             self._msp_frame(msp_frame, now)
         for mavlink_frame in self._visit.mavlink.feed(data):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Listens to a serial port before anything is sent, to detect GPS receivers and telemetry radios. Sans-IO.
 
-A GPS receiver sends at least once a second. A SiK radio puts RADIO_STATUS of its own (system 51, component 68) between
+A GPS receiver sends at least once a second. A SiK radio puts its own RADIO_STATUS (system 51, component 68) between
 the frames of the other end, which is a ground station. Only complete frames count. A device that stays silent, or is
 not understood at any speed, may be a flight controller and is left to autosense.
 """
@@ -63,7 +63,7 @@ class PortListener:
         self.ends = now + _LISTEN_S
 
     def receive(self, data: bytes) -> None:
-        """Take bytes that were read at the present `speed`."""
+        """Take bytes that were read at the current `speed`."""
         self._watch.feed(data)
         self._size += len(data)
         self.what = self._watch.what

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The profile of a flight controller: everything specific to one kind of board.
 
-`bridge.controllers.table` lists the profiles. To add a flight controller, write its profile in a file of its own under
+`bridge.controllers.table` lists the profiles. To add a flight controller, write its profile in its own file under
 `bridge/controllers/` and add it to that list; nothing else asks what kind of board it is.
 """
 
@@ -46,7 +46,7 @@ class Profile:
 
     name: for people and logs. family: profiles of one firmware share it; a board that switches protocol stays in it.
     recognise: MSP only; returns the flight controller if the interview shows that it is this kind.
-    polls: the telemetry questions it answers. decoders: by command, for replies in a layout of its own; the common ones
+    polls: the telemetry questions it answers. decoders: by command, for replies in its own layout; the common ones
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
     has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.

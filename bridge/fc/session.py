@@ -65,7 +65,7 @@ class FcSession:
         #: From the port's opening or a loss until a flight controller is found.
         self._incident = ""
         self._on_change = on_change
-        #: The present state, with the flight controller, the MSP link, and the speed that the port must have.
+        #: The current state, with the flight controller, the MSP link, and the speed that the port must have.
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
 
     def opened(self, now: float) -> None:

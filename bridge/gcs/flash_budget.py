@@ -2,7 +2,7 @@
 """Limits the writes to the flight controller's flash, whose pages endure 10,000 each. Sans-IO.
 
 All ground stations on open links together get 160 writes at once and 12 an hour: to wear out a page, strangers would
-have to write for three weeks. A Harakiri with the mission extension has a limit of its own (docs/msp-mission.md).
+have to write for three weeks. A Harakiri with the mission extension has its own limit (docs/msp-mission.md).
 """
 
 from collections.abc import Callable, Hashable
@@ -26,14 +26,14 @@ class FlashBudget:
     more than half as many writes are left as it has used: a single one gets 96 at once and 7 an hour. A host that gains
     precedence takes over the account of one that has lost it: changing addresses gains nothing.
 
-    A peer with the key or a listed address has a budget of its own, but its writes count for the others, too.
+    A peer with the key or a listed address has its own budget, but its writes also count for the others.
     """
 
     def __init__(self, standing: Callable[[Peer], Standing], stations: Stations) -> None:
         self._standing = standing
         self._stations = stations
         self._shares = Shares(_WRITES)
-        #: The hosts with precedence, and those that had it, each with an account of its own.
+        #: The hosts with precedence, and those that had it, each with its own account.
         self._accounts: set[Hashable] = set()
         self._proven: dict[Hashable, TokenBucket] = {}
 

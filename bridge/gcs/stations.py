@@ -230,6 +230,6 @@ class Stations:
         times = {}
         for peer, known in self._known.items():
             # Heard later at another address: the station has moved there.
-            moved = all(latest[peer.link, known.is_listener, who] > at for who, at in known.speakers.items())
+            moved = all(latest[peer.link, known.is_listener, ids] > at for ids, at in known.speakers.items())
             times[peer] = known.heard_at + (MOVED_S if moved else EXPIRY_S)
         return times

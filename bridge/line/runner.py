@@ -157,7 +157,7 @@ class Runner:
 
     @property
     def _interruptible(self) -> Task[Any] | None:
-        """The running conversation, unless it waits for the store, which has a timeout of its own."""
+        """The running conversation, unless it waits for the store, which has its own timeout."""
         return self._current if isinstance(self._awaited, Receive | Await | Pause) else None
 
     def _begin_next(self, now: float) -> None:

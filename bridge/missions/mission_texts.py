@@ -41,6 +41,6 @@ def finding_lines(findings: Iterable[Finding]) -> list[tuple[News, str]]:
     lines = [(finding.news, finding.text(counts[kind])) for kind, finding in first.items()]
     lines.sort(key=lambda line: line[0] is not News.WARNING)
     if len(lines) > _MOST_LINES:
-        more = f"and {len(lines) - _MOST_LINES} more: see the list on the status page or naze-bridge missions show"
+        more = f"and {len(lines) - _MOST_LINES} more: see the status page or naze-bridge missions show"
         lines[_MOST_LINES:] = [(News.NOTICE, more)]
     return lines

@@ -57,21 +57,21 @@ class Finding:
 
     def text(self, count: int = 1) -> str:
         """One line with the reason; `count` items have the same finding."""
-        who = f"{count} items" if count > 1 else f"WP {self.seq}" if self.seq else "Home"
+        subject = f"{count} items" if count > 1 else f"WP {self.seq}" if self.seq else "Home"
         if self.becomes == REJECTED:
-            return f"Mission rejected: {self.why}" if self.seq is None else f"Rejected, {who}: {self.why}"
+            return f"Mission rejected: {self.why}" if self.seq is None else f"Rejected, {subject}: {self.why}"
         if self.becomes == CLEARED:
             return f"Mission erased: {self.why}"
         if self.becomes == DROPPED:
             name = "item" if self.command is None else command_name(self.command)
-            return f"{who}: {name} dropped, {self.why}"
+            return f"{subject}: {name} dropped, {self.why}"
         if self.seq is None:
             return self.why
         if self.field == "frame" or (self.news is News.WARNING and self.field in ("lat_e7", "lon_e7")):
-            return f"{who}: {self.why}"
+            return f"{subject}: {self.why}"
         if self.was == self.becomes:
             # Nothing is changed: the warning is about the value as sent.
-            return f"{who}: {self.why}"
+            return f"{subject}: {self.why}"
         label = value_label(self.command, self.field)
         unit = " m" if self.field in _METRES or label in _METRES else ""
         was, becomes = self._shown(self.was), self._shown(self.becomes)
@@ -80,7 +80,7 @@ class Finding:
         is_raised = self.field == "alt_m" and self.news is News.WARNING
         verb = "raised" if is_raised else "changed"
         change = f"set to {becomes}" if self.was is None else f"{verb} from {was} to {becomes}"
-        return f"{who}: {label} {change}{unit} ({self.why})"
+        return f"{subject}: {label} {change}{unit} ({self.why})"
 
     def _shown(self, value: str | float | int | None) -> str:
         if value is None or isinstance(value, str):

@@ -3,7 +3,7 @@
 
 Uploads run one at a time, in the order of their MISSION_COUNT, unless slow or numerous lists would lock out the
 others: then they are received in parallel, and only written one at a time. Mission Planner loses
-packets of its own and takes any ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed
+some packets and takes any ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed
 in docs/ground-stations.md.
 """
 
@@ -456,7 +456,7 @@ class MissionUploads:
             self._context.refuse(station, _UNKNOWN_UPLOAD)
 
     def _elsewhere(self, upload: _Upload, now: float) -> list[Station]:
-        """Other addresses of the upload's station, except those that have announced a list of their own."""
+        """Other addresses of the upload's station, except those that have announced their own list."""
         announced = {other.station for other in self._uploads if other is not upload}
         return [
             where

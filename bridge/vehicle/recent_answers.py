@@ -54,16 +54,16 @@ class RecentAnswers:
         return station in self._answers
 
     def to(self, station: Station, now: float) -> Answer | None:
-        """The last answer to a ground station, at its present or previous address."""
+        """The last answer to a ground station, at its current or previous address."""
         self._forget_old(now)
         if station in self._answers:
             return self._answers[station]
-        return next((answer for who, answer in self._answers.items() if self._has_moved(who, station, now)), None)
+        return next((answer for known, answer in self._answers.items() if self._has_moved(known, station, now)), None)
 
     def is_known(self, station: Station, now: float) -> bool:
         """True if a station with these ids was answered, here or at an address that it may have left."""
         self._forget_old(now)
-        return any((who.sysid, who.compid) == (station.sysid, station.compid) for who in self._answers)
+        return any((known.sysid, known.compid) == (station.sysid, station.compid) for known in self._answers)
 
     def _forget_old(self, now: float) -> None:
         while self._answers and now > self._answers[oldest := next(iter(self._answers))].until:

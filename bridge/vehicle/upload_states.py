@@ -134,7 +134,7 @@ class ItemRequest:
         self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
 
     def is_copy(self, now: float) -> bool:
-        """True if a repeated message was duplicated on its way, and needs no answer of its own."""
+        """True if a repeated message was duplicated on its way, and needs no separate answer."""
         return now < self._asked_at + _REPEAT_AFTER_S
 
     def answered(self, now: float) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Connects a command to a bridge: the running daemon's, or one of its own with `--fc`."""
+"""Connects a command to a bridge: the running daemon's, or its own with `--fc`."""
 
 import asyncio
 import signal

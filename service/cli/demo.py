@@ -88,7 +88,7 @@ def _stay(port: int, process: subprocess.Popen[bytes], state_dir: Path, console:
     try:
         process.wait()
     except KeyboardInterrupt:
-        console.print()  # the shell's prompt belongs on a line of its own
+        console.print()  # the shell's prompt starts on a new line
 
 
 def _latest_mission(state_dir: Path) -> Json:

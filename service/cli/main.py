@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The `naze-bridge` command: each subcommand lives in a file of its own and is imported only when it is used."""
+"""The `naze-bridge` command: each subcommand is in its own file and is imported only when it is used."""
 
 import errno
 import importlib

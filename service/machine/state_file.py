@@ -21,7 +21,7 @@ _log = structlog.get_logger()
 
 
 class StateFile:
-    """Written in order by a thread of its own: an SD card may take a second. `without`: the effect of losing it."""
+    """Written in order by its own thread: an SD card may take a second. `without`: the effect of losing it."""
 
     def __init__(self, path: Path, without: str) -> None:
         self._path = path

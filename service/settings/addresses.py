@@ -101,7 +101,7 @@ def parse_fc(text: str) -> FcAddress:
 
 
 def _parse_serial(text: str, port: str) -> SerialFc:
-    """Read "PATH", "PATH,BAUD" or "PATH:BAUD"; paths of /dev/serial/by-path have colons of their own."""
+    """Read "PATH", "PATH,BAUD" or "PATH:BAUD"; paths in /dev/serial/by-path contain colons."""
     path, separator, baud = port.partition(",")
     if not separator:
         before, separator, after = port.rpartition(":")

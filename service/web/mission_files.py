@@ -32,7 +32,7 @@ Progress = Callable[[Json], None]
 
 
 class MissionWriter:
-    """One write at a time. `state`: the present or latest one as the page shows it, None before the first."""
+    """One write at a time. `state`: the current or latest one as the page shows it, None before the first."""
 
     def __init__(self) -> None:
         self._task: asyncio.Task[None] | None = None

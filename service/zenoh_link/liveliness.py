@@ -27,8 +27,8 @@ class Liveliness:
         self._own = str(session.zid())
 
         def joined(event: zenoh.TransportEvent) -> None:
-            who, kind = str(event.transport.zid), str(event.transport.whatami)
-            post(self._loop, self._joined, who, kind, event.kind == zenoh.SampleKind.PUT)
+            peer_id, kind = str(event.transport.zid), str(event.transport.whatami)
+            post(self._loop, self._joined, peer_id, kind, event.kind == zenoh.SampleKind.PUT)
 
         session.info.declare_transport_events_listener(zenoh.handlers.Callback(joined, indirect=False), history=True)
         liveliness = session.liveliness()
@@ -41,16 +41,16 @@ class Liveliness:
 
         liveliness.declare_subscriber(f"{alive}/*", zenoh.handlers.Callback(seen, indirect=False), history=True)
 
-    def _seen(self, who: str, is_there: bool) -> None:
-        if who == self._own or is_there == (who in self.others):
+    def _seen(self, peer_id: str, is_there: bool) -> None:
+        if peer_id == self._own or is_there == (peer_id in self.others):
             return
         if is_there:
-            self.others.add(who)
+            self.others.add(peer_id)
             what = "give one of the two another zenoh.vehicle"
-            self._note("warning", "zenoh.name_taken", vehicle=self._vehicle, by=who, what=what)
+            self._note("warning", "zenoh.name_taken", vehicle=self._vehicle, by=peer_id, what=what)
         else:
-            self.others.discard(who)
-            self._note("info", "zenoh.name_free", vehicle=self._vehicle, was=who)
+            self.others.discard(peer_id)
+            self._note("info", "zenoh.name_free", vehicle=self._vehicle, was=peer_id)
 
     @property
     def is_alone(self) -> bool:
@@ -65,9 +65,9 @@ class Liveliness:
             "zenoh_others_of_this_name": len(self.others),
         }
 
-    def _joined(self, who: str, kind: str, is_there: bool) -> None:
+    def _joined(self, peer_id: str, kind: str, is_there: bool) -> None:
         if is_there:
-            self._neighbours[who] = kind
+            self._neighbours[peer_id] = kind
         else:
-            self._neighbours.pop(who, None)
-        self._note("info", "zenoh.joined" if is_there else "zenoh.left", neighbour=who, kind=kind)
+            self._neighbours.pop(peer_id, None)
+        self._note("info", "zenoh.joined" if is_there else "zenoh.left", neighbour=peer_id, kind=kind)

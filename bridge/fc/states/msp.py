@@ -139,9 +139,9 @@ class Identifying(MspLine):
         port.runner.link_up(self.link)
         self._task = port.runner.start(_identify(port.profiles), self._identified, now)
 
-    def _identified(self, who: FlightController | LinkLost | None, _now: float) -> None:
-        if isinstance(who, FlightController):
-            self._end = Identified(who, self.found, self.link)
+    def _identified(self, board: FlightController | LinkLost | None, _now: float) -> None:
+        if isinstance(board, FlightController):
+            self._end = Identified(board, self.found, self.link)
         else:
             self._end = Lost("fell silent while it was being identified", pending=self.unanswered())
 
@@ -202,9 +202,9 @@ class Polling(MspLine):
         check_at = inf if self.port.runner.is_busy else self._check_at
         return min(super().deadline(), check_at, self.port.polls.next_deadline(self.link))
 
-    def _checked(self, who: FlightController | LinkLost | None, now: float) -> None:
-        if isinstance(who, FlightController) and who.profile is not self.controller.profile:
-            self._end = Identified(who, self.found, self.link)
+    def _checked(self, board: FlightController | LinkLost | None, now: float) -> None:
+        if isinstance(board, FlightController) and board.profile is not self.controller.profile:
+            self._end = Identified(board, self.found, self.link)
             return
         self._check_interval_s = min(self._check_interval_s * 2, _LAST_CHECK_S)
         self._check_at = now + self._check_interval_s

@@ -58,8 +58,8 @@ def _check_port(host: Host, link: GcsAddress) -> Checked:
     holder = host.holder(f"socket:[{inode}]")
     if holder is not None and holder.is_naze_bridge:
         return ok("port for ground stations", f"{what} is the running daemon's")
-    who = holder or "another program (see: sudo naze-bridge doctor)"
-    return problem("port for ground stations", f"{what} is used by {who}", "stop it, or give gcs another port")
+    user = holder or "another program (see: sudo naze-bridge doctor)"
+    return problem("port for ground stations", f"{what} is used by {user}", "stop it, or give gcs another port")
 
 
 def _inode(host: Host, transport: str, port: int) -> str | None:

@@ -22,7 +22,7 @@ _ACCEPT_PENDING = 1_000
 _BUFFER_BYTES = 32 << 10
 _LISTEN = ("declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber")
 _SPEAK = ("put", "delete", "declare_queryable", "reply", "liveliness_token")
-#: Verbatim chunks match no wildcard: each needs an expression of its own.
+#: Verbatim chunks match no wildcard: each needs its own expression.
 _EXPRESSIONS = ("**", "**/@adv/**", "@cmd/**", "@mavlink/**")
 _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 

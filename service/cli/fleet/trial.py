@@ -45,7 +45,7 @@ class Trial:
 def try_mission(
     session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeState], mission: bytes
 ) -> list[Trial]:
-    """Have each vehicle check the mission, and get the checksum of its own."""
+    """Have each vehicle check the mission and send the checksum of its current one."""
     trials = {name: Trial(name) for name in names}
     for name, reply in ask_each(session, prefix, names, CHECK.suffix, _TIMEOUT_S, mission):
         if reply is not None:
