@@ -34,6 +34,8 @@ class Range:
 
     def reason(self, value: float) -> str:
         """The reason that `value` is not stored unchanged."""
+        if not math.isfinite(value):
+            return "not a number"
         whole = _whole(value)
         if whole == 0 and self.instead_of_zero:
             return "0 not allowed"

@@ -84,8 +84,9 @@ def test_every_warning_and_rejection_fits_a_statustext() -> None:
 
 def test_no_value_is_reported_as_changed_to_itself() -> None:
     """Neither a number with noise in its last digit nor an unchanged coordinate."""
-    verdict = check_list(mission(item(WAYPOINT, p2=3.0000002384185791, p3=0.5)), HarakiriRules())
+    verdict = check_list(mission(item(WAYPOINT, p1=math.inf, p2=3.0000002384185791, p3=0.5)), HarakiriRules())
     assert [each.text() for each in verdict.findings] == [
+        "WP 1: Delay changed from inf to 0 (not a number)",
         "WP 1: Hit Rad changed from 3.00000024 to 3 m (whole numbers only)",
         "WP 1: param3 changed from 0.5 to 0 (not used)",
     ]
