@@ -31,7 +31,7 @@ from protocols.msp.telemetry import decode_channels
 
 _MAX_SAVES = 2
 #: Requests after SAVE: their timeouts together exceed its flash time.
-_ASKS_AFTER_SAVE = 4
+_ASKS_AFTER_SAVE = 12
 _MAX_READS = 2
 _SETTING_SIZE = 1
 _RC_SIZE = 68
@@ -162,8 +162,7 @@ class InavMissions(NavMissions):
             raise PushFailed(PushFailure.UNCERTAIN)
         for _ in range(_MAX_SAVES):
             reply = yield from ask(SAVE_REQUEST, Nav.SAVE, 0, tries=1, exclusive=True)
-            after = yield from self._info_after_save()
-            if after != before:
+            if (yield from self._info(tries=_ASKS_AFTER_SAVE)) != before:
                 raise PushFailed(PushFailure.UNCERTAIN)
             if reply is not None:
                 break
@@ -205,13 +204,6 @@ class InavMissions(NavMissions):
             return bool(before) and (yield from self._is_unchanged((yield from self._look())))
         return False
 
-    def _info_after_save(self) -> Conversation[NavInfo | None]:
-        for _ in range(_ASKS_AFTER_SAVE):
-            info = yield from self._info()
-            if info is not None:
-                return info
-        return None
-
     def _look(self) -> Conversation[tuple[NavInfo, int] | None]:
         """GETINFO, and the number of the selected mission, from 1; of an incomplete list, none is selected."""
         info = yield from self._info()
@@ -222,8 +214,8 @@ class InavMissions(NavMissions):
         reply = yield from ask(SELECTED_REQUEST, SETTING, _SETTING_SIZE)
         return info, reply.payload[0] if reply is not None and reply.payload else 1
 
-    def _info(self) -> Conversation[NavInfo | None]:
-        reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE)
+    def _info(self, *, tries: int = 3) -> Conversation[NavInfo | None]:
+        reply = yield from ask(request(Nav.GETINFO), Nav.GETINFO, INFO_SIZE, tries=tries)
         return None if reply is None else decode_info(reply.payload)
 
 

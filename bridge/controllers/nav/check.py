@@ -253,12 +253,11 @@ class NavCheck(ListCheck):
         if self._profile.limits is not None:
             for place, name, why in limited_legs(self._records, self._profile.limits):
                 self._warn(self._sent[place], name, why)
-        for item, record in zip(self._sent, self._records, strict=True):
-            lands = record.p1 > 0
-            if record.action != NavAction.RTH or self._profile.own_rth_landing:
-                continue
-            if lands != lands_after_rth(self._records):
-                why = f"it would {'hover' if lands else 'land'} because of the last item: put this RTL last"
+        lands = lands_after_rth(self._records)
+        returns = () if self._profile.own_rth_landing else zip(self._sent, self._records, strict=True)
+        for item, record in returns:
+            if record.action == NavAction.RTH and (record.p1 > 0) != lands:
+                why = f"it would {'land' if lands else 'hover'} because of the last item: put this RTL last"
                 return reject(MissionResult.INVALID_PARAM1, item, "p1", why)
         for place, item in self._jumps.wanted:
             if place < len(self._records) and self._speed_differs(place, item):
