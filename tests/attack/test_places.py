@@ -53,7 +53,7 @@ def crowd(bench: Bench, stack: ExitStack, *spoken: Message, size: int = CROWD, p
 
 def hears_heartbeats(station: PlainStation, count: int) -> bool:
     """Send a heartbeat every second until `count` heartbeats have been received."""
-    for _ in range(20):
+    for _ in range(60):
         station.send(HELLO)
         count -= len([heard for heard in station._messages(1.0) if heard.get_type() == "HEARTBEAT"])
         if count <= 0:
