@@ -42,7 +42,7 @@ _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | None]:
     """Open or create the database; also returns the new path of a damaged one, if there was one.
 
-    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's StateLock: no other
+    `now`: unix seconds, for the name of a damaged file. The caller holds the directory's state_lock: no other
     process may have a file open that is renamed. StoreError if the file cannot be opened, created or written,
     or is of a newer release.
     """

@@ -282,7 +282,7 @@ def open_store(path: Path, now: float, budget: int = BUDGET) -> OpenedStore:
     """Open the store in file `path`, or create it and its directory.
 
     `now`: unix seconds, for the name of a damaged file. `budget`: size limit, bytes. The caller holds
-    the directory's StateLock.
+    the directory's state_lock.
     StoreError if it cannot be opened or written, or is of a newer release.
     """
     connection, set_aside = open_database(path, now)
@@ -296,7 +296,7 @@ def store_in_memory() -> MissionStore:
 
 
 def read_store(path: Path) -> MissionStore:
-    """Open the store in file `path` read-only, without the StateLock; StoreError if that fails."""
+    """Open the store in file `path` read-only, without the state_lock; StoreError if that fails."""
     return MissionStore(read_database(path), path)
 
 

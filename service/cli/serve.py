@@ -17,7 +17,7 @@ from service.machine.log_setup import set_up_logging
 from service.machine.notify import Notifier
 from service.settings import Settings, SettingsError
 from service.settings.zenoh import ZenohSettingsError
-from storage.state_lock import StateLock, StateUnusableError
+from storage.state_lock import StateUnusableError, state_lock
 from storage.store_error import StoreError
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
     with ExitStack() as stack:
         # An unwritable disk must not prevent a flight: the store reports it, and keeps missions in memory.
         with suppress(StateUnusableError):
-            stack.enter_context(StateLock(settings.state_dir))
+            stack.enter_context(state_lock(settings.state_dir))
         asyncio.run(_main(settings, load, socket_of_daemon(settings.state_dir)))
 
 

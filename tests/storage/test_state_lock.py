@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from storage.mission_store import open_store
-from storage.state_lock import StateLock
+from storage.state_lock import state_lock
 from storage.store_error import StoreError
 from tests.support.sample_missions import mission
 
@@ -18,12 +18,12 @@ import sys
 from pathlib import Path
 from tests.support.sample_missions import mission
 from storage.mission_store import open_store
-from storage.state_lock import StateLock
+from storage.state_lock import state_lock
 from storage.store_error import StoreError
 
 directory = Path(sys.argv[1])
 try:
-    with StateLock(directory), open_store(directory / "missions.db", now=0.0).store as store:
+    with state_lock(directory), open_store(directory / "missions.db", now=0.0).store as store:
         print(store.add(mission(1)), flush=True)
         sys.stdin.read()
 except StoreError as error:
@@ -59,7 +59,7 @@ def test_the_second_daemon_is_told_the_first_ones_process_id(tmp_path: Path) -> 
         first.kill()
     with start(directory) as third:  # a dead process's lock does not count
         assert said_by(third) == "2"
-    with StateLock(directory), open_store(directory / "missions.db", now=0.0).store as store:
+    with state_lock(directory), open_store(directory / "missions.db", now=0.0).store as store:
         assert [summary.number for summary in store.list(9)] == [2, 1]
 
 
@@ -73,17 +73,19 @@ def test_of_many_processes_started_at_once_one_gets_the_lock(tmp_path: Path) -> 
 
 
 def test_the_lock_can_be_released_and_taken_again(tmp_path: Path) -> None:
-    lock = StateLock(tmp_path)
     for _ in range(2):
-        with lock, pytest.raises(StoreError, match=f"in use by process {os.getpid()}"):
-            StateLock(tmp_path).acquire()
-    lock.release()
+        in_use = pytest.raises(StoreError, match=f"in use by process {os.getpid()}")
+        with state_lock(tmp_path), in_use, state_lock(tmp_path):
+            pass
 
 
 def test_a_file_in_place_of_the_directory(tmp_path: Path) -> None:
     (tmp_path / "state").touch()
-    with pytest.raises(StoreError, match=r"cannot use the state directory .*/state: .*use another with --state-dir"):
-        StateLock(tmp_path / "state").acquire()
+    unusable = pytest.raises(
+        StoreError, match=r"cannot use the state directory .*/state: .*use another with --state-dir"
+    )
+    with unusable, state_lock(tmp_path / "state"):
+        pass
 
 
 def test_without_the_lock_two_writers_take_turns(tmp_path: Path) -> None:

@@ -81,14 +81,14 @@ import os, sys
 from pathlib import Path
 from storage.mission_store import open_store
 from storage.store_error import StoreError
-from storage.state_lock import StateLock
+from storage.state_lock import state_lock
 
 if os.geteuid() == 0:
     os.setgid(65534)
     os.setuid(65534)
 try:
     if sys.argv[1] == "lock":
-        StateLock(Path(".")).acquire()
+        state_lock(Path(".")).__enter__()
     else:
         open_store(Path("missions.db"), now=0.0).store.close()
 except StoreError as error:
