@@ -84,7 +84,7 @@ class PtyLink:
         return self._path.readlink() if self._path.is_symlink() else self._path
 
     def _is_anothers(self) -> bool:
-        """True if a running simulator owns the terminal behind the link; terminal numbers are reused."""
+        """True if a running simulator owns the link. Terminal numbers are reused: an older link led to another one."""
         if self._leads_to().parent != _TERMINALS:
             return False
         try:
@@ -94,7 +94,7 @@ class PtyLink:
         try:
             _lock(terminal)
         except BlockingIOError:
-            return True
+            return os.fstat(terminal).st_ctime_ns <= self._path.lstat().st_mtime_ns
         finally:
             os.close(terminal)
         return False

@@ -101,7 +101,8 @@ class FcConnection:
             if self.capture is not None:
                 self.capture.note(UartAction.WRITE, self._speed, data)
             self._port.write(data)
-            self._traffic.sent(data)
+            self._traffic.pieces_sent += 1
+            self._traffic.bytes_sent += len(data)
 
     def event(self, event: str) -> None:
         """The bridge logged an event."""
@@ -122,7 +123,8 @@ class FcConnection:
     def _received(self, data: bytes) -> None:
         if self.capture is not None:
             self.capture.note(UartAction.READ, self._speed, data)
-        self._traffic.received(data)
+        self._traffic.pieces_received += 1
+        self._traffic.bytes_received += len(data)
         bridge = self._bridge
         if self._finder is not None:
             self._finder.received(data)

@@ -68,7 +68,9 @@ class GcsConnections:
         """Send the bridge's datagrams."""
         for peer, data in self._bridge.ground.take_datagrams():
             self._links[peer.link].send(peer, data)
-            self._traffic[peer.link].sent(data)
+            traffic = self._traffic[peer.link]
+            traffic.pieces_sent += 1
+            traffic.bytes_sent += len(data)
 
     def close(self) -> None:
         """Close all links."""
@@ -77,7 +79,9 @@ class GcsConnections:
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
         """Take bytes from a ground station."""
-        self._traffic[peer.link].received(data)
+        traffic = self._traffic[peer.link]
+        traffic.pieces_received += 1
+        traffic.bytes_received += len(data)
         try:
             if not self._bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram):
                 return

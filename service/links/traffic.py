@@ -12,13 +12,3 @@ class Traffic:
     bytes_received: int = 0
     pieces_sent: int = 0
     bytes_sent: int = 0
-
-    def received(self, data: bytes) -> None:
-        """Count a read."""
-        self.pieces_received += 1
-        self.bytes_received += len(data)
-
-    def sent(self, data: bytes) -> None:
-        """Count a write."""
-        self.pieces_sent += 1
-        self.bytes_sent += len(data)

@@ -17,7 +17,7 @@ from service.zenoh_link.rates import MAX_REQUEST_HZ, MAX_REQUEST_S, SampleRates
 _ACCEPTED = "MAV_MISSION_ACCEPTED"
 _PAYLOAD = "the query's payload"
 #: Larger files are read by the command line only, not alongside a running link: a mission that fits has about 20 KB.
-_MAX_BYTES = 1 << 20
+_MAX_BYTES = 1 << 18
 _MAX_ITEMS = 1000
 _USUAL_REQUEST_S = 60.0
 _RATE_NAMES = (*(group.value for group in Group), STATE_NAME)
@@ -29,6 +29,8 @@ class CommandQueries:
     def __init__(self, api: DaemonApi, rates: SampleRates) -> None:
         self._api = api
         self._rates = rates
+        #: Parsing takes 60 times the file's size in memory.
+        self._one_at_a_time = asyncio.Lock()
         self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.UPLOAD: self._upload,
             keys.CHECK: self._check,
@@ -39,12 +41,12 @@ class CommandQueries:
         }
 
     async def _upload(self, question: Question) -> Json:
-        items = await _items(question)
+        items = await self._items(question)
         # A file without a storable item must not erase the missions of a fleet.
         return _end(await self._api.push(items, "zenoh upload", _teller(question, len(items)), may_erase=False))
 
     async def _check(self, question: Question) -> Json:
-        return {"result": await self._api.check(await _items(question))}
+        return {"result": await self._api.check(await self._items(question))}
 
     async def _clear(self, _: Question) -> Json:
         return _end(await self._api.push([], "zenoh clear", lambda _: None))
@@ -68,20 +70,21 @@ class CommandQueries:
                 self._rates.request(name, rate_hz, now + for_s)
         return {"result": {"rates_hz": self._rates.describe(now)}}
 
-
-async def _items(question: Question) -> list[MissionItem]:
-    """Parse the mission in the payload, with the formats, reader and messages of `naze-bridge check`."""
-    if question.size > _MAX_BYTES:
-        raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 20} MB: send a mission file")
-    try:
-        items = await asyncio.to_thread(read_mission_file, question.payload(), _PAYLOAD)
-    except MissionFileError as error:
-        raise QueryRefused(str(error)) from None
-    if not items:
-        raise QueryRefused(f"{_PAYLOAD} holds no mission; mission/clear clears the one on the craft")
-    if len(items) > _MAX_ITEMS:
-        raise QueryRefused(f"{_PAYLOAD} holds {len(items)} items, more than any flight controller stores: shorten it")
-    return items
+    async def _items(self, question: Question) -> list[MissionItem]:
+        """Parse the mission in the payload, with the formats, reader and messages of `naze-bridge check`."""
+        if question.size > _MAX_BYTES:
+            raise QueryRefused(f"{_PAYLOAD} is larger than {_MAX_BYTES >> 10} KiB: send a mission file")
+        try:
+            async with self._one_at_a_time:
+                items = await asyncio.to_thread(read_mission_file, question.payload(), _PAYLOAD)
+        except MissionFileError as error:
+            raise QueryRefused(str(error)) from None
+        if not items:
+            raise QueryRefused(f"{_PAYLOAD} holds no mission; mission/clear clears the one on the craft")
+        if len(items) > _MAX_ITEMS:
+            held = f"{_PAYLOAD} holds {len(items)} items"
+            raise QueryRefused(f"{held}, more than any flight controller stores: shorten it")
+        return items
 
 
 def _number(question: Question, name: str, most: float) -> float | None:

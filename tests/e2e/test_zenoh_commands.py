@@ -104,7 +104,7 @@ BAD_PAYLOADS = {
     "no text": (b"\xff\xfe\x00\x01", "this is not text"),
     "half a plan": (b'{"fileType": "Plan", "mission": {', "JSON"),
     "a place in words": (mission_file(5).replace(b"45.384", b"nowhere"), "line 3"),
-    "10 MB": (b"x" * 10_000_000, "larger than 1 MB"),
+    "10 MB": (b"x" * 10_000_000, "larger than 256 KiB"),
     "a book": (mission_file(1200), "1200 items"),
     "a home alone": (mission_file(1), "only a home point"),
     "too many": (mission_file(200), "146 fit"),

@@ -219,6 +219,18 @@ def test_the_link_of_a_killed_simulator_is_replaced(start: Callable[..., Simulat
         assert ask(port, IDENT) is not None
 
 
+def test_a_link_older_than_the_terminal_behind_it_is_replaced(start: Callable[..., Simulator]) -> None:
+    other = start()
+    stale = other.link.with_name("stale")
+    # The kernel gave the number of a killed simulator's terminal to this one.
+    stale.symlink_to(other.link.readlink())
+    os.utime(stale, (0, 0), follow_symlinks=False)
+    start("--link", str(stale), "--control", f"{stale}-control")
+    with serial.Serial(str(stale), 115200, timeout=0.05) as port:
+        assert ask(port, IDENT) is not None
+    assert stale.readlink() != other.link.readlink()
+
+
 def test_a_link_taken_over_by_another_simulator_is_not_removed(start: Callable[..., Simulator]) -> None:
     first = start()
     first.link.unlink()
