@@ -60,7 +60,7 @@
 #define NM_BYTE_TIMEOUT_MS 50u /* the receiver's inter-byte timeout: reported by INFO, kept by the receiver */
 #define NM_IDLE_TIMEOUT_MS 5000u
 #define NM_MAX_RADIUS_CM 2000u
-#define NM_WRITE_BURST 64u     /* flash writes that requests may cause in a row: more than a day of testing missions needs */
+#define NM_WRITE_BURST 250u    /* flash writes that requests may cause in a row: more than a day of testing missions needs */
 #define NM_WRITE_INTERVAL_MS 300000u /* ... and the interval at which one more is allowed */
 
 #define NM_PAGE_SIZE 1024u

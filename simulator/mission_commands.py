@@ -27,7 +27,7 @@ _READ = struct.Struct("<HBB")
 _RECORDS_HEADER = struct.Struct("<BH")
 _RADIUS = struct.Struct("<HH")
 #: The burst of flash writes that requests may cause, and the interval at which one more is allowed.
-_WRITE_BURST = 64
+_WRITE_BURST = 250
 _WRITE_INTERVAL_MS = 300_000
 
 

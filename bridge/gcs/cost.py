@@ -64,7 +64,7 @@ LIMITS = {
     Cost.ANSWER: Limit(Rate(50, 200), Rate(500, 1000)),
     Cost.TRANSFER: Limit(Rate(1000, 2000), Rate(1000, 2000)),
     Cost.TEXT: Limit(Rate(5, 200), Rate(10, 300)),
-    Cost.UPLOAD: Limit(Rate(4, 20), Rate(10, 400)),
+    Cost.UPLOAD: Limit(Rate(10, 50), Rate(10, 400)),
     Cost.BOARD: Limit(Rate(4, 20), Rate(10, 40)),
     Cost.PASSED: Limit(Rate(200, 600), Rate(200, 600)),
     Cost.COPIED: Limit(Rate(150, 300), Rate(150, 300)),

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Limits the writes to the flight controller's flash, whose pages endure 10,000 each. Sans-IO.
 
-All ground stations on open links together get 160 writes at once and 12 an hour: to wear out a page, strangers would
-have to write for three weeks. A Harakiri with the mission extension has its own limit (docs/msp-mission.md).
+All ground stations on open links together get 400 writes at once and 12 an hour: to wear out a page, strangers would
+have to write for a month. A Harakiri with the mission extension has its own limit (docs/msp-mission.md).
 """
 
 from collections.abc import Callable, Hashable
@@ -13,7 +13,7 @@ from bridge.gcs.guard import Standing
 from bridge.gcs.station import Peer
 from bridge.gcs.stations import PRECEDENCE, Stations
 
-_WRITES = Rate(1 / 300, 160)
+_WRITES = Rate(1 / 300, 400)
 
 #: The text for a ground station whose share is used up.
 TOO_MANY_WRITES = "Flash wear limit: try again in 10 minutes"
@@ -23,8 +23,8 @@ class FlashBudget:
     """Shares the writes between the hosts with precedence on an open link; all others have one account.
 
     The last writes are kept for hosts that have not written lately, one for each. Above that, a host may write while
-    more than half as many writes are left as it has used: a single one gets 96 at once and 7 an hour. A host that gains
-    precedence takes over the account of one that has lost it: changing addresses gains nothing.
+    more than half as many writes are left as it has used: a single one gets 256 at once and 7 an hour. A host that
+    gains precedence takes over the account of one that has lost it: changing addresses gains nothing.
 
     A peer with the key or a listed address has its own budget, but its writes also count for the others.
     """

@@ -59,7 +59,10 @@ BOUNDS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 @dataclass(slots=True)
 class _Request:
-    """A request that was sent. Once it is no longer `awaited`, a reply may still arrive until the deadline."""
+    """A request that was sent. Once it is no longer `awaited`, a reply may still arrive until the deadline.
+
+    `is_lost`: it was not answered in time. If it is neither, this one or an equal one before it was answered.
+    """
 
     command: int
     reply_size: int
@@ -67,6 +70,7 @@ class _Request:
     deadline: float
     exclusive: bool
     awaited: bool = True
+    is_lost: bool = False
 
 
 class MspLink:
@@ -85,7 +89,7 @@ class MspLink:
         self._sent: list[_Request] = []  # in sending order
         if owed:
             self._sent.append(
-                _Request(_NO_COMMAND, owed, now, now + owed * self.byte_s, exclusive=False, awaited=False)
+                _Request(_NO_COMMAND, owed, now, now + owed * self.byte_s, exclusive=False, awaited=False, is_lost=True)
             )
         self._output: list[bytes] = []
         self._line_free_at = now
@@ -174,7 +178,7 @@ class MspLink:
         self._sent = [sent for sent in self._sent if sent.awaited or now < sent.deadline]
         lost = [sent for sent in self._sent if now >= sent.deadline]
         for sent in lost:
-            sent.awaited = False
+            sent.awaited, sent.is_lost = False, True
             sent.deadline = sent.sent_at + LONGEST_STALL_S
         if lost:
             self.requests_lost += len(lost)
@@ -223,8 +227,8 @@ class MspLink:
         while self._waiting:
             message = self._waiting[0]
             if message.reply_size > self._room_in_ring():
-                if not any(sent.awaited for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
-                    # Only abandoned requests block this one: the reply to a short request behind them clears them.
+                if all(sent.is_lost for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
+                    # Only lost requests block this one: the reply to a short request behind them clears them.
                     self._ask(_QUESTION, now)
                 return
             self._waiting.popleft()

@@ -30,10 +30,10 @@ def test_flash_writes_are_limited() -> None:
     world.wait_ready()
     station = GroundStation(world)
     save = m.MAVLink_command_long_message(1, 1, 245, 0, 1, 0, 0, 0, 0, 0, 0)
-    for number in range(200):
+    for number in range(300):
         world.after(number / 2, lambda: station.send(save))
-    world.run(100)
-    assert 95 < sum(data.count(_SAVE) for _, _, data in world.written) <= 98
+    world.run(150)
+    assert 250 < sum(data.count(_SAVE) for _, _, data in world.written) <= 258
 
 
 def test_new_peers_share_a_limit_per_host_and_a_total() -> None:

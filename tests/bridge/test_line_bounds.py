@@ -11,6 +11,7 @@ from bridge.line.msp_link import RESYNC, MspLink
 from bridge.line.pending_replies import MAX_OUTSTANDING_BYTES
 from bridge.model.vehicle import Orientation
 from protocols.mavlink.dialect import messages
+from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from simulator.options import Faults, SimOptions
 from tests.support.conversations import Download, records_of, waypoints
@@ -175,6 +176,24 @@ def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
     assert link.outstanding_bytes == 17
     link.receive(reply(101, 11), 0.202)
     assert link.outstanding_bytes == 0
+
+
+def test_a_board_that_answers_again_gets_the_request_that_lost_ones_block() -> None:
+    """Each reply to the second of two equal questions left one of them open, and a third was asked, without end."""
+    link = MspLink(115200, 0.0)
+    link.receiver_timeout_s = 0.05
+    link.send(question(195, 99), 0.0)
+    link.tick(link.next_deadline())
+    link.send(question(195, 99), 0.2)
+    link.tick(link.next_deadline())  # the question that was asked instead is lost, too
+    now, asked = 2.0, sent(link)
+    for _ in range(200):
+        now += 0.005
+        link.tick(now)
+        if Msp.API_VERSION in (fresh := sent(link)):
+            link.receive(reply(Msp.API_VERSION, 0), now + 0.002)
+        asked += fresh + sent(link)
+    assert asked.count(195) == 2
 
 
 def test_a_reply_ends_earlier_requests() -> None:

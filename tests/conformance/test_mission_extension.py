@@ -335,7 +335,7 @@ def test_a_blank_slot_needs_no_erase(fc: Companion) -> None:
 
 def test_flash_writes_are_limited(fc: Companion) -> None:
     fc.device.power_cycle()
-    assert begin_until_refused(fc) == (64, ReplyStatus.BUSY)
+    assert begin_until_refused(fc) == (250, ReplyStatus.BUSY)
     assert fc.info().flags == InfoFlag.WRITES_SPENT
     assert fc.begin(identify(OLD)).status is ReplyStatus.SAME
     assert fc.radius(300) == (ReplyStatus.BUSY, 200)
@@ -353,9 +353,9 @@ def test_flash_writes_are_limited(fc: Companion) -> None:
     fc.device.advance(1000)
     assert begin_until_refused(fc) == (2, ReplyStatus.BUSY)
     fc.device.advance(1000 * 300_000)
-    assert begin_until_refused(fc) == (64, ReplyStatus.BUSY)
+    assert begin_until_refused(fc) == (250, ReplyStatus.BUSY)
     fc.device.power_cycle()
-    assert begin_until_refused(fc) == (64, ReplyStatus.BUSY)
+    assert begin_until_refused(fc) == (250, ReplyStatus.BUSY)
 
 
 def begin_new(fc: Companion) -> ReplyStatus:
