@@ -291,8 +291,9 @@ class MspLink:
         self._losses_in_a_row = 0
         self._backoff = 1.0
         if answered is not oldest:
-            # Either of them may have been answered: this one is no longer awaited, but stays pending.
+            # Either of them may have been answered: this one is no longer awaited, but its reply may follow.
             answered.awaited = False
+            answered.deadline = min(answered.deadline, now + self.outstanding_bytes * self.byte_s + self._round_trip_s)
         elif not answered.exclusive:
             measured = max(now - answered.sent_at, 0.0)
             self.round_trips.add(measured)

@@ -344,7 +344,7 @@ def test_setting_the_radius_while_armed_is_refused_with_a_text() -> None:
 
 def test_a_radius_refused_for_flash_wear_is_reported() -> None:
     world, station = radius_world()
-    for radius_cm in range(301, 301 + 64):
+    for radius_cm in range(301, 301 + 250):
         ended: list[object] = []
         change = world.bridge.missions.fc_store.set_wp_radius(radius_cm)  # type: ignore[union-attr]
         world.bridge.runner.start(change, lambda failure, _, ended=ended: ended.append(failure), world.now)  # type: ignore[misc]
@@ -352,8 +352,8 @@ def test_a_radius_refused_for_flash_wear_is_reported() -> None:
         assert ended == [None]
     station.send(param_set(b"WPNAV_RADIUS", 400.0))
     world.wait_until(lambda _: bool(station.said("PARAM_VALUE")), 5)
-    assert values(station.said()) == [("WPNAV_RADIUS", 364.0, 1, 2)]
-    assert " ".join(station.texts()) == f"WPNAV_RADIUS stays 364: {PushFailure.WRITES_SPENT.value}"
+    assert values(station.said()) == [("WPNAV_RADIUS", 550.0, 1, 2)]
+    assert " ".join(station.texts()) == f"WPNAV_RADIUS stays 550: {PushFailure.WRITES_SPENT.value}"
 
 
 def test_setting_the_radius_of_a_silent_board_fails_with_a_text() -> None:
