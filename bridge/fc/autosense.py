@@ -17,7 +17,7 @@ from enum import Enum
 from itertools import cycle, islice
 
 from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE
-from bridge.line.pending_replies import PendingReplies
+from bridge.line.pending_replies import PendingReplies, byte_time_s
 from protocols.frsky import FRSKY_SPEED, FrskyParser
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.heartbeat import is_plausible_heartbeat
@@ -182,7 +182,7 @@ class Autosense:
 
     def _on_wire_s(self, frame: bytes) -> float:
         """The time of a probe and one reply on the wire: long at 1200 baud."""
-        return (len(frame) + _ANSWER_SIZE) * 10 / self.speed if self.speed else 0.0
+        return (len(frame) + _ANSWER_SIZE) * byte_time_s(self.speed)
 
     def _msp_frame(self, frame: MspFrame, now: float) -> None:
         visit = self._visit

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import inf
 
 from bridge.line.conversation import Send
-from bridge.line.pending_replies import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES, PendingReplies
+from bridge.line.pending_replies import LONGEST_STALL_S, MAX_OUTSTANDING_BYTES, PendingReplies, byte_time_s
 from protocols.frsky import FRSKY_SPEED
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
@@ -82,7 +82,7 @@ class MspLink:
     def __init__(self, baud: int | None, now: float, owed: int = 0) -> None:
         self._baud = baud
         #: A byte's time on the line.
-        self.byte_s = 10 / baud if baud else 0.0
+        self.byte_s = byte_time_s(baud)
         self._ring_size = _OUTSTANDING_BESIDE_FRSKY if baud == FRSKY_SPEED else MAX_OUTSTANDING_BYTES
         self._parser = MspParser()
         self._waiting: deque[Send] = deque()

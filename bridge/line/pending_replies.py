@@ -11,6 +11,11 @@ MAX_OUTSTANDING_BYTES = 224
 LONGEST_STALL_S = 3.0
 
 
+def byte_time_s(baud: int | None) -> float:
+    """A byte's time on a line, with its start and stop bits; 0 where the line has no speed."""
+    return 10 / baud if baud else 0.0
+
+
 class PendingReplies:
     """Pending reply bytes, by the speed of their requests: at another speed the board understood nothing."""
 
@@ -41,7 +46,7 @@ class PendingReplies:
             paid = min(owed, size)
             size -= paid
             if owed > paid:
-                left_ring_at += (owed - paid) * 10 / speed if speed else 0.0
+                left_ring_at += (owed - paid) * byte_time_s(speed)
                 rest.append((min(until, left_ring_at), owed - paid))
         self._owed = {speed: rest}
 

@@ -29,7 +29,7 @@ class CommandQueries:
     def __init__(self, api: DaemonApi, rates: SampleRates) -> None:
         self._api = api
         self._rates = rates
-        #: Parsing takes 60 times the file's size in memory.
+        #: Parsing takes about 50 times the file's size in memory.
         self._one_at_a_time = asyncio.Lock()
         self.answerers: dict[keys.ZenohKey, Answerer] = {
             keys.UPLOAD: self._upload,

@@ -9,13 +9,14 @@ from bridge.fc.profile import FlightController, Profile
 from bridge.fc.states.base import Event, Lost, Port, State
 from bridge.line.mavlink_sender import HarakiriSender
 from bridge.line.msp_link import PROBE
+from bridge.line.pending_replies import byte_time_s
 from bridge.model.autopilot import Autopilot
 from bridge.model.vehicle import Source
 from protocols.mavlink.codec import Packed
+from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.msp.frame import MspParser
 
-_HEARTBEAT = 0
 #: Two lost heartbeats.
 _SILENCE_S = 2.5
 #: An armed Harakiri sends its attitude 30 times a second: when that ends, it has disarmed and changed its speed.
@@ -52,7 +53,7 @@ class Mavlink(State):
         self._probe_due = now + _PROBE_INTERVAL_S if self._is_harakiri else inf
         if self._is_harakiri:
             port.runner.mavlink_up(self._send)
-            if event.heard.msgid != _HEARTBEAT:
+            if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
                 # Unasked, it sends more than heartbeats only while armed.
                 port.hear_armed(Source.MAVLINK, now)
         self.telemetry.take([event.heard], now)
@@ -115,7 +116,7 @@ class Mavlink(State):
     def _timeout_s(self) -> float:
         if not (self._is_harakiri and self.port.vehicle.armed):
             return _SILENCE_S
-        return _HARAKIRI_ARMED_SILENCE_S + (_TORN_BYTES * 10 / self.speed if self.speed else 0.0)
+        return _HARAKIRI_ARMED_SILENCE_S + _TORN_BYTES * byte_time_s(self.speed)
 
     def _profile(self, heard: MavlinkFrame) -> Profile:
         """A board met over MSP on this port stays in its family; otherwise the sender decides."""

@@ -103,11 +103,9 @@ class MspLine(State):
 
     @property
     def _silence_s(self) -> float:
-        return (
-            min(_FOREIGN_SILENCE_S + _TORN_BYTES * self.link.byte_s, MSP_SILENCE_S)
-            if self._is_foreign
-            else MSP_SILENCE_S
-        )
+        if not self._is_foreign:
+            return MSP_SILENCE_S
+        return min(_FOREIGN_SILENCE_S + _TORN_BYTES * self.link.byte_s, MSP_SILENCE_S)
 
     @property
     def _is_foreign(self) -> bool:
