@@ -33,7 +33,7 @@ def test_flash_writes_are_limited() -> None:
     for number in range(300):
         world.after(number / 2, lambda: station.send(save))
     world.run(150)
-    assert 250 < sum(data.count(_SAVE) for _, _, data in world.written) <= 258
+    assert 255 < sum(data.count(_SAVE) for _, _, data in world.written) <= 258
 
 
 def test_new_peers_share_a_limit_per_host_and_a_total() -> None:

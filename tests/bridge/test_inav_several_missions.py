@@ -257,13 +257,18 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
     assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
 
 
-@pytest.mark.parametrize("streams_hz", [0, 50])
-def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_hz: int) -> None:
-    """The board serves one request per 10 ms, and a ground station requests all telemetry."""
+def with_the_longest_list(streams_hz: int = 0) -> tuple[MspBoard, World, GroundStation]:
+    """The board serves one request per 10 ms. Above 0, a ground station requests all telemetry at this rate."""
     board, world, station = board_with(serial_task_ms=10.0)
     assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
     for stream in range(1, 13) if streams_hz else ():
         station.send(messages.MAVLink_request_data_stream_message(1, 1, stream, streams_hz, 1))
+    return board, world, station
+
+
+@pytest.mark.parametrize("streams_hz", [0, 50])
+def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_hz: int) -> None:
+    board, world, station = with_the_longest_list(streams_hz)
     world.run(3)
     other = packed(plan(CAPACITY + 1, 3))
     mission = board._firmware._mission  # type: ignore[union-attr]
@@ -275,8 +280,7 @@ def test_another_list_of_the_longest_size_is_noticed_within_two_seconds(streams_
 
 
 def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> None:
-    board, world, station = board_with(serial_task_ms=10.0)
-    assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
+    board, world, station = with_the_longest_list()
     world.run(3)
     records = packed(plan(CAPACITY + 1))
     records[0] = packed(plan(CAPACITY + 1, 3))[0]
@@ -291,11 +295,8 @@ def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> 
 @pytest.mark.parametrize("streams_hz", [0, 50])
 def test_a_former_list_loaded_again_is_noticed_within_two_seconds(streams_hz: int) -> None:
     """Another client has changed one of many records without saving, and loads the saved list."""
-    board, world, station = board_with(serial_task_ms=10.0)
+    board, world, _ = with_the_longest_list(streams_hz)
     ours = packed(plan(CAPACITY + 1))
-    assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
-    for stream in range(1, 13) if streams_hz else ():
-        station.send(messages.MAVLink_request_data_stream_message(1, 1, stream, streams_hz, 1))
     records = [*ours[:76], packed(plan(CAPACITY + 1, 3))[76], *ours[77:]]
     mission = board._firmware._mission  # type: ignore[union-attr]
     for number, record in enumerate(records, 1):
@@ -310,10 +311,7 @@ def test_a_former_list_loaded_again_is_noticed_within_two_seconds(streams_hz: in
 @pytest.mark.parametrize("streams_hz", [0, 50])
 def test_a_list_that_the_sticks_load_is_read_at_once(streams_hz: int) -> None:
     """It is of the longest size, has never been seen, and differs in one record."""
-    board, world, station = board_with(serial_task_ms=10.0)
-    assert Upload(station, plan(CAPACITY + 1)).run(60) is ACCEPTED
-    for stream in range(1, 13) if streams_hz else ():
-        station.send(messages.MAVLink_request_data_stream_message(1, 1, stream, streams_hz, 1))
+    board, world, _ = with_the_longest_list(streams_hz)
     for number in (1, 60, 119):
         world.run(3)
         changed = packed(plan(CAPACITY + 1, 7))[number - 1]

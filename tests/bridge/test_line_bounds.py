@@ -163,12 +163,18 @@ def test_an_unanswered_request_is_forgotten_after_the_longest_stall() -> None:
     assert sent(link).count(195) == 3
 
 
-def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
+def asked_again(message: Send) -> MspLink:
+    """A line on which a request was lost and sent again."""
     link = MspLink(115200, 0.0)
     link.receiver_timeout_s = 0.05
-    link.send(question(101, 11), 0.0)
+    link.send(message, 0.0)
     link.tick(link.next_deadline())
-    link.send(question(101, 11), 0.2)
+    link.send(message, 0.2)
+    return link
+
+
+def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
+    link = asked_again(question(101, 11))
     before = link.round_trip_s
     link.receive(reply(101, 11), 0.201)
     assert link.round_trip_s == before
@@ -180,11 +186,7 @@ def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
 
 def test_a_board_that_answers_again_gets_the_request_that_lost_ones_block() -> None:
     """Each reply to the second of two equal questions left one of them open, and a third was asked, without end."""
-    link = MspLink(115200, 0.0)
-    link.receiver_timeout_s = 0.05
-    link.send(question(195, 99), 0.0)
-    link.tick(link.next_deadline())
-    link.send(question(195, 99), 0.2)
+    link = asked_again(question(195, 99))
     link.tick(link.next_deadline())  # the question that was asked instead is lost, too
     now, asked = 2.0, sent(link)
     for _ in range(200):
