@@ -90,7 +90,7 @@ def test_without_a_state_directory_the_daemon_keeps_working(start: Starter, tmp_
 
 
 class DaemonWithoutDisk(Daemon):
-    """Its disk never answers, like an SD card that hangs in the kernel."""
+    """Its disk never responds, like an SD card that hangs in the kernel."""
 
     _HANGING = """
 import os, threading
@@ -107,7 +107,7 @@ main(prog_name="naze-bridge")
             return subprocess.Popen(command, cwd=REPOSITORY, stdout=output, stderr=output)
 
 
-def test_with_a_hung_disk_the_daemon_works_and_stops(start: Starter, stack: ExitStack) -> None:
+def test_the_daemon_works_and_stops_while_the_disk_hangs(start: Starter, stack: ExitStack) -> None:
     board = start.board()
     options = ("--record-uart", str(start.directory / "naze.uart"))
     daemon = DaemonWithoutDisk(start.directory, str(board.link), options=options)
@@ -151,7 +151,7 @@ def test_connections_and_unread_replies_are_limited(start: Starter) -> None:
             for _ in range(CONNECTIONS):
                 client = clients.enter_context(socket.socket(family))
                 client.settimeout(0.2)
-                with suppress(OSError):  # the daemon has hung up, or its backlog is full
+                with suppress(OSError):  # the daemon has disconnected, or its backlog is full
                     client.connect(address)
                     client.sendall(request)
             heard = len(witness.gaps_s)
@@ -176,7 +176,7 @@ def test_a_long_source_is_truncated(start: Starter) -> None:
     assert witness.frames[m.MAVLINK_MSG_ID_STATUSTEXT] < 60
 
 
-def test_requests_of_a_megabyte(start: Starter) -> None:
+def test_requests_of_a_megabyte_do_not_fill_the_memory(start: Starter) -> None:
     """A list of empty items takes thirty times as much memory as its text."""
     bench = start.bench()
     before = _memory_kb(bench.daemon.process.pid)

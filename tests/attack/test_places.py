@@ -40,7 +40,7 @@ def guarded(start: Starter, key_file: Path) -> Bench:
 
 
 def crowd(bench: Bench, stack: ExitStack, *spoken: Message, size: int = CROWD, per_s: float = 30) -> Attack:
-    """Strangers, each with its own address and ids; it sends a heartbeat, or something else, from time to time."""
+    """Strangers, each with its own address and ids, that send heartbeats and other messages from time to time."""
     strangers = [
         Stranger(bench.daemon.address, f"127.0.{1 + row}.{1 + number}", sysid=1 + number, compid=190 + row)
         for row, number in (divmod(each, 200) for each in range(size))
@@ -62,7 +62,7 @@ def hears_heartbeats(station: PlainStation, count: int) -> bool:
 
 
 def test_a_crowd_neither_displaces_a_pilot_nor_locks_one_out(start: Starter, stack: ExitStack) -> None:
-    """One pilot's radio fades, another arrives. The crowd announces ten times as many lists as all newcomers may."""
+    """One pilot's radio fades, another connects. The crowd announces ten times the lists allowed to all newcomers."""
     bench = start.bench()
 
     def places() -> list[str]:
@@ -99,7 +99,7 @@ def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, sta
             assert listener.upload(plain_plan(3)) is MissionResult.DENIED
             listener.send(m.MAVLink_command_long_message(1, 1, 511, 0, 30, 10000, 0, 0, 0, 0, 0))
             assert listener.wait_for("COMMAND_ACK").result == m.MAV_RESULT_DENIED
-            # Strangers share places of their own.
+            # Strangers have separate places.
             assert len(bench.daemon.ask({"do": "status"})["ground_stations"]) < CROWD
     # Texts to the pilot do not go to strangers, even if there is room.
     with udp_station(bench.daemon.address) as pilot, udp_station(bench.daemon.address) as listener:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random actions of two ground stations, the command line, the pilot and the plugs: no wrong list, no deadlock."""
+"""Random actions of two ground stations, command line, pilot and cables: no wrong list, no deadlock."""
 
 from collections.abc import Sequence
 
@@ -40,7 +40,7 @@ def places(records: Sequence[WpRecord]) -> list[tuple[int, int, int]]:
 
 
 class Conversation(RuleBasedStateMachine):
-    """Each announced list has a different number of items, so items of one cannot be taken for another's."""
+    """Each announced list has a different length, so an item cannot be attributed to the wrong list."""
 
     @initialize(slow_store=st.sampled_from([0.0, 0.05, 1.0]), flash_erase_ms=st.sampled_from([20.0, 100.0, 400.0]))
     def start(self, slow_store: float, flash_erase_ms: float) -> None:

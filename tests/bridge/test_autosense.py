@@ -60,7 +60,7 @@ def test_found_within_seconds_at_every_speed(baud: int, extension: bool) -> None
 
 @pytest.mark.parametrize("baud", [baud for baud in ALL_SPEEDS if baud >= 2400])
 def test_identified_within_8_s(baud: int) -> None:
-    """Not at 1200 baud: there the box names alone take a second, and they are read twice."""
+    """Except at 1200 baud, where reading the box names twice takes two seconds."""
     assert World(SimOptions(baud=baud)).wait_ready() <= 8
 
 
@@ -93,7 +93,7 @@ def test_losing_the_end_of_a_frame_later_does_not_lose_the_board(extension: bool
 
 @pytest.mark.parametrize("boot_ms", [0, 300, 1000, 1500, 2000, 2700, 3500, 6000])
 @pytest.mark.parametrize("extension", [True, False])
-def test_a_board_that_boots_while_the_port_opens(boot_ms: float, extension: bool) -> None:
+def test_a_board_that_boots_while_the_port_opens_is_found(boot_ms: float, extension: bool) -> None:
     world = World(SimOptions(boot_ms=boot_ms), Faults(extension=extension), powered=False)
     world.power_on()
     assert world.wait_ready() <= boot_ms / 1000 + 3
@@ -106,7 +106,7 @@ def test_found_within_3_s_of_the_ports_return(baud: int) -> None:
     for _ in range(8):
         world = World(SimOptions(baud=baud))
         world.wait_until(verdict, 10)
-        # This may be during identification, when only the speed is known.
+        # The speed may already be known when the port is lost.
         world.run(draw.random() * draw.choice((0.2, 4)))
         world.unplug()
         assert isinstance(world.bridge.session.state, Closed)
@@ -143,7 +143,7 @@ def test_found_within_3_s_of_booting_after_a_power_cycle_at_any_moment(baud: int
         world.assert_line_was_clean()
 
 
-def test_random_power_and_port_losses() -> None:
+def test_the_board_is_found_after_random_power_and_port_losses() -> None:
     for seed in range(12):
         world = World(SimOptions(boot_ms=800), seed=seed)
         draw = random.Random(seed)
@@ -204,7 +204,7 @@ def test_switches_to_mavlink_when_armed_and_back(protocol: TelemetryProtocol, ba
 
 
 @pytest.mark.parametrize("protocol", [TelemetryProtocol.MAVLINK, TelemetryProtocol.MAVLINK_57600])
-def test_armed_from_the_start(protocol: TelemetryProtocol) -> None:
+def test_a_board_that_is_armed_from_the_start_is_found(protocol: TelemetryProtocol) -> None:
     world = World(SimOptions(tele_prot=protocol), Faults(armed=True))
     world.run(0.5)
     assert world.naze.armed
@@ -269,7 +269,7 @@ OTHERS: dict[str, Callable[[], MspFake]] = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_similar_firmware_is_not_taken_for_harakiri(name: str) -> None:
+def test_similar_firmware_is_not_mistaken_for_harakiri(name: str) -> None:
     fake = OTHERS[name]()
     world = World(peer=fake)
     world.wait_until(lambda w: w.is_found, 3)
@@ -280,7 +280,7 @@ def test_similar_firmware_is_not_taken_for_harakiri(name: str) -> None:
     assert not {190, 191, 192, 193, 194, 195, 196} & set(fake.asked)
 
 
-def test_firmware_that_ignores_unknown_requests_is_not_guessed() -> None:
+def test_firmware_that_ignores_unknown_requests_is_not_identified() -> None:
     world = World(peer=MspFake({100: ident(240, 0), 116: BOXES, 101: bytes(11)}, silent_on_unknown=True))
     world.run(20)
     assert world.kind is None
@@ -326,7 +326,7 @@ def test_an_empty_line_yields_no_flight_controller(peer: Callable[[], QuietLine]
     assert world.events("fc.found") == world.events("fc.in_command_line") == []
 
 
-def test_a_looped_back_line_is_not_an_answer() -> None:
+def test_a_looped_back_line_is_not_mistaken_for_a_board() -> None:
     """The adapter's RX and TX wires touch after the flight controller was unplugged from it."""
     world = World()
     world.wait_ready()

@@ -49,7 +49,7 @@ def test_megabytes_of_noise_give_no_verdict(name: str) -> None:
     noise = bytes(draw.choices(ALPHABETS[name], k=MEGABYTE))
     visited = listen(noise, Autosense(SPEEDS, (), 0.0), 96)
     assert visited == set(SPEEDS)
-    # At one speed throughout, the one with the most frames.
+    # At one speed throughout: the one that yields the most frames.
     listen(noise[MEGABYTE // 2 :], Autosense((115200,), (115200,), 0.0), 512)
 
 

@@ -51,14 +51,14 @@ def test_new_peers_share_a_limit_per_host_and_a_total() -> None:
         assert sum(budgets.allows(cost, pilot, 0.0) for _ in range(1000)) == limit.each.burst
 
 
-def test_the_clock_begins_anywhere_and_may_rest_for_years() -> None:
+def test_limits_do_not_depend_on_when_the_clock_starts() -> None:
     peer = Peer("udp", ("10.0.0.1", 14550))
     budgets = Budgets(lambda _peer: False)
     for now in (1e5, 1e5 + 1, 1e9, 1e9):
         assert budgets.allows(Cost.RECEIVED, peer, now)
 
 
-def test_a_newcomer_gets_as_much_as_each_greedy_host() -> None:
+def test_a_newcomer_gets_the_same_share_as_each_busy_host() -> None:
     budgets = Budgets(lambda _peer: False)
     hosts = [Peer("udp", (f"10.0.0.{host}", 14550)) for host in range(2, 12)]
     for peer in hosts * 1000:

@@ -32,7 +32,7 @@ def is_in_cli(world: World) -> bool:
 def open_command_line(world: World) -> None:
     """From a terminal program on another port of the board, not through the bridge."""
     world.naze.receive(b"#" if world.naze.protocol is None else b"\r\r\r", world.now)
-    # INAV needs silence after the key, so the bridge pauses as on a busy machine.
+    # INAV needs silence after the key; on a busy machine the bridge may pause that long.
     world.now += 0.2
     world.run_until(lambda w: w.naze.counters.cli_entered, 1)
     assert world.naze.counters.cli_entered
@@ -91,7 +91,7 @@ def test_it_is_recognised_when_the_port_is_opened(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", BOARDS)
-def test_it_is_recognised_in_mid_conversation_and_exit_brings_it_back(kind: str) -> None:
+def test_it_is_recognised_in_mid_conversation_and_found_again_after_exit(kind: str) -> None:
     world = World(peer=BOARDS[kind]())
     station = GroundStation(world)
     world.bridge.ground.add_default_peer(station.peer, until_answered=False)
@@ -116,7 +116,7 @@ def test_it_is_recognised_in_mid_conversation_and_exit_brings_it_back(kind: str)
 
 
 @pytest.mark.parametrize("kind", BOARDS)
-def test_unplugging_it_brings_it_back(kind: str) -> None:
+def test_it_is_found_again_after_unplugging(kind: str) -> None:
     world = left_in_cli(BOARDS[kind]())
     world.wait_until(is_in_cli, 2)
     world.run(10)
@@ -129,7 +129,7 @@ def test_unplugging_it_brings_it_back(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", BOARDS)
-def test_one_request_every_three_seconds_without_end(kind: str) -> None:
+def test_a_board_in_its_cli_is_probed_every_three_seconds(kind: str) -> None:
     world = left_in_cli(BOARDS[kind]())
     world.wait_until(is_in_cli, 2)
     began = world.now
@@ -154,7 +154,7 @@ def test_nothing_is_sent_while_a_person_types() -> None:
     assert is_in_cli(world)
 
 
-def test_a_list_that_looks_like_an_echo_is_not_taken_for_one() -> None:
+def test_a_list_that_looks_like_an_echo_is_not_mistaken_for_one() -> None:
     """The coordinate 67.5040548 N contains a request's header, and the board sends it twice."""
     world = World()
     world.wait_ready()

@@ -14,7 +14,7 @@ from tests.support.world import GroundStation, World
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
-#: The text of a refusal is repeated no sooner.
+#: Minimum time between two equal refusal texts.
 _SILENCE_S = 10.1
 #: Unsolicited messages.
 TELEMETRY_TYPES = {"HEARTBEAT", "MISSION_CURRENT", "CURRENT_MODE"} | {
@@ -384,8 +384,8 @@ def test_repeated_sets_are_done_one_at_a_time() -> None:
     world.assert_line_was_clean()
 
 
-def test_a_late_reply_to_the_first_value_is_not_taken_for_the_seconds() -> None:
-    """The board hangs while the first value is on its way and answers both when it resumes."""
+def test_a_late_reply_to_the_first_set_does_not_confirm_the_second() -> None:
+    """The board hangs after the first PARAM_SET and answers both when it resumes."""
     for hang_s in (0.1, 0.2, 0.3, 0.5, 0.8):
         world, station = radius_world()
         world.faults.hang = True

@@ -261,8 +261,7 @@ def test_a_station_that_floods_requests_does_not_delay_others() -> None:
     assert len(Download(second).run()) == 20
 
 
-def test_a_long_queue_without_a_link_ends() -> None:
-    """Waiting requests are refused when the port is lost."""
+def test_waiting_downloads_are_refused_when_the_link_is_lost() -> None:
     world, _ = holding()
     bridge = world.bridge
     answers: list[HeldMission | Refusal] = []

@@ -39,7 +39,7 @@ def world_of(state: type[State]) -> World:
 @pytest.mark.parametrize(
     "state", [state for state in TRANSITIONS if state is not Closed], ids=lambda state: state.__name__
 )
-def test_the_line_is_searched_again(state: type[State]) -> None:
+def test_a_bug_in_any_state_starts_a_new_search(state: type[State]) -> None:
     world = world_of(state)
     world.wait_until(lambda w: type(w.bridge.session.state) is state, 30)
     broken = world.bridge.session.state

@@ -27,7 +27,7 @@ def host(number: int) -> Peer:
 
 
 class Field:
-    """A link, its stations' heartbeats, and the writes they were granted."""
+    """A link with its stations; counts the writes granted to each."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -80,7 +80,9 @@ def rotating(field: Field, hosts: int) -> Iterator[Callable[[], None]]:
 
 @pytest.mark.parametrize("attack", [steady, rotating])
 @pytest.mark.parametrize("hosts", [1, 15, 240])
-def test_a_day_of_attacks(attack: Callable[[Field, int], Iterator[Callable[[], None]]], hosts: int) -> None:
+def test_the_pilot_can_write_throughout_a_day_of_attacks(
+    attack: Callable[[Field, int], Iterator[Callable[[], None]]], hosts: int
+) -> None:
     field = Field()
     field.comes(PILOT)
     for strike in itertools.islice(attack(field, hosts), 24 * 6):

@@ -38,7 +38,7 @@ def test_velocity_and_climb_are_computed_from_two_reports() -> None:
     assert (position.altitude_m, height.height_m, height.climb_m_s) == (None, 4.5, 1.5)
 
 
-def test_a_position_that_no_longer_changes_is_taken_for_a_lost_fix() -> None:
+def test_a_position_that_stops_changing_is_treated_as_a_lost_fix() -> None:
     position = hear(at(0), at(500), at(500), at(500)).last(GlobalPosition)
     assert position is not None
     assert position.heard_at == 1

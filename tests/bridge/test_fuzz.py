@@ -47,7 +47,7 @@ def _fuzz(test: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @_fuzz
-def test_ground_stations(seed: int) -> None:
+def test_no_input_from_ground_stations_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     world = World(speeds=(115200,))
     world.wait_ready()
@@ -61,7 +61,7 @@ def test_ground_stations(seed: int) -> None:
 
 
 @_fuzz
-def test_the_uart(seed: int) -> None:
+def test_no_input_from_the_uart_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     world = World(speeds=(115200,))
     if inputs.random.random() < 0.7:
@@ -74,7 +74,7 @@ def test_the_uart(seed: int) -> None:
 
 
 @_fuzz
-def test_mission_files(seed: int) -> None:
+def test_no_mission_file_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     for _ in range(AT_ONCE):
         with suppress(MissionFileError):
@@ -82,7 +82,7 @@ def test_mission_files(seed: int) -> None:
 
 
 @_fuzz
-def test_logs_and_captures(seed: int) -> None:
+def test_no_log_or_capture_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     for _ in range(AT_ONCE // 2):
         frames = MavlinkSplitter().feed(b"".join(inputs.from_a_ground_station() for _ in range(3)))
@@ -101,7 +101,7 @@ def store_file(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @_fuzz
-def test_mission_stores(store_file: bytes, seed: int) -> None:
+def test_no_database_file_raises(store_file: bytes, seed: int) -> None:
     inputs = FuzzInputs(seed)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "missions.db"

@@ -139,7 +139,7 @@ def near_on_circle(value: float, other: float, within: float) -> bool:
 
 
 @given(READINGS, HOMES, st.sampled_from(PayloadEncoding))
-def test_groups_and_messages(
+def test_groups_have_the_values_of_mavlink_messages(
     readings: tuple[Reading | None, ...], home: tuple[int, int] | None, encoding: PayloadEncoding
 ) -> None:
     bridge = World(powered=False, plugged=False).bridge

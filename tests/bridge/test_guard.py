@@ -343,7 +343,7 @@ def test_a_signed_upload_over_a_network_that_loses_and_duplicates(seed: int) -> 
     assert MissionResult.DENIED not in [ack.type for ack in station.said("MISSION_ACK")]
 
 
-def test_a_clock_that_is_set_back_changes_nothing() -> None:
+def test_setting_the_clock_back_repeats_no_timestamp() -> None:
     clock = Clock()
     world = keyed(signing(clock))
     station = signing_station(world)

@@ -93,7 +93,7 @@ def test_an_earlier_list_is_read() -> None:
     assert [item.command for item in read] == [item.command for item in mixed()]
 
 
-def test_clearing() -> None:
+def test_an_empty_list_clears_the_board() -> None:
     world, station = mavlink_only()
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
     assert Upload(station, []).run() is A.ACCEPTED
@@ -103,7 +103,7 @@ def test_clearing() -> None:
     assert (home.lat_e7, home.lon_e7) == world.bridge.session.vehicle.place()
 
 
-def test_armed_is_denied() -> None:
+def test_an_upload_while_armed_is_denied() -> None:
     world, station = mavlink_only()
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
     world.faults.armed = True
@@ -137,7 +137,7 @@ def trapped_degrees(hazard: int) -> float:
 
 
 @pytest.mark.parametrize("rate", [3e-4, 1e-3])
-def test_on_a_bad_line_the_result_is_true(rate: float) -> None:
+def test_the_reported_result_is_true_on_a_bad_line(rate: float) -> None:
     outcomes = set()
     for seed in range(6):
         world, station = mavlink_only(seed=seed)

@@ -161,7 +161,7 @@ def test_a_transfer_takes_little_more_than_its_time_on_the_wire() -> None:
     assert board.counters.rx_overflows == 0
 
 
-def test_a_transfer_to_a_board_that_serves_one_request_per_10_ms() -> None:
+def test_a_slow_board_gets_each_record_only_once() -> None:
     _, world, station = board_with(serial_task_ms=10.0)
     upload = Upload(station, plan(61))
     assert upload.run() is ACCEPTED

@@ -33,7 +33,7 @@ def introduced(**options: Any) -> tuple[MspBoard, World, GroundStation]:
 
 
 @pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
-def test_its_version_is_known(version: str) -> None:
+def test_the_version_is_reported(version: str) -> None:
     _, world, _ = introduced(version=version)
     assert world.bridge.session.state.controller is not None
     assert world.bridge.session.state.controller.version == tuple(map(int, version.split(".")))
@@ -50,7 +50,7 @@ def test_its_version_is_known(version: str) -> None:
         (5, messages.MAV_TYPE_SURFACE_BOAT, messages.ROVER_MODE_MANUAL),
     ],
 )
-def test_its_platform_is_shown(platform: int, kind: int, by_hand: int) -> None:
+def test_the_platform_determines_the_vehicle_type(platform: int, kind: int, by_hand: int) -> None:
     _, _, station = introduced(platform=platform, faults=Faults(boxes=0))
     last = station.said("HEARTBEAT")[-1]
     assert (last.type, last.custom_mode) == (kind, by_hand)

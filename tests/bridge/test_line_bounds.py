@@ -34,7 +34,7 @@ def sent(link: MspLink) -> list[int]:
 
 
 @pytest.mark.parametrize("stall_ms", [150.0, 300.0])
-def test_a_download_while_the_board_writes_its_configuration(stall_ms: float) -> None:
+def test_a_download_during_a_configuration_write_is_complete(stall_ms: float) -> None:
     """Mission Planner sets the radius after a Write; the board stalls a second later, perhaps during a Read."""
     for seed in range(8):
         draw = random.Random(seed)
@@ -51,7 +51,7 @@ def test_a_download_while_the_board_writes_its_configuration(stall_ms: float) ->
 
 
 @pytest.mark.parametrize("baud", [115200, 38400, 9600])
-def test_everything_at_once_at_every_speed(baud: int) -> None:
+def test_a_push_with_downloads_and_telemetry_fits_the_ring(baud: int) -> None:
     """A push, downloads, parameters and telemetry."""
     world = World(SimOptions(baud=baud), speeds=(baud,), flash=FULL_FLASH)
     world.wait_ready(40)
@@ -184,10 +184,10 @@ def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
     assert link.outstanding_bytes == 0
 
 
-def test_a_board_that_answers_again_gets_the_request_that_lost_ones_block() -> None:
-    """Each reply to the second of two equal questions left one of them open, and a third was asked, without end."""
+def test_lost_requests_do_not_block_a_repeat_to_a_board_that_answers() -> None:
+    """A regression: each reply to a repeated request left another one open, so requests were sent endlessly."""
     link = asked_again(question(195, 99))
-    link.tick(link.next_deadline())  # the question that was asked instead is lost, too
+    link.tick(link.next_deadline())  # the repeat is lost, too
     now, asked = 2.0, sent(link)
     for _ in range(200):
         now += 0.005

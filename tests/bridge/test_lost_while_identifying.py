@@ -49,7 +49,7 @@ def is_known(world: World) -> bool:
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_a_power_cut(baud: int) -> None:
+def test_a_board_is_found_again_after_a_power_cut(baud: int) -> None:
     for seed in range(MOMENTS):
         world = identifying(baud, seed)
         world.power_off()
@@ -62,7 +62,7 @@ def test_a_power_cut(baud: int) -> None:
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
-def test_arming(baud: int, protocol: TelemetryProtocol) -> None:
+def test_a_board_that_arms_and_disarms_is_found_again(baud: int, protocol: TelemetryProtocol) -> None:
     for seed in range(MOMENTS):
         world = identifying(baud, seed, protocol)
         world.faults.armed = True
@@ -77,7 +77,7 @@ def test_arming(baud: int, protocol: TelemetryProtocol) -> None:
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_a_stall(baud: int) -> None:
+def test_a_board_is_found_again_after_a_stall(baud: int) -> None:
     for seed in range(MOMENTS):
         world = identifying(baud, seed)
         world.faults.hang = True

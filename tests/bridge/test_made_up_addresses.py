@@ -60,7 +60,7 @@ def longest_gap_s(pilot: GroundStation, since: float) -> float:
     return max(after - before for before, after in pairwise([since, *beats, pilot.world.now]))
 
 
-def test_a_pilot_connected_before_the_flood_notices_nothing() -> None:
+def test_a_flood_does_not_affect_a_pilot_who_connected_before_it() -> None:
     world = World(speeds=(115200,))
     world.wait_ready()
     pilot = GroundStation(world, "pilot", air=Air(delay_s=0.01))

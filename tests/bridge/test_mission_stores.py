@@ -166,7 +166,7 @@ def test_a_cleared_list_reads_as_empty_and_can_be_replaced(craft: Craft) -> None
     assert craft.holds(craft.plan(7))
 
 
-def test_rejected_lists_change_nothing_and_have_a_reason(craft: Craft) -> None:
+def test_a_rejected_list_changes_nothing_and_has_a_reason(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     good = craft.plan(6, 1)
     for bad in (

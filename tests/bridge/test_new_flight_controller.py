@@ -22,7 +22,7 @@ NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, "Toys do not navigate")
 TOY = Profile("a toy", "Toy", recognise=recognise, missions=NO_MISSIONS)
 
 
-def test_a_profile_is_enough() -> None:
+def test_a_new_flight_controller_needs_only_a_profile() -> None:
     board = FakeInav()
     board.answers = {2: b"TOYS", 116: b"ANGLE;ARM;"}
     board.answer = lambda frame: (  # type: ignore[method-assign]

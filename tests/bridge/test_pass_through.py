@@ -219,7 +219,7 @@ def test_frames_are_split_as_in_pymavlink() -> None:
     assert [frame.raw for frame in MavlinkSplitter().feed(b"".join(frames))] == frames
 
 
-def test_a_false_header_does_not_delay_a_slow_stream() -> None:
+def test_a_false_header_in_a_slow_stream_delays_no_frame() -> None:
     """The false frame has room for twelve heartbeats."""
     world, autopilot, (station, _) = passing()
     autopilot.outgoing += b"\xfd\xff\x00\x00\x00\x01\x01\x1e\x00\x00"

@@ -38,7 +38,7 @@ def ubx(payload: bytes) -> bytes:
     ],
 )
 @pytest.mark.parametrize("size", [1, 7, 1000])
-def test_other_devices_are_recognised(sent: bytes, named: str, size: int) -> None:
+def test_gps_receivers_and_radios_are_recognised(sent: bytes, named: str, size: int) -> None:
     watch = OtherDeviceWatch()
     data = b"\x00\xff" + sent + sent
     for start in range(0, len(data), size):
@@ -47,7 +47,7 @@ def test_other_devices_are_recognised(sent: bytes, named: str, size: int) -> Non
 
 
 @pytest.mark.parametrize("sent", [heartbeat(2, 3), request(Msp.IDENT), b"$M>\x07\x64\xd3\x03\x00\x00\x00\x00\x80\x37"])
-def test_a_flight_controller_is_not_taken_for_another_device(sent: bytes) -> None:
+def test_a_flight_controller_is_not_mistaken_for_another_device(sent: bytes) -> None:
     watch = OtherDeviceWatch()
     watch.feed(sent * 3)
     assert not watch.what

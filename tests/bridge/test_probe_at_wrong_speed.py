@@ -71,8 +71,8 @@ def test_no_run_for_a_receiver_that_starts_within_a_probe(sent: int) -> None:
 
 
 @pytest.mark.parametrize("read", [300, 14400, 31250, 250000])
-def test_a_long_search_triggers_no_hazard(read: int) -> None:
-    """A board at an unlisted speed receives a minute of searching, ten rounds."""
+def test_a_minute_of_searching_triggers_no_hazard(read: int) -> None:
+    """Ten rounds of the search, received by a board at an unlisted speed."""
     world = World(SimOptions(baud=read))
     world.run(60)
     assert world.events("fc.found") == []

@@ -108,7 +108,7 @@ def switching(fault: str, latest: float, longest: float) -> Injection:
     return inject
 
 
-def test_a_clean_push_is_as_fast_as_the_line() -> None:
+def test_a_push_without_faults_is_limited_only_by_the_line() -> None:
     came_to, world = push_under(lambda world, draw: None, 0)
     assert came_to == "ACCEPTED"
     world.assert_line_was_clean()
@@ -138,7 +138,7 @@ def test_a_repeated_push_continues_where_it_ended() -> None:
 
 
 @pytest.mark.parametrize("rate", [1e-3, 4e-3])
-def test_more_bit_errors_end_while_mission_planner_still_waits_for_the_ack(rate: float) -> None:
+def test_a_push_over_a_bad_line_ends_before_mission_planner_times_out(rate: float) -> None:
     for seed in range(10):
         world = holding_the_old_list(seed)
         world.faults.bit_error_rate = rate
@@ -259,7 +259,7 @@ def test_arming_during_a_push_keeps_the_old_list() -> None:
     assert came_to[PushFailure.ARMED.value] > 6
 
 
-def test_arming_briefly_during_a_push() -> None:
+def test_a_brief_arming_during_a_push_damages_no_list() -> None:
     came_to = outcomes(switching("armed", 0.4, 0.1), 15)
     assert set(came_to) <= {"ACCEPTED", PushFailure.ARMED.value, ARMED.text}
 

@@ -83,7 +83,7 @@ def test_the_new_address_is_served_at_once_and_the_old_one_dropped() -> None:
     assert world.bridge.ground.stations.peers() == [new.peer]
 
 
-def test_moving_and_back() -> None:
+def test_a_station_may_move_away_and_back() -> None:
     world = start()
     roamer = Roamer(world)
     home = roamer.station
@@ -156,7 +156,7 @@ def test_an_upload_continues_from_a_new_address(seed: int) -> None:
     assert world.stored == records_of(PLAN)
 
 
-def test_a_station_that_only_answers_is_asked_at_its_new_address() -> None:
+def test_requests_follow_a_station_that_only_sends_items() -> None:
     world = start()
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN, repeat_s=100)
@@ -212,7 +212,7 @@ def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
     assert world.stored == records_of(PLAN)
 
 
-def test_a_refused_station_is_not_taken_for_one_that_moved() -> None:
+def test_a_refused_station_is_not_mistaken_for_one_that_moved() -> None:
     """Mission Planner sends its items even after its COUNT was refused, when the first station is silent."""
     world = start()
     first = GroundStation(world, "first", air=WIFI)

@@ -134,7 +134,7 @@ class Screen:
                 assert self.is_true(name, value), (self.world.now, name, value, what.truth(self.past[-1][1]))
 
     def look(self) -> None:
-        """Record the craft's present state."""
+        """Record the craft's current state."""
         craft = self.world.naze.truth(self.world.now)
         if craft is not None:
             self.past.append((self.world.now, craft))
@@ -218,7 +218,7 @@ def shown_by(board: str | TelemetryProtocol) -> set[str]:
 
 
 @pytest.mark.parametrize("board", ALL)
-def test_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
+def test_every_shown_value_is_true_for_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
     screen = on_the_ground(board)
     screen.fly(3)
     assert set(screen.shown) == set(SCREEN)

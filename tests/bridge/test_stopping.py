@@ -50,7 +50,7 @@ def test_a_push_under_way_is_finished(world: World) -> None:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_push_that_is_aborted_at_any_moment(world: World, seed: int) -> None:
+def test_a_push_may_be_aborted_at_any_moment(world: World, seed: int) -> None:
     """The result is true, and the board accepts the next list."""
     outcome = world.push(NEW)
     world.run(random.Random(seed).uniform(0, 0.45))

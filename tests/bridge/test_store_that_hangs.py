@@ -49,8 +49,8 @@ def test_the_flight_controller_is_still_found_and_read() -> None:
     assert len(Download(GroundStation(world)).run(10)) == 5
 
 
-def test_identification_behind_many_missions_is_given_up_and_repeated() -> None:
-    """Each of the missions waits 3 s for the store, and the flight controller's questions wait behind them."""
+def test_identification_delayed_by_many_missions_is_repeated() -> None:
+    """Each mission waits 3 s for the store, and identification waits behind them in the queue."""
     world = World(speeds=(115200,))
     world.wait_ready()
     world.store.delay_s = NEVER
@@ -65,7 +65,7 @@ def test_identification_behind_many_missions_is_given_up_and_repeated() -> None:
 
 
 def test_a_late_reply_of_the_store_is_dropped() -> None:
-    """The card resumes after 10 s; the reply for the first mission is not taken for the second's."""
+    """The card resumes after 10 s: its reply for the first mission must not count for the second."""
     world, station = holding()
     world.store.delay_s = 10.0
     assert Upload(station, waypoints(6, 1)).run(8) is MissionResult.ACCEPTED

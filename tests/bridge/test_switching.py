@@ -66,7 +66,7 @@ def test_ground_stations_see_one_vehicle(protocol: TelemetryProtocol, baud: int)
 
 
 @pytest.mark.parametrize(("board", "wanted"), [(SimulatedNaze, harakiri.PATCHED), (DeafWhileArmed, harakiri.FRSKY)])
-def test_one_vehicle_while_frsky_is_sent(board: type[SimulatedNaze], wanted: Profile) -> None:
+def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[SimulatedNaze], wanted: Profile) -> None:
     faults = Faults()
     world = World(faults=faults, peer=board(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults))
     station = GroundStation(world)

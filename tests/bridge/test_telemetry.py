@@ -244,7 +244,9 @@ def test_telemetry_takes_only_its_share_of_the_line(baud: int) -> None:
     (115200, 25, 5, 4), (57600, 25, 5, 4), (19200, 25, 5, 4),
     (9600, 14, 2.8, 4), (2400, 2.8, 0.5, 1.5), (1200, 0.9, 0.25, 0.7),
 ])  # fmt: skip
-def test_the_default_rates(baud: int, attitude_hz: float, position_hz: float, status_hz: float) -> None:
+def test_default_rates_depend_on_the_line_speed(
+    baud: int, attitude_hz: float, position_hz: float, status_hz: float
+) -> None:
     world, station = flown(5, baud=baud)
     station.take()
     world.written.clear()

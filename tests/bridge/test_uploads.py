@@ -235,7 +235,7 @@ def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> Non
 
 
 def test_two_simultaneous_uploads_both_succeed() -> None:
-    """The second station repeats its MISSION_COUNT for 2.8 s and is answered when its turn comes."""
+    """The second station repeats its MISSION_COUNT for 2.8 s and is answered when the first is done."""
     world, station = holding()
     second = GroundStation(world, "second", sysid=254, air=Air(delay_s=0.002))
     station.air = Air(delay_s=0.002)
@@ -446,7 +446,7 @@ def test_a_list_announced_while_another_is_written_is_requested() -> None:
     world.run(0.05)
     station.send(count_message(12))
     world.wait_until(lambda _: bool(requested(station)), 2)
-    # The ground station would take the first list's ack for the second one's.
+    # The ground station would attribute the first list's ack to the second.
     assert acks(station) == []
     assert world.stored == records_of(first)
     for seq, item in enumerate(again):
@@ -457,7 +457,7 @@ def test_a_list_announced_while_another_is_written_is_requested() -> None:
 
 
 @pytest.mark.parametrize("announce", [count_message(0), clear_message(), count_message(12)])
-def test_no_ack_for_a_list_after_its_station_has_announced_another(announce: Message) -> None:
+def test_a_list_gets_no_ack_once_its_station_has_announced_another(announce: Message) -> None:
     world, station = holding()
     receiving(world, station, waypoints(146, 1), 146)
     world.run(0.05)

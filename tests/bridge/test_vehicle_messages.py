@@ -150,7 +150,7 @@ def test_signs_are_the_same_on_all_firmware(who: FlightController, heading: int,
     assert make.vfr_hud(at(state)).heading == shown
 
 
-def test_an_unmeasured_battery() -> None:
+def test_an_unmeasured_battery_is_unknown() -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status())
     for reply in (None, struct.pack("<BHH", 0, 0, 0)):
         if reply:
@@ -160,7 +160,7 @@ def test_an_unmeasured_battery() -> None:
         assert at(state).made((make.battery_status,)) == []
 
 
-def test_a_battery_with_and_without_measured_current() -> None:
+def test_a_current_of_0_without_consumption_is_unknown() -> None:
     state = told(Vehicle(), BETAFLIGHT, STATUS=status(), ANALOG=struct.pack("<BHHh", 124, 350, 0, 1234))
     battery = fields(make.battery_status(at(state)))
     assert (battery["voltages"], battery["current_battery"], battery["current_consumed"]) == (
@@ -174,7 +174,7 @@ def test_a_battery_with_and_without_measured_current() -> None:
     assert make.battery_status(at(state)).current_battery == make.battery_status(at(state)).current_consumed == -1
 
 
-def test_a_receiver_without_signal_strength() -> None:
+def test_signal_strength_is_unknown_until_it_was_above_0() -> None:
     state = told(Vehicle(), HARAKIRI, RC=struct.pack("<4H", 1500, 1500, 1500, 1000))
     assert make.rc_channels(at(state)).rssi == U8
     told(state, HARAKIRI, ANALOG=struct.pack("<BHH", 120, 0, 0))
@@ -184,7 +184,7 @@ def test_a_receiver_without_signal_strength() -> None:
         assert make.rc_channels(at(state)).rssi == make.rc_channels_raw(at(state)).rssi == shown
 
 
-def test_missing_channels() -> None:
+def test_missing_channels_are_unknown() -> None:
     state = told(Vehicle(), HARAKIRI, RC=struct.pack("<6H", 1501, 1502, 1503, 1004, 1005, 1006))
     all_channels, raw = make.rc_channels(at(state)), make.rc_channels_raw(at(state))
     assert all_channels.chancount == 6
@@ -237,7 +237,7 @@ def test_the_mixer_determines_the_type(mixer: int, mav_type: int) -> None:
         (HARAKIRI, ("BARO", "ANGLE"), 2, 6, 0),
     ],
 )
-def test_modes_from_boxes(
+def test_the_active_boxes_determine_the_mode(
     who: FlightController, active: tuple[str, ...], copter_mode: int, plane_mode: int, rover_mode: int
 ) -> None:
     flags = sum(1 << who.boxes.index(name) for name in ("ARM", *active))
@@ -291,7 +291,7 @@ def test_inavs_home_has_its_altitude_in_centimetres() -> None:
     assert make.global_position_int(at(state)).alt == 141_590
 
 
-def test_an_inav_without_a_voltage() -> None:
+def test_an_inav_without_a_voltage_reports_no_battery() -> None:
     analog = struct.pack("<BHHIIIIBH", 3 << 4, 0, 0, 0, 0, 0, 0, 0, 0)
     assert at(told(Vehicle(), INAV, INAV_ANALOG=analog)).made((make.battery_status,)) == []
 
@@ -304,7 +304,7 @@ def test_distance_home_only_with_a_known_home() -> None:
     assert make.home_direction(at(state)).value == pytest.approx(180)
 
 
-def test_sensors_and_errors() -> None:
+def test_sensors_and_i2c_errors_are_reported() -> None:
     present = make.sys_status(at(told(Vehicle(), HARAKIRI, STATUS=status(sensors=0b0001, i2c_errors=9)), 0))
     assert present.errors_comm == 9
     assert not present.onboard_control_sensors_present & m.MAV_SYS_STATUS_SENSOR_GPS
@@ -346,13 +346,15 @@ def test_a_receiver_is_healthy_while_it_has_a_signal() -> None:
         (1 << 5, -200, 0, 300, m.MAV_LANDED_STATE_IN_AIR),
     ],
 )
-def test_landed_state(flags: int, height_cm: int, climb_cms: int, speed: int, landed: int) -> None:
+def test_height_and_speed_determine_the_landed_state(
+    flags: int, height_cm: int, climb_cms: int, speed: int, landed: int
+) -> None:
     state = told(Vehicle(), HARAKIRI, STATUS=status(flags=flags), RAW_GPS=gps(speed=speed))
     told(state, HARAKIRI, ALTITUDE=struct.pack("<ih", height_cm, climb_cms))
     assert make.extended_sys_state(at(state)).landed_state == landed
 
 
-def test_motors_and_local_position() -> None:
+def test_motors_and_local_position_are_reported() -> None:
     state = told(
         Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(speed=0), MOTOR=struct.pack("<8H", *range(1000, 1008))
     )

@@ -111,7 +111,7 @@ def test_groups_from_a_mavlink_autopilot() -> None:
     autopilot.say(m.MAVLink_gps_raw_int_message(1, 2, 0, 0, 0, 120, 65535, 65535, 65535, 255))
     autopilot.say(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, -1, -1, 0, 0, 0, 0, 0, 0))
     autopilot.say(m.MAVLink_rc_channels_raw_message(1, 0, 1500, 1501, 1000, 1502, *[65535] * 4, 127))
-    # A gimbal on board is not taken for the autopilot.
+    # A gimbal on board is not the autopilot.
     gimbal = m.MAVLink(None, srcSystem=1, srcComponent=154)
     autopilot.outgoing += m.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3).pack(gimbal)
     autopilot.outgoing += m.MAVLink_attitude_message(1, 1.0, 1.0, 1.0, 0, 0, 0).pack(gimbal)

@@ -62,7 +62,7 @@ def test_errors_are_reported_with_the_file(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(("path", "words"), [("/dev/zero", "larger than 1 MB"), ("/none", "No such file")])
-def test_a_file_that_cannot_be_read(tmp_path: Path, path: str, words: str) -> None:
+def test_an_unreadable_file_is_one_sentence(tmp_path: Path, path: str, words: str) -> None:
     ended = run_naze_bridge("run", "--fc", "sim:", "--config", path, "--state-dir", tmp_path)
     assert ended.returncode == 2
     assert ended.stderr.splitlines()[0].startswith(f"naze-bridge: {path}: this cannot be read: ")

@@ -78,7 +78,7 @@ def test_an_installation_has_the_example(tmp_path: Path) -> None:
     assert "Sent 14 items; the flight controller holds 13" in ended.stdout
 
 
-def test_a_missing_file(tmp_path: Path) -> None:
+def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
     ended = run_naze_bridge("demo", "--once", tmp_path / "none")
     assert ended.returncode == 2
     assert ended.stderr.startswith(f"naze-bridge: {tmp_path / 'none'}: no such file")

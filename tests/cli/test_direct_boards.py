@@ -43,7 +43,7 @@ def plan_file(tmp_path: Path) -> Path:
     return file
 
 
-def test_push_pull_and_clear(board: Board, plan_file: Path, tmp_path: Path) -> None:
+def test_push_pull_and_clear_work(board: Board, plan_file: Path, tmp_path: Path) -> None:
     pushed = run_naze_bridge("push", plan_file, "--fc", board.link)
     assert (pushed.returncode, pushed.stderr.strip()) == (0, "")
     assert "ACCEPTED: Mission verified" in pushed.stdout
@@ -57,7 +57,7 @@ def test_push_pull_and_clear(board: Board, plan_file: Path, tmp_path: Path) -> N
     assert run_naze_bridge("pull", "--fc", board.link).stdout.startswith("0 records")
 
 
-def test_the_same_as_json(board: Board, plan_file: Path) -> None:
+def test_push_pull_and_clear_print_json(board: Board, plan_file: Path) -> None:
     pushed = run_naze_bridge("push", plan_file, "--json", "--fc", board.link)
     assert json.loads(pushed.stdout)["ack"] == "MAV_MISSION_ACCEPTED"
     held = json.loads(run_naze_bridge("pull", "--json", "--fc", board.link).stdout)
@@ -73,7 +73,7 @@ def assert_status(board: Board) -> None:
     assert str(board.link) in diagnosis.stdout
 
 
-def test_status_and_doctor(board: Board) -> None:
+def test_status_and_doctor_work(board: Board) -> None:
     assert_status(board)
 
 

@@ -57,11 +57,11 @@ def test_status_waits_for_telemetry(tmp_path: Path) -> None:
     assert status["satellites"] > 4
 
 
-def test_a_missing_port(tmp_path: Path) -> None:
+def test_a_missing_port_is_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--fc", tmp_path / "naze"), 1, "is missing", str(tmp_path))
 
 
-def test_a_port_used_by_another_program(board: Board) -> None:
+def test_a_port_used_by_another_program_is_one_sentence(board: Board) -> None:
     script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", script, str(board.link)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -72,11 +72,11 @@ def test_a_port_used_by_another_program(board: Board) -> None:
         other.kill()
 
 
-def test_a_tcp_port_without_a_listener() -> None:
+def test_a_tcp_port_without_a_listener_is_one_sentence() -> None:
     assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"), 1, "tcp:127.0.0.1:9 cannot be reached")
 
 
-def test_an_unknown_host() -> None:
+def test_an_unknown_host_is_one_sentence() -> None:
     advice = "check the name and the network"
     assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:[fe80::1%no-card]:9"), 1, advice)
 
@@ -84,7 +84,7 @@ def test_an_unknown_host() -> None:
 # -- the machine ---------------------------------------------------------------------------------------------
 
 
-def test_a_full_disk_behind_standard_output(tmp_path: Path) -> None:
+def test_a_full_disk_behind_standard_output_is_one_sentence(tmp_path: Path) -> None:
     def leave_100_bytes() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
 
@@ -113,7 +113,7 @@ def test_a_full_disk_behind_the_log_does_not_stop_the_program(tmp_path: Path) ->
     assert (ended.returncode, ended.stdout) == (0, "goes on\n")
 
 
-def test_a_closed_pipe() -> None:
+def test_a_closed_pipe_is_not_reported() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     ended = run_naze_bridge("check", EXAMPLES / "long-146.waypoints", stdout=writing)
@@ -122,7 +122,9 @@ def test_a_closed_pipe() -> None:
 
 
 @pytest.mark.parametrize("command", [["status"], ["missions", "list"], ["run", "--fc", "sim:"]])
-def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, command: list[str]) -> None:
+def test_a_user_without_a_home_is_told_of_the_state_dir_option(
+    monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
     def nobody(uid: int) -> None:
         raise KeyError(uid)
 

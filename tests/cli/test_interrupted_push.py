@@ -105,7 +105,7 @@ def test_a_daemon_continues_and_its_result_is_shown(start: Starter) -> None:
     assert len(board.records()) == 146
 
 
-def test_a_second_ctrl_c_exits(start: Starter) -> None:
+def test_a_second_ctrl_c_exits_at_once(start: Starter) -> None:
     _, terminal = interrupted_push(start)
     terminal.wait_for("press Ctrl-C again")
     terminal.type(CTRL_C)

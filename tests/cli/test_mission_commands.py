@@ -219,14 +219,14 @@ def test_pull_replaces_only_files(daemon: Daemon, tmp_path: Path, make: object) 
     assert stat.S_IFMT(path.stat().st_mode) == kind
 
 
-def test_pull_into_a_link_to_itself(daemon: Daemon, tmp_path: Path) -> None:
+def test_pull_into_a_link_to_itself_is_refused(daemon: Daemon, tmp_path: Path) -> None:
     path = tmp_path / "loop"
     path.symlink_to(path)
     assert_one_sentence(ask(daemon, "pull", path), 1, str(path), "loop")
     assert path.is_symlink()
 
 
-def test_pull_into_a_missing_folder(daemon: Daemon, tmp_path: Path) -> None:
+def test_pull_into_a_missing_folder_is_refused(daemon: Daemon, tmp_path: Path) -> None:
     assert_one_sentence(ask(daemon, "pull", tmp_path / "none" / "held"), 1, "no such file or directory")
 
 
@@ -241,7 +241,7 @@ def test_pull_into_standard_output_is_a_mission_file(daemon: Daemon) -> None:
 # -- with and without a daemon ---------------------------------------------------------------------------------
 
 
-def test_no_daemon(tmp_path: Path) -> None:
+def test_a_missing_daemon_is_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--state-dir", tmp_path), 1, str(tmp_path), "naze-bridge run")
 
 
@@ -262,7 +262,7 @@ def test_stored_missions_are_read_without_a_daemon(start_in: Starter, tmp_path: 
     assert_one_sentence(run_naze_bridge("missions", "list", "--state-dir", tmp_path), 1, "no missions are stored")
 
 
-def test_status_is_readable(daemon: Daemon) -> None:
+def test_status_shows_the_flight_controller_and_the_address(daemon: Daemon) -> None:
     lines = dict(line.split("  ", 1) for line in ask(daemon, "status").stdout.splitlines())
     assert ", firmware 2.1.1, on sim:, MSP" in lines["Flight controller"]
     assert ", for " in lines["Flight controller"]
@@ -293,7 +293,7 @@ def test_the_list_of_commands_imports_none_of_them() -> None:
     assert not {"asyncio", "rich", "pymavlink", "structlog"} & set(printed.split())
 
 
-def test_another_users_daemon(daemon: Daemon) -> None:
+def test_another_users_daemon_is_reported_as_such(daemon: Daemon) -> None:
     """As root, the daemon's directory is root's; otherwise it is the tester's own with no permissions."""
     as_nobody = (
         "import os; from service.cli.main import main; import service.cli.status, service.settings;"
@@ -318,7 +318,7 @@ def test_missions_needs_a_daemon() -> None:
     assert "No such option" in ended.stderr
 
 
-def test_numbers_of_missing_missions(daemon: Daemon) -> None:
+def test_a_missing_mission_is_one_sentence(daemon: Daemon) -> None:
     for wrong in (["show", "99999999999999999999"], ["list", "--limit", "99999999999999999999"], ["show", "-1"]):
         ended = ask(daemon, "missions", *wrong)
         assert ended.returncode == 2, ended
@@ -326,7 +326,7 @@ def test_numbers_of_missing_missions(daemon: Daemon) -> None:
     assert_one_sentence(ask(daemon, "missions", "show", "2147483647"), 1, "there is no mission 2147483647")
 
 
-def test_an_empty_list_of_missions(tmp_path: Path) -> None:
+def test_an_empty_store_is_said_to_be_empty(tmp_path: Path) -> None:
     with ExitStack() as stack:
         daemon = Starter(tmp_path, stack).daemon("sim:")
         daemon.wait_up()

@@ -25,7 +25,7 @@ CAPACITY, CHUNK, READ = 146, 15, 6
 
 
 def mission(count: int, seed: int = 0) -> tuple[WpRecord, ...]:
-    """A list with every command."""
+    """A list that contains every command."""
     return tuple(
         WpRecord(480_000_000 + 977 * n + seed, -110_000_000 - 13 * n, 13 + n, n & 1, n, 2, -n % 128, n % 8)
         for n in range(count)
@@ -150,7 +150,7 @@ def test_a_full_list_is_pushed_read_back_and_survives_a_reset(fc: Companion) -> 
     assert fc.info().stored == identify(records)
 
 
-def test_count_zero_clears(fc: Companion) -> None:
+def test_a_count_of_0_clears(fc: Companion) -> None:
     fc.push(())
     assert fc.holds(())
     fc.device.power_cycle()
@@ -203,18 +203,18 @@ def test_without_a_transfer_chunks_are_refused(fc: Companion) -> None:
     assert fc.commit(identify(NEW)) == Stored(ReplyStatus.NO_TRANSFER, identify(OLD))
 
 
-def test_more_records_than_the_capacity(fc: Companion) -> None:
+def test_more_records_than_the_capacity_are_no_space(fc: Companion) -> None:
     assert fc.begin(ListIdentity(CAPACITY + 1, 1)) == Staged(ReplyStatus.NO_SPACE, 0, 0)
 
 
-def test_commit_of_an_incomplete_list(fc: Companion) -> None:
+def test_commit_of_an_incomplete_list_is_incomplete(fc: Companion) -> None:
     fc.begin(identify(NEW))
     fc.chunk(NEW, 0)
     assert fc.commit(identify(NEW)) == Stored(ReplyStatus.INCOMPLETE, identify(OLD))
     assert InfoFlag.TRANSFER_OPEN in fc.info().flags
 
 
-def test_commit_of_other_records_than_announced(fc: Companion) -> None:
+def test_commit_of_records_other_than_announced_is_a_checksum_error(fc: Companion) -> None:
     wrong = ListIdentity(len(NEW), 7)
     fc.begin(wrong)
     fc.chunk(NEW, 0)
@@ -224,7 +224,7 @@ def test_commit_of_other_records_than_announced(fc: Companion) -> None:
     assert fc.holds(OLD)
 
 
-def test_commit_of_another_list_than_begun(fc: Companion) -> None:
+def test_commit_of_a_list_other_than_begun_is_a_checksum_error(fc: Companion) -> None:
     fc.stage(NEW)
     assert fc.commit(identify(NEW[:3])).status is ReplyStatus.CHECKSUM
     assert fc.info().flags == InfoFlag(0)
@@ -250,7 +250,7 @@ def test_arming_drops_the_transfer_and_refuses_changes(fc: Companion) -> None:
     assert fc.holds(OLD)
 
 
-def test_a_scheduled_write_makes_it_busy(fc: Companion) -> None:
+def test_a_scheduled_configuration_write_makes_it_busy(fc: Companion) -> None:
     fc.device.set_busy(True)
     assert fc.begin(identify(NEW)) == Staged(ReplyStatus.BUSY, 0, 0)
     fc.device.set_busy(False)
@@ -267,7 +267,7 @@ def test_five_seconds_of_silence_drop_the_transfer(fc: Companion) -> None:
     assert fc.chunk(NEW, CHUNK).status is ReplyStatus.NO_TRANSFER
 
 
-def test_read_past_the_end(fc: Companion) -> None:
+def test_reading_past_the_end_is_out_of_range(fc: Companion) -> None:
     assert fc.read(len(OLD), 1) == Records(ReplyStatus.RANGE, len(OLD), [])
     assert fc.read(len(OLD) - 1, READ).records == list(OLD[-1:])
     assert fc.read(0, 255).records == list(OLD)

@@ -71,7 +71,7 @@ def no_answer() -> dict[str, object]:
     raise ControlError("no flight controller answers on /dev/serial0")
 
 
-def test_a_healthy_pi(pi: FaultyMachine, tmp_path: Path) -> None:
+def test_a_healthy_pi_has_no_problem(pi: FaultyMachine, tmp_path: Path) -> None:
     settings = Settings(PORT, GCS, tmp_path / "state")
     found = list(examine(pi, settings, no_answer, lambda: STATUS))
     # Only root can give a file to the group dialout.
@@ -85,7 +85,7 @@ def test_a_healthy_pi(pi: FaultyMachine, tmp_path: Path) -> None:
 # -- the port ------------------------------------------------------------------------------------------------
 
 
-def test_a_missing_port(pi: FaultyMachine) -> None:
+def test_a_missing_port_is_a_problem(pi: FaultyMachine) -> None:
     pi.path("/dev/serial0").unlink()
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup")
     pi.write("/dev/ttyUSB0")
@@ -116,12 +116,12 @@ def test_without_a_named_port_every_port_is_checked(pi: FaultyMachine, tmp_path:
     assert_problem(checked()["port"], "/dev/serial0 is missing", "sudo naze-bridge setup")
 
 
-def test_a_port_that_the_group_may_not_use(pi: FaultyMachine) -> None:
+def test_a_port_without_group_access_is_a_problem(pi: FaultyMachine) -> None:
     pi.path("/dev/ttyAMA0").chmod(0o600)
     assert_problem(check_permission(pi, PORT), "-rw-------", "sudo chmod g+rw /dev/ttyAMA0")
 
 
-def test_a_running_login_console(pi: FaultyMachine) -> None:
+def test_a_running_login_console_is_reported_once(pi: FaultyMachine) -> None:
     pi.runs(412, "/sbin/agetty", "--keep-baud", "115200,57600", "ttyAMA0", "vt220", has_open="/dev/ttyAMA0")
     assert_problem(
         check_console(pi, PORT),
@@ -132,13 +132,13 @@ def test_a_running_login_console(pi: FaultyMachine) -> None:
     assert check_holder(pi, PORT) is None
 
 
-def test_a_login_console_that_starts_at_the_next_boot(pi: FaultyMachine) -> None:
+def test_a_login_console_enabled_for_the_next_boot_is_found(pi: FaultyMachine) -> None:
     pi.write("/etc/systemd/system/getty.target.wants/serial-getty@ttyAMA0.service")
     assert_problem(check_console(pi, PORT), "is enabled", "disable --now serial-getty@ttyAMA0.service")
 
 
 @pytest.mark.parametrize("word", ["console=serial0,115200", "console=ttyAMA0", "console=ttyAMA0,115200n8"])
-def test_a_console_of_the_kernel(pi: FaultyMachine, word: str) -> None:
+def test_a_kernel_console_is_a_problem(pi: FaultyMachine, word: str) -> None:
     pi.write("/boot/firmware/cmdline.txt", f"{word} console=tty1 rootwait\n")
     name = word.removeprefix("console=").partition(",")[0]
     assert_problem(
@@ -148,7 +148,7 @@ def test_a_console_of_the_kernel(pi: FaultyMachine, word: str) -> None:
     )
 
 
-def test_a_console_of_a_machine_with_another_boot_loader(pi: FaultyMachine) -> None:
+def test_a_kernel_console_outside_cmdline_txt_is_found(pi: FaultyMachine) -> None:
     pi.write("/proc/cmdline", "root=/dev/sda1 console=ttyAMA0,9600\n")
     assert_problem(check_console(pi, PORT), "started with console=ttyAMA0,9600", "reboot")
 
@@ -159,7 +159,7 @@ def test_a_console_on_another_port_is_fine(pi: FaultyMachine) -> None:
     assert_ok(check_console(pi, PORT), "no login console on /dev/ttyAMA0")
 
 
-def test_another_program_on_the_port(pi: FaultyMachine) -> None:
+def test_another_program_on_the_port_is_named(pi: FaultyMachine) -> None:
     pi.runs(99, "/usr/bin/gpsd", "/dev/ttyAMA0", has_open="/dev/ttyAMA0")
     assert_problem(check_holder(pi, PORT), "gpsd (pid 99) has /dev/ttyAMA0 open", "sudo kill 99")
 
@@ -175,7 +175,7 @@ def test_a_daemon_on_the_port_is_fine_and_left_alone(pi: FaultyMachine, tmp_path
     assert [each.found for each in found if each.check == "flight controller"] == ["/dev/serial0 was not checked"]
 
 
-def test_modem_manager(pi: FaultyMachine) -> None:
+def test_modem_manager_is_a_note_unless_it_ignores_the_port(pi: FaultyMachine) -> None:
     usb = SerialFc("/dev/ttyUSB0", None)
     pi.write("/dev/ttyUSB0")
     assert_ok(check_modem_manager(pi, usb), "does not run")
@@ -189,7 +189,7 @@ def test_modem_manager(pi: FaultyMachine) -> None:
 # -- the flight controller -----------------------------------------------------------------------------------
 
 
-def test_a_silent_flight_controller() -> None:
+def test_a_silent_flight_controller_is_a_problem() -> None:
     assert_problem(check_flight_controller(PORT, no_answer, no_answer), "no flight controller answers", "TX goes to RX")
     silent = STATUS | {"flight_controller": None, "state": "searching"}
     (_, found) = check_flight_controller(PORT, lambda: silent, None)
@@ -198,7 +198,7 @@ def test_a_silent_flight_controller() -> None:
     assert_note(found, "/dev/serial0 cannot be opened yet")
 
 
-def test_a_flight_controller_in_its_command_line() -> None:
+def test_a_flight_controller_in_its_command_line_is_recognised() -> None:
     (_, found) = check_flight_controller(PORT, lambda: STATUS | {"flight_controller": None, "state": Cli.name}, None)
     assert_problem(found, "in its command line: type exit there, or unplug it", "naze-bridge doctor` again")
 
@@ -217,7 +217,7 @@ def test_a_daemon_is_asked_and_the_port_left_alone() -> None:
 # -- the network ---------------------------------------------------------------------------------------------
 
 
-def test_wifi(pi: FaultyMachine) -> None:
+def test_a_wifi_without_address_or_switched_off_is_reported(pi: FaultyMachine) -> None:
     pi.addresses.clear()
     assert_note(check_wifi(pi, GCS), "wlan0 has no address")
     pi.write("/sys/class/rfkill/rfkill0/type", "wlan\n")
@@ -229,14 +229,14 @@ def test_wifi(pi: FaultyMachine) -> None:
     assert_note(check_wifi(pi, GCS), "no Wi-Fi card")
 
 
-def test_an_occupied_port(pi: FaultyMachine) -> None:
+def test_an_occupied_network_port_is_a_problem(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
     assert_problem(check_ports(pi, GCS), "UDP port 14550 is used by another program", "give gcs another port")
     pi.runs(55, "/usr/bin/python3", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
     assert_problem(check_ports(pi, GCS), "python3 (pid 55)", "stop it")
 
 
-def test_a_port_used_by_our_daemon(pi: FaultyMachine) -> None:
+def test_a_network_port_used_by_our_daemon_is_fine(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
     pi.runs(55, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="socket:[4711]")
     assert_ok(check_ports(pi, GCS), "the running daemon's")
@@ -249,7 +249,7 @@ def test_an_outgoing_connection_does_not_occupy_its_port(pi: FaultyMachine) -> N
     assert_problem(check_ports(pi, [parse_gcs("tcpin:0.0.0.0:14550")]), "TCP port 14550 is used", "stop it")
 
 
-def test_zenoh(tmp_path: Path) -> None:
+def test_zenoh_endpoints_and_files_are_checked(tmp_path: Path) -> None:
     assert_ok(check_zenoh(None), "off")
     assert_ok(check_zenoh(ZenohSettings(vehicle="naze-1")), "fleet/naze-1, opens no connections")
     nowhere = ZenohSettings(vehicle="naze-1", connect=("tcp/127.0.0.1:9",))
@@ -262,7 +262,7 @@ def test_zenoh(tmp_path: Path) -> None:
 # -- the machine ---------------------------------------------------------------------------------------------
 
 
-def test_the_clock(pi: FaultyMachine) -> None:
+def test_a_wrong_clock_is_a_problem(pi: FaultyMachine) -> None:
     assert_ok(check_clock(pi, NOW), "set by the network")
     assert_problem(check_clock(pi, datetime(1970, 1, 1, tzinfo=UTC)), "1970-01-01", "sudo date --set")
     pi.path("/run/systemd/timesync/synchronized").unlink()
@@ -271,13 +271,13 @@ def test_the_clock(pi: FaultyMachine) -> None:
     assert_ok(check_clock(pi, NOW), "kept by chronyd")
 
 
-def test_the_disk(tmp_path: Path) -> None:
+def test_a_nearly_full_disk_is_a_problem(tmp_path: Path) -> None:
     state = tmp_path / "not made yet" / "state"
     assert_ok(check_disk(state, lambda _: 1 << 30), "1024 MB free")
     assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove unneeded files")
 
 
-def test_an_unusable_state_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unusable_state_directory_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     assert_problem(check_disk(tmp_path / "file" / "state"), f"{tmp_path}/file is a file", "name another state_dir")
     monkeypatch.setattr(os, "access", lambda _path, _mode: False)
@@ -286,7 +286,7 @@ def test_an_unusable_state_directory(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert_problem(check_disk(tmp_path, lambda _: 1 << 30), "on a disk that is read-only", "remount,rw")
 
 
-def test_the_missions(tmp_path: Path) -> None:
+def test_a_damaged_store_is_a_problem(tmp_path: Path) -> None:
     path = tmp_path / "missions.db"
     assert_ok(check_database(tmp_path), "none stored yet")
     open_store(path, 0).store.close()

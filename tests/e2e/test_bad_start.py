@@ -30,7 +30,7 @@ UNKNOWN = {
 
 
 @pytest.mark.parametrize("name", UNKNOWN)
-def test_an_invalid_connection(tmp_path: Path, name: str) -> None:
+def test_an_invalid_connection_is_one_sentence(tmp_path: Path, name: str) -> None:
     arguments, hint = UNKNOWN[name]
     ended = run_naze_bridge("run", *arguments, "--state-dir", str(tmp_path))
     assert ended.returncode == 2
@@ -48,7 +48,7 @@ def assert_refused(ended: subprocess.CompletedProcess[str], *parts: str) -> None
         assert part in sentence
 
 
-def test_two_daemons_on_one_port(start: Starter, tmp_path: Path) -> None:
+def test_a_second_daemon_on_one_port_is_refused(start: Starter, tmp_path: Path) -> None:
     first = start.daemon("sim:")
     first.wait_up()
     link = f"udpin:127.0.0.1:{first.port}"
@@ -66,11 +66,11 @@ def test_two_daemons_on_one_port(start: Starter, tmp_path: Path) -> None:
         ("udpin:203.0.113.1:14550", "this machine has no such address"),
     ],
 )
-def test_an_impossible_ground_station_link(tmp_path: Path, link: str, advice: str) -> None:
+def test_an_impossible_link_to_ground_stations_is_one_sentence(tmp_path: Path, link: str, advice: str) -> None:
     assert_refused(run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", tmp_path), link, advice)
 
 
-def test_two_daemons_on_one_state_directory(start: Starter) -> None:
+def test_a_second_daemon_on_one_state_directory_is_refused(start: Starter) -> None:
     first = start.daemon("sim:")
     first.wait_up()
     link = f"udpin:127.0.0.1:{free_port()}"
@@ -80,8 +80,8 @@ def test_two_daemons_on_one_state_directory(start: Starter) -> None:
     first.wait()
 
 
-def test_an_impossible_state_directory(start: Starter, tmp_path: Path) -> None:
-    """As with a dead disk: the daemon works without it and reports it everywhere."""
+def test_the_daemon_works_without_a_state_directory(start: Starter, tmp_path: Path) -> None:
+    """As with a dead disk. The missing store is reported everywhere."""
     file = tmp_path / "file"
     file.write_text("not a directory")
     daemon = start.daemon("sim:", state_dir=file / "state")
@@ -148,11 +148,11 @@ def test_a_missing_port_is_opened_when_it_appears(start: Starter) -> None:
 
 
 @pytest.mark.parametrize("path", ["/dev/null", __file__])
-def test_a_port_that_is_not_a_serial_port(start: Starter, path: str) -> None:
+def test_a_port_that_is_not_a_serial_port_is_reported(start: Starter, path: str) -> None:
     assert "is not a serial port" in complaint(start, Path(path))
 
 
-def test_a_port_used_by_another_program(start: Starter, terminal: Path) -> None:
+def test_a_port_used_by_another_program_is_reported(start: Starter, terminal: Path) -> None:
     script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", script, str(terminal)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -165,7 +165,7 @@ def test_a_port_used_by_another_program(start: Starter, terminal: Path) -> None:
         other.kill()
 
 
-def test_a_port_used_by_a_login_console(start: Starter, terminal: Path) -> None:
+def test_a_port_used_by_a_login_console_is_reported(start: Starter, terminal: Path) -> None:
     with subprocess.Popen(
         ["/sbin/agetty", "-c", "input()", terminal.name], executable=sys.executable, stdin=subprocess.PIPE
     ) as console:
@@ -175,7 +175,7 @@ def test_a_port_used_by_a_login_console(start: Starter, terminal: Path) -> None:
         console.kill()
 
 
-def test_a_tcp_flight_controller_that_is_not_up_yet(start: Starter) -> None:
+def test_a_tcp_flight_controller_is_found_once_it_is_up(start: Starter) -> None:
     port = free_port(socket.SOCK_STREAM)
     daemon = start.daemon(f"tcp:127.0.0.1:{port}")
     event = until(lambda: daemon.has_logged("fc.port_unavailable"), "a complaint")

@@ -47,7 +47,9 @@ def assert_retry_works(bench: Bench, planner: MissionPlanner) -> None:
 
 # Writing the first list, in a blank slot, and writing the second.
 @pytest.mark.parametrize("operation", [2, 106])
-def test_a_power_cut_while_it_is_written(bench: Bench, planner: MissionPlanner, operation: int) -> None:
+def test_a_power_cut_while_a_list_is_written_keeps_the_old_one(
+    bench: Bench, planner: MissionPlanner, operation: int
+) -> None:
     bench.board.set(f"power_cut_at_flash_operation {operation}")
     assert_denied(lambda: planner.write(NEW))
     assert bench.board.stats()["power"] == "OFF"
@@ -58,7 +60,7 @@ def test_a_power_cut_while_it_is_written(bench: Bench, planner: MissionPlanner, 
     assert_retry_works(bench, planner)
 
 
-def test_a_hang_while_items_arrive(bench: Bench, planner: MissionPlanner) -> None:
+def test_a_board_that_hangs_while_items_arrive_keeps_the_old_list(bench: Bench, planner: MissionPlanner) -> None:
     planner.write_begun(NEW, 20)
     bench.board.set("hang 1")
     assert_denied(lambda: planner.go_on(NEW, 20))
@@ -68,7 +70,7 @@ def test_a_hang_while_items_arrive(bench: Bench, planner: MissionPlanner) -> Non
     assert_retry_works(bench, planner)
 
 
-def test_failing_flash(bench: Bench, planner: MissionPlanner) -> None:
+def test_failing_flash_keeps_the_old_list(bench: Bench, planner: MissionPlanner) -> None:
     bench.board.set("flash_failures 1000")
     assert_denied(lambda: planner.write(NEW))
     planner.wait_for_text("could not write its flash")
@@ -78,13 +80,13 @@ def test_failing_flash(bench: Bench, planner: MissionPlanner) -> None:
 
 
 @pytest.mark.parametrize("fault", ["bit_error_rate 0.0001", "lost_byte_rate 0.0005"])
-def test_a_line_that_damages_some_frames_only_delays(bench: Bench, planner: MissionPlanner, fault: str) -> None:
+def test_a_line_that_damages_some_frames_only_delays_a_write(bench: Bench, planner: MissionPlanner, fault: str) -> None:
     bench.board.set(fault)
     planner.write(NEW)
     assert bench.board.records() == records_of(judge(NEW))
 
 
-def test_a_line_that_damages_most_frames(bench: Bench, planner: MissionPlanner) -> None:
+def test_a_line_that_damages_most_frames_damages_no_list(bench: Bench, planner: MissionPlanner) -> None:
     bench.board.set("bit_error_rate 0.004")
     possible = [records_of(judge(NEW))]
     try:
@@ -96,7 +98,7 @@ def test_a_line_that_damages_most_frames(bench: Bench, planner: MissionPlanner) 
     assert_retry_works(bench, planner)
 
 
-def test_unplugged_and_plugged_in_again(bench: Bench, planner: MissionPlanner) -> None:
+def test_a_board_is_found_after_unplugging_during_a_write(bench: Bench, planner: MissionPlanner) -> None:
     planner.write_begun(NEW, 20)
     bench.board.set("unplug")
     assert_denied(lambda: planner.go_on(NEW, 20))
@@ -111,7 +113,7 @@ def test_unplugged_and_plugged_in_again(bench: Bench, planner: MissionPlanner) -
     assert lost is not None
 
 
-def test_a_board_left_in_its_command_line(start: Starter) -> None:
+def test_a_board_left_in_its_command_line_is_reported(start: Starter) -> None:
     board = start.board()
     with board.link.open("r+b", buffering=0) as terminal:
         terminal.write(b"\r\r\r")
@@ -160,7 +162,7 @@ def refusal_by(bench: Bench, reason: str) -> MissionResult | None:
     return refused.value.result
 
 
-def test_a_harakiri_without_the_mission_extension(start: Starter) -> None:
+def test_a_harakiri_without_the_extension_refuses_missions(start: Starter) -> None:
     bench = start.bench("--no-extension")
     assert refusal_by(bench, "lacks the mission patch") is MissionResult.UNSUPPORTED
     found = bench.daemon.has_logged("fc.found")
@@ -169,7 +171,7 @@ def test_a_harakiri_without_the_mission_extension(start: Starter) -> None:
     bench.board.assert_was_treated_well()
 
 
-def test_a_harakiri_that_speaks_mavlink_while_armed(start: Starter) -> None:
+def test_a_harakiri_that_speaks_mavlink_while_armed_is_one_vehicle(start: Starter) -> None:
     board = start.board("--armed", "--tele-prot", "2")
     daemon = start.daemon(str(board.link))
     daemon.wait("MAVLink")
@@ -185,7 +187,7 @@ def test_a_harakiri_that_speaks_mavlink_while_armed(start: Starter) -> None:
     board.assert_was_treated_well()
 
 
-def test_an_unexpected_speed(start: Starter) -> None:
+def test_a_board_at_an_unexpected_speed_is_found(start: Starter) -> None:
     bench = start.bench("--baud", "38400")
     status = bench.daemon.status()
     assert status is not None

@@ -25,7 +25,7 @@ NEW_OPERATIONS = len(NEW_RECORDS) + 2
 
 
 def start_on_core(start: Starter) -> tuple[Bench, Path]:
-    """Start daemon and board; return them and the board's flash file."""
+    """Start daemon and board; return them and the path of the board's flash."""
     flash = start.directory / "flash"
     return start.bench("--core", str(library()), "--state", str(flash)), flash
 
@@ -51,7 +51,7 @@ async def hear_of(vehicle: Any, *, armed: bool) -> None:
             break
 
 
-async def test_a_round_trip_of_146_items(core: tuple[Bench, Path]) -> None:
+async def test_146_items_are_written_and_read_back(core: tuple[Bench, Path]) -> None:
     (bench, flash), plan = core, mixed_plan(146)
     board, records = bench.board, records_of(judge(plan))
     async with vehicle_at(bench.daemon.port) as vehicle:
@@ -70,7 +70,7 @@ async def test_a_round_trip_of_146_items(core: tuple[Bench, Path]) -> None:
         assert board.stats()["flash_writes"] == written + 1
 
 
-async def test_refused_when_armed(core: tuple[Bench, Path]) -> None:
+async def test_a_write_while_armed_is_refused(core: tuple[Bench, Path]) -> None:
     bench, _ = core
     bench.daemon.push(OLD)
     async with vehicle_at(bench.daemon.port) as vehicle:
@@ -85,7 +85,7 @@ async def test_refused_when_armed(core: tuple[Bench, Path]) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-async def test_a_power_cut_while_it_is_written(start: Starter, seed: int) -> None:
+async def test_a_power_cut_while_a_list_is_written_keeps_the_old_one(start: Starter, seed: int) -> None:
     bench, flash = start_on_core(start)
     bench.daemon.push(OLD)
     cut = random.Random(seed).randint(1, NEW_OPERATIONS)
@@ -104,7 +104,7 @@ async def test_a_power_cut_while_it_is_written(start: Starter, seed: int) -> Non
     assert bench.board.records() == bench.daemon.held()["records"] == NEW_RECORDS
 
 
-async def test_bit_errors(start: Starter) -> None:
+async def test_bit_errors_damage_no_list(start: Starter) -> None:
     bench, _ = start_on_core(start)
     bench.daemon.push(OLD)
     bench.board.set("bit_error_rate 0.001")
@@ -121,7 +121,7 @@ async def test_bit_errors(start: Starter) -> None:
         assert bench.board.records() == NEW_RECORDS
 
 
-def test_a_library_that_is_not_the_core(tmp_path: Path) -> None:
+def test_a_library_that_is_not_the_core_is_refused(tmp_path: Path) -> None:
     wrong = tmp_path / "core.so"
     wrong.write_text("not a library")
     for options, said in [

@@ -102,7 +102,7 @@ def test_waiting_clients_are_told_of_a_stop(start: Starter, number: signal.Signa
     assert not (daemon.state_dir / "control.sock").exists()
 
 
-def test_a_path_too_long_for_a_socket(tmp_path: Path) -> None:
+def test_a_path_too_long_for_a_socket_is_one_sentence(tmp_path: Path) -> None:
     state = tmp_path / ("long" * 30)
     ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", "udpout:127.0.0.1:9", "--state-dir", state)
     assert ended.returncode == 1

@@ -24,7 +24,7 @@ LOSSES = {"fc.lost", "fc.port_lost"}
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_start_search_and_stop(start: Starter, number: signal.Signals) -> None:
+def test_start_search_and_stop_are_logged(start: Starter, number: signal.Signals) -> None:
     bench = start.bench()
     assert bench.daemon.end(number) == 0
     events = bench.daemon.events()
@@ -50,7 +50,7 @@ def test_an_unplugged_port_is_reported_lost(start: Starter) -> None:
 
 
 def test_an_unread_log_does_not_stop_the_daemon(tmp_path: Path) -> None:
-    """`naze-bridge run 2>&1 | less`, or a stalled journal; here the pipe is full before the first line."""
+    """As with `naze-bridge run 2>&1 | less`, or a stalled journal: the pipe is full before the first line."""
     unread, full = os.pipe()
     os.set_blocking(full, False)
     with suppress(BlockingIOError):

@@ -16,7 +16,7 @@ from tests.support.programs import free_port, until
 # -- kinds of links ------------------------------------------------------------------------------------------
 
 
-def test_every_kind_of_link_at_once(start: Starter) -> None:
+def test_every_kind_of_link_works_at_once(start: Starter) -> None:
     udp_in, udp_out, broadcast, tcp_in = free_port(), free_port(), free_port(), free_port(socket.SOCK_STREAM)
     links = (
         f"udpin:127.0.0.1:{udp_in}",
@@ -69,7 +69,7 @@ def test_a_tcp_client_that_disconnects_during_an_upload_blocks_no_one(start: Sta
     assert bench.board.records() == records_of(judge(plan))
 
 
-def test_a_station_that_supports_only_mavlink_1(shared: Bench) -> None:
+def test_a_station_that_supports_only_mavlink_1_writes_and_reads(shared: Bench) -> None:
     plan = mixed_plan(14)
     with udp_station(shared.daemon.address, mavlink_1) as station:
         station.say_hello()

@@ -114,7 +114,7 @@ def test_an_upload_continues_from_another_address(bench: Bench) -> None:
         until(is_alone, "the end of the old address")
 
 
-def test_a_list_written_meanwhile_is_acked_at_the_new_address(bench: Bench) -> None:
+def test_a_station_that_moves_during_the_write_gets_its_ack(bench: Bench) -> None:
     with udp_station(bench.daemon.address) as there:
         there.announce(len(PLAN))
         assert answer_requests(there, PLAN, until_seq=len(PLAN) - 1) is None
@@ -135,7 +135,7 @@ def test_a_list_written_meanwhile_is_acked_at_the_new_address(bench: Bench) -> N
 # -- other kinds of links ------------------------------------------------------------------------------------
 
 
-def test_ipv6_and_a_name(start: Starter) -> None:
+def test_links_on_ipv6_and_on_a_host_name_work(start: Starter) -> None:
     udp, tcp, named = free_port(), free_port(socket.SOCK_STREAM), free_port()
     bench = start.bench(gcs=[f"udpin:[::1]:{udp}", f"tcpin:[::1]:{tcp}", f"udpout:localhost:{named}"])
     by_udp = socket.socket(socket.AF_INET6, socket.SOCK_DGRAM)

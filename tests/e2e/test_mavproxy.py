@@ -13,7 +13,7 @@ from tests.support.programs import comes
 
 
 @pytest.mark.parametrize("version", ["--mav10", "--mav20"])
-def test_load_list_save_and_clear(shared: Bench, tmp_path: Path, version: str) -> None:
+def test_load_list_save_and_clear_work(shared: Bench, tmp_path: Path, version: str) -> None:
     plan = mixed_plan(20)
     with MavProxy(tmp_path, shared.daemon.port, version) as mavproxy:
         mavproxy.load(plan)
@@ -31,7 +31,7 @@ def test_load_list_save_and_clear(shared: Bench, tmp_path: Path, version: str) -
         mavproxy.wait_for("Requesting 1 waypoints")
 
 
-def test_load_with_float_items_and_its_parameters(shared: Bench, tmp_path: Path) -> None:
+def test_float_items_parameters_and_refusals_work(shared: Bench, tmp_path: Path) -> None:
     plan = mixed_plan(20)
     with MavProxy(tmp_path, shared.daemon.port) as mavproxy:
         mavproxy.wait_for("Received 2 parameters")
@@ -63,7 +63,7 @@ def test_refusals_have_a_reason_and_keep_the_list(bench: Bench, tmp_path: Path) 
         assert bench.board.records() == records_of(judge(plan))
 
 
-def test_load_and_list_over_a_bad_link(shared: Bench, tmp_path: Path) -> None:
+def test_load_and_list_work_over_a_bad_link(shared: Bench, tmp_path: Path) -> None:
     """MAVProxy sends MISSION_COUNT and the last item only once; after a loss the user repeats `wp load`."""
     link = shared.lossy_link(loss=0.1, repeats=0.05, delay_s=0.02, jitter_s=0.05, seed=3)
     plan = plain_plan(8, start=40)

@@ -74,7 +74,7 @@ async def refusal_of(missions: Any, plan: Sequence[PlanRow]) -> Any:
 
 
 async def pressed_again(act: Callable[[], Awaitable[T]], after_failure: Callable[[], None]) -> T:
-    """Retry twice, like a user whose MAVSDK gave up (after five repeats of one message)."""
+    """Try up to three times: MAVSDK gives up after five repeats of one message."""
     for _ in range(2):
         try:
             return await act()
@@ -86,7 +86,7 @@ async def pressed_again(act: Callable[[], Awaitable[T]], after_failure: Callable
 
 
 @pytest.mark.parametrize("count", [12, 146])
-async def test_a_round_trip(shared: Bench, count: int) -> None:
+async def test_a_written_list_is_read_back(shared: Bench, count: int) -> None:
     plan = mixed_plan(count)
     async with vehicle_at(shared.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
@@ -102,7 +102,7 @@ async def test_unset_parameters_are_nan(shared: Bench) -> None:
     assert shared.board.records() == records_of(judge(plain_plan(20, start=3)))
 
 
-async def test_a_round_trip_over_a_bad_link(shared: Bench, kept: list[str]) -> None:
+async def test_a_list_is_written_and_read_over_a_bad_link(shared: Bench, kept: list[str]) -> None:
     link = shared.lossy_link(loss=0.1, repeats=0.05, delay_s=0.03, jitter_s=0.04, seed=2)
     plan = mixed_plan(20)
     new = records_of(judge(plan))
@@ -120,7 +120,7 @@ async def test_a_round_trip_over_a_bad_link(shared: Bench, kept: list[str]) -> N
     assert link.lost
 
 
-async def test_refusals(shared: Bench) -> None:
+async def test_refused_lists_keep_the_old_one(shared: Bench) -> None:
     async with vehicle_at(shared.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
         plan = plain_plan(12, start=20)
@@ -132,7 +132,7 @@ async def test_refusals(shared: Bench) -> None:
         assert shared.board.records() == records_of(judge(plan))
 
 
-async def test_armed(bench: Bench) -> None:
+async def test_writing_and_reading_while_armed_are_refused(bench: Bench) -> None:
     async with vehicle_at(bench.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
         plan = plain_plan(12, start=20)
@@ -147,8 +147,8 @@ async def test_armed(bench: Bench) -> None:
         assert bench.board.records() == records_of(judge(plan))
 
 
-async def test_clearing(shared: Bench) -> None:
-    """To an ArduPilot its clear_mission sends a list of one item, which the rules reject: the list is kept."""
+async def test_clear_mission_and_clear_all_clear_the_board(shared: Bench) -> None:
+    """Its clear_mission sends an ArduPilot a list of one item of zeros."""
     async with vehicle_at(shared.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
         plan = plain_plan(12, start=20)
@@ -202,7 +202,7 @@ async def test_cancelling_keeps_the_old_list(shared: Bench, kept: list[str]) -> 
     assert shared.board.records() == kept
 
 
-async def test_parameters_and_telemetry(shared: Bench) -> None:
+async def test_parameters_and_telemetry_work(shared: Bench) -> None:
     async with vehicle_at(shared.daemon.port) as vehicle:
         parameters = ParamAsync(vehicle)
         found = {each.name: each.value for each in (await parameters.get_all_params()).float_params}

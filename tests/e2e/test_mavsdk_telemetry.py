@@ -45,7 +45,7 @@ async def streams_with_values(vehicle: Any, expected: set[str]) -> set[str]:
     return found
 
 
-async def test_the_table_of_telemetry_streams(shared: Bench) -> None:
+async def test_the_listed_telemetry_streams_have_values(shared: Bench) -> None:
     table = dict(re.findall(r"^\| `([a-z_0-9]+)` \| ([a-z]+)", PAGE.split("## Telemetry streams")[1], re.MULTILINE))
     expected = {name for name, has_values in table.items() if has_values == "yes"}
     async with vehicle_at(shared.daemon.port) as vehicle:

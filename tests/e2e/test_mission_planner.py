@@ -86,7 +86,7 @@ def test_it_speaks_mavlink_1_until_it_has_seen_mavlink_2(shared: Bench) -> None:
         assert not planner.heard_in(1)
 
 
-def test_an_old_version_that_never_switches_to_mavlink_2(shared: Bench) -> None:
+def test_an_old_version_on_mavlink_1_writes_and_reads(shared: Bench) -> None:
     planner = shared.mission_planner(mavlink_1_only=True)
     planner.connect()
     plan = mixed_plan(14)
@@ -160,7 +160,7 @@ def test_a_write_survives_loss_duplication_and_reordering(shared: Bench, count: 
 
 
 @pytest.mark.parametrize("count", [12, 20, 146])
-def test_write_fast(shared: Bench, count: int) -> None:
+def test_write_fast_is_written_and_verified(shared: Bench, count: int) -> None:
     planner = shared.mission_planner()
     plan = plain_plan(count, start=2 * count)
     planner.write_fast(plan)
@@ -171,7 +171,7 @@ def test_write_fast(shared: Bench, count: int) -> None:
     assert MissionResult.INVALID_SEQUENCE not in planner.acks()
 
 
-def test_write_fast_over_a_bad_radio_is_whole_or_not_at_all(shared: Bench, kept: list[str]) -> None:
+def test_write_fast_over_a_bad_radio_writes_everything_or_nothing(shared: Bench, kept: list[str]) -> None:
     """It does not check that its last burst arrived; if not, the old list is kept and the user is told."""
     link = shared.lossy_link(**BAD_RADIO, seed=4)
     planner = shared.mission_planner(link.address, pace=1.0)
@@ -222,14 +222,14 @@ def refusal_of(planner: MissionPlanner, plan: Sequence[PlanRow]) -> MissionResul
     return refused.value.result
 
 
-def test_too_long_a_list(shared: Bench, kept: list[str]) -> None:
+def test_a_list_that_is_too_long_is_refused(shared: Bench, kept: list[str]) -> None:
     planner = shared.mission_planner()
     assert refusal_of(planner, plain_plan(147)) is MissionResult.NO_SPACE
     planner.wait_for_text("147 items, but only 146 fit")
     assert shared.board.records() == kept
 
 
-def test_an_empty_write(shared: Bench, kept: list[str]) -> None:
+def test_an_empty_write_is_refused(shared: Bench, kept: list[str]) -> None:
     planner = shared.mission_planner()
     assert refusal_of(planner, [HOME]) is MissionResult.INVALID
     planner.wait_for_text("only a home point")
@@ -246,7 +246,7 @@ BAD_LISTS = {
 
 
 @pytest.mark.parametrize("name", BAD_LISTS)
-def test_a_list_that_breaks_a_rule(shared: Bench, kept: list[str], name: str) -> None:
+def test_a_list_that_breaks_a_rule_is_refused(shared: Bench, kept: list[str], name: str) -> None:
     plan, ack, reason = BAD_LISTS[name]
     planner = shared.mission_planner()
     assert judge(plan).result is Result.REJECTED
@@ -276,7 +276,7 @@ def test_refused_fence_and_rally_points_keep_their_mission_type(shared: Bench, k
     assert shared.board.records() == kept
 
 
-def test_armed(bench: Bench) -> None:
+def test_writing_and_reading_while_armed_are_refused(bench: Bench) -> None:
     planner = bench.mission_planner()
     planner.connect()
     plan = plain_plan(12)
@@ -379,8 +379,8 @@ def test_a_late_duplicate_of_a_count_does_no_harm(shared: Bench) -> None:
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_an_item_sent_before_its_request(shared: Bench) -> None:
-    """Mission Planner takes a stale ack of the previous upload for "continue"."""
+def test_an_item_sent_before_its_request_is_accepted(shared: Bench) -> None:
+    """For Mission Planner a stale ack of the previous upload means "continue"."""
     planner = shared.mission_planner()
     plan = plain_plan(20, start=180)
     planner.send(messages.MAVLink_mission_count_message(1, 1, len(plan), 0))

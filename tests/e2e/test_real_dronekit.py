@@ -32,7 +32,7 @@ def upload(vehicle: Any, commands: Sequence[Any]) -> None:
     vehicle.commands.upload(timeout=60)
 
 
-def test_an_empty_board_then_a_mission_then_a_full_board(shared: Bench) -> None:
+def test_missions_are_written_to_an_empty_and_to_a_full_board(shared: Bench) -> None:
     with vehicle_at(shared.daemon.port) as vehicle:
         assert len(download(vehicle)) == 0
         home = vehicle.home_location

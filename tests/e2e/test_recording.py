@@ -252,7 +252,7 @@ def test_a_recorded_flight_controller_is_found_in_the_replay(start: Starter, con
         ),
     ],
 )
-def test_invalid_recordings_and_replays(
+def test_invalid_recordings_and_replays_are_refused(
     tmp_path: Path, arguments: tuple[str, ...], status: int, complaint: str
 ) -> None:
     (tmp_path / "notes.txt").write_text("mine\n")

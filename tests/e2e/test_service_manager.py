@@ -62,7 +62,7 @@ def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Systemd
         yield systemd
 
 
-def test_ready_without_a_flight_controller_and_the_status_has_the_link(start: Starter, systemd: Systemd) -> None:
+def test_the_daemon_is_ready_without_a_flight_controller(start: Starter, systemd: Systemd) -> None:
     daemon = start.daemon(str(start.directory / "naze"))
     until(lambda: "READY=1" in systemd.listen(), "READY")
     until(lambda: "is missing: plug the flight controller in" in systemd.status(), "the port in the status")
@@ -105,7 +105,7 @@ def test_a_failed_start_is_never_ready(start: Starter, systemd: Systemd) -> None
     assert "READY=1" not in systemd.listen()
 
 
-def test_a_service_manager_in_the_abstract_namespace(tmp_path: Path) -> None:
+def test_a_service_manager_in_the_abstract_namespace_is_notified(tmp_path: Path) -> None:
     """systemd gives its name with a leading @."""
     name = f"naze-bridge-test-{tmp_path}"
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) as systemd:
@@ -125,7 +125,7 @@ def test_a_watchdog_for_another_process_is_ignored(environment: dict[str, str]) 
     assert Notifier({"WATCHDOG_USEC": "1000000", **environment}).watchdog_s == (None if environment else 1.0)
 
 
-def test_a_missing_service_manager(start: Starter, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_service_manager_is_ignored(start: Starter, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NOTIFY_SOCKET", str(start.directory / "nobody"))
     daemon = start.daemon("sim:")
     daemon.wait()

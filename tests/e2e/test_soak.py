@@ -28,7 +28,9 @@ TELE_PROTS = (2, 0, 3, 1)
 
 
 @pytest.mark.timeout(60 * MINUTES + 600)
-def test_soak(start: Starter, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_daemon_survives_events_and_attacks_at_full_rate(
+    start: Starter, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     port = tmp_path / "naze-by-id"
     udp_port, tcp_port = free_port(), free_port(SOCK_STREAM)
     daemon = start.daemon(str(port), gcs=[f"udpin:127.0.0.1:{udp_port}", f"tcpin:127.0.0.1:{tcp_port}"])

@@ -73,7 +73,7 @@ def test_a_check_changes_nothing(commanded: tuple[Bench, zenoh.Session]) -> None
     assert (bench.board.records(), len(bench.daemon.missions())) == (before, missions)
 
 
-def test_clear_and_restore(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_a_list_is_cleared_and_restored(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     ask(opened, UPLOAD, mission_file(9))
     number = bench.daemon.missions()[0]["number"]
@@ -123,7 +123,7 @@ def test_an_invalid_mission_is_refused_with_a_reason(commanded: tuple[Bench, zen
 @pytest.mark.parametrize(
     "parameters", ["", "?number=", "?number=0", "?number=-1", "?number=1e3", "?number=" + "9" * 99]
 )
-def test_restoring_a_missing_mission(commanded: tuple[Bench, zenoh.Session], parameters: str) -> None:
+def test_restoring_a_missing_mission_is_an_error(commanded: tuple[Bench, zenoh.Session], parameters: str) -> None:
     _, opened = commanded
     assert "restore?number=3" in error(ask(opened, RESTORE + parameters))
     assert "there is no mission 99999" in error(ask(opened, f"{RESTORE}?number=99999"))
@@ -184,7 +184,7 @@ def test_commands_are_off_by_default(start: Starter) -> None:
             assert list(opened.get(key(suffix), timeout=2.0)) == []
 
 
-def test_a_command_without_a_flight_controller(start: Starter, tmp_path: Path) -> None:
+def test_a_command_without_a_flight_controller_is_an_error(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     config = write_config(tmp_path, f'listen = ["{where}"]\n{I_KNOW}')
     daemon = start.daemon(str(tmp_path / "nothing"), options=("--config", str(config)))

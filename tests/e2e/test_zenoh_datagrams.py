@@ -15,7 +15,7 @@ from tests.support.zenoh_bench import Reader, endpoint, session, zenoh_bench
 from tests.support.zenoh_router import running_router
 
 
-def test_a_link_that_loses_every_fourth_datagram(start: Starter, tmp_path: Path) -> None:
+def test_reports_are_recovered_on_a_link_that_loses_datagrams(start: Starter, tmp_path: Path) -> None:
     tcp, udp_port = endpoint(), free_port()
     config = tmp_path / "router.json5"
     listen = {"endpoints": [tcp, f"udp/127.0.0.1:{udp_port}"]}

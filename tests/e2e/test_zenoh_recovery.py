@@ -150,7 +150,7 @@ def test_replies_and_samples_have_a_time(start: Starter) -> None:
         assert body(reply.ok)["time_source"] in {"gps", "ntp", "pi"}
 
 
-def test_a_metered_link_and_a_request_for_more(start: Starter) -> None:
+def test_a_metered_link_is_quiet_unless_more_is_requested(start: Starter) -> None:
     """Telemetry is infrequent, arming is not delayed, and a subscriber may request more."""
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\nprofile = "metered"\nrates = {{rc = 0}}\n{I_KNOW}')

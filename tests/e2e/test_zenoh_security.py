@@ -147,7 +147,7 @@ def test_invalid_settings_stop_the_start_with_one_sentence(tmp_path: Path, name:
 
 
 @pytest.mark.parametrize("of", ["zenoh-tls", "zenoh-password"])
-def test_the_examples_allow_commands(tmp_path: Path, of: str) -> None:
+def test_the_examples_count_as_authentication(tmp_path: Path, of: str) -> None:
     """With authentication, "I know" is not needed."""
     example = Path(__file__).parents[2] / "examples" / of / "vehicle.json5"
     config = write_config(tmp_path, f'config_file = "{example}"\ncommands = true\nmavlink_in = true')

@@ -62,7 +62,7 @@ def count(bench: Bench, event: str) -> int:
     return sum(entry["event"] == event for entry in bench.daemon.events())
 
 
-def test_a_router_that_starts_late_and_restarts(start: Starter, tmp_path: Path) -> None:
+def test_the_daemon_joins_a_router_that_starts_late_or_restarts(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     with running_router(tmp_path, where) as router, session(connect=where) as opened:
@@ -80,7 +80,7 @@ def test_a_router_that_starts_late_and_restarts(start: Starter, tmp_path: Path) 
         assert state["mission"]["count"] == 12
 
 
-def test_two_peers_without_a_router(start: Starter) -> None:
+def test_two_peers_need_no_router(start: Starter) -> None:
     """The later peer queries for earlier events."""
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
@@ -106,7 +106,7 @@ def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
     bench.board.assert_was_treated_well()
 
 
-def test_a_router_that_dies_during_an_upload(start: Starter, tmp_path: Path) -> None:
+def test_an_upload_succeeds_although_the_router_dies(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     with running_router(tmp_path, where) as router, session(connect=where) as opened:
@@ -114,7 +114,7 @@ def test_a_router_that_dies_during_an_upload(start: Starter, tmp_path: Path) -> 
         upload_while(bench, router, signal.SIGKILL)
 
 
-def test_a_router_that_hangs_during_an_upload(start: Starter, tmp_path: Path) -> None:
+def test_an_upload_succeeds_although_the_router_hangs(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     with running_router(tmp_path, where) as router, session(connect=where) as opened:

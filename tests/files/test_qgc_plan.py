@@ -61,7 +61,7 @@ def test_home_is_item_0_and_null_is_not_given() -> None:
     assert math.isnan(point.p4)
 
 
-def test_an_item_without_a_position() -> None:
+def test_an_item_without_a_position_is_read() -> None:
     item = read(plan(simple(178, 2, [1, 4, -1, 0, None, None, None])))[1]
     assert (item.command, item.frame, item.lat_e7, item.lon_e7) == (178, 2, None, None)
     assert math.isnan(item.alt_m)

@@ -47,7 +47,7 @@ def same(one: list[MissionItem], other: list[MissionItem]) -> bool:
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_a_file_written_by_mission_planner(end: str) -> None:
+def test_a_file_written_by_mission_planner_is_read(end: str) -> None:
     assert same(read(HEADER, HOME, POINT, end=end), ITEMS)
 
 
@@ -60,7 +60,7 @@ def test_a_file_written_by_mission_planner(end: str) -> None:
     ],
     ids=["byte order mark", "spaces", "blank lines and remarks"],
 )
-def test_files_of_other_programs(lines: list[str]) -> None:
+def test_files_written_by_other_programs_are_read(lines: list[str]) -> None:
     assert same(read(*lines), ITEMS)
 
 

@@ -97,7 +97,7 @@ def test_applying_again_updates_the_core(workshop: Workshop) -> None:
     assert workshop.files() == patched
 
 
-def test_removing_a_patch_that_is_not_applied(workshop: Workshop) -> None:
+def test_removing_a_patch_that_is_not_applied_changes_nothing(workshop: Workshop) -> None:
     assert workshop.run("--remove") == (0, "Tree: the patch is not in it, nothing to do\n")
 
 
@@ -239,7 +239,7 @@ def test_all_files_change_or_none(
     assert failed == times[operation][remove]
 
 
-def test_no_tree_at_all(workshop: Workshop) -> None:
+def test_a_missing_tree_is_reported(workshop: Workshop) -> None:
     shutil.rmtree(workshop.tree)
     code, printed = workshop.run()
     assert code == 1
@@ -257,5 +257,5 @@ def test_shipped_patches_have_only_our_own_lines(path: Path) -> None:
         )
 
 
-def test_a_patch_for_each_tree() -> None:
+def test_each_known_tree_has_a_patch() -> None:
     assert [path.stem for path in PATCHES] == ["HarakiriWebstore1", "TestCode3"]

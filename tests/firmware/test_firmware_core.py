@@ -31,7 +31,7 @@ def test_core_survives_every_power_cut_under_sanitizers(build: str) -> None:
     assert re.search(r"\d+ checks passed", printed)
 
 
-def test_core_on_an_emulated_cortex_m3() -> None:
+def test_core_passes_its_tests_on_an_emulated_cortex_m3() -> None:
     printed = make("test-arm")
     stack = re.search(r"(\d+) bytes at most", printed)
     assert stack is not None

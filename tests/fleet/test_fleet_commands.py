@@ -42,7 +42,7 @@ def plan_file(folder: Path, plan: list[PlanRow]) -> Path:
     return path
 
 
-def test_list(fleet: Fleet) -> None:
+def test_list_shows_what_each_daemon_reports(fleet: Fleet) -> None:
     listed = fleet.ask("list", "--json")
     assert listed.returncode == 0, listed
     vehicles = {each["name"]: each for each in json.loads(listed.stdout)["vehicles"]}
@@ -60,7 +60,7 @@ def test_list(fleet: Fleet) -> None:
     assert [line for line in table.splitlines() if len(line) > 80 or line != line.rstrip()] == []
 
 
-def test_push_to_all_and_pull_again(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_list_pushed_to_all_is_pulled_from_each(fleet: Fleet, tmp_path: Path) -> None:
     plan = plain_plan(9, start=20)
     pushed = fleet.ask("push", plan_file(tmp_path, plan), "--all")
     assert (pushed.returncode, pushed.stderr) == (0, ""), pushed
@@ -78,7 +78,7 @@ def test_push_to_all_and_pull_again(fleet: Fleet, tmp_path: Path) -> None:
         assert [item.lat_e7 for item in held[1:]] == [int(row.lat * 1e7) for row in plan[1:]]
 
 
-def test_push_to_one_and_pull_into_a_file(fleet: Fleet, tmp_path: Path) -> None:
+def test_push_and_pull_act_only_on_the_named_vehicle(fleet: Fleet, tmp_path: Path) -> None:
     before = fleet.daemons["kite"].held()["records"]
     pushed = fleet.pushed(plan_file(tmp_path, plain_plan(4, start=60)), "--vehicle", "owl", code=0)
     assert (list(pushed), pushed["owl"]["ok"]) == (["owl"], True)
@@ -97,13 +97,13 @@ def test_push_to_one_and_pull_into_a_file(fleet: Fleet, tmp_path: Path) -> None:
     assert [(each["vehicle"], each["error"]) for each in data] == [("owl", None), ("kite", None)]
 
 
-def test_changes_are_reported(fleet: Fleet, tmp_path: Path) -> None:
+def test_push_reports_each_vehicles_changes(fleet: Fleet, tmp_path: Path) -> None:
     plan = [*plain_plan(4, start=90), PlanRow(178, p2=5.0)]
     pushed = fleet.ask("push", plan_file(tmp_path, plan), "--vehicle", "kite")
     assert "4 of 5 stored: 1 dropped; 2 corrections\n" in pushed.stdout, pushed
 
 
-def test_a_list_against_the_rules(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_list_that_breaks_a_rule_is_refused_by_each(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, [HOME, PlanRow(Command.NAV_LAND), waypoint(1)])
     pushed = fleet.pushed(file, "--all", code=1)
     assert {name: each["error"] for name, each in pushed.items()} == dict.fromkeys(
@@ -111,7 +111,7 @@ def test_a_list_against_the_rules(fleet: Fleet, tmp_path: Path) -> None:
     )
 
 
-def test_a_push_while_one_vehicle_is_armed(fleet: Fleet, tmp_path: Path) -> None:
+def test_an_armed_vehicle_refuses_a_push_to_all(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, plain_plan(5, start=100))
     swift, board = fleet.daemons["swift"], fleet.boards["swift"]
     before = board.records()
@@ -131,7 +131,7 @@ def test_a_push_while_one_vehicle_is_armed(fleet: Fleet, tmp_path: Path) -> None
         until(lambda: (swift.status() or {}).get("armed") is False, "the landing")
 
 
-def test_an_unknown_name(fleet: Fleet, tmp_path: Path) -> None:
+def test_an_unknown_name_is_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, plain_plan(4))
     for command in (["push", file], ["pull"]):
         ended = fleet.ask(*command, "--vehicle", "kita")
@@ -139,7 +139,7 @@ def test_an_unknown_name(fleet: Fleet, tmp_path: Path) -> None:
         assert ended.stderr == "naze-bridge: no vehicle 'kita' is alive; there are kite, owl, swift\n"
 
 
-def test_invalid_states_of_strangers(fleet: Fleet) -> None:
+def test_invalid_states_of_strangers_are_ignored(fleet: Fleet) -> None:
     """Tokens and states of other programs neither stop the list nor reach the terminal."""
     with ExitStack() as stack:
         session = stack.enter_context(open_session((fleet.router.endpoint,)))
@@ -166,7 +166,7 @@ def test_invalid_states_of_strangers(fleet: Fleet) -> None:
         assert set(fleet.listed()) == {"ghost", *NAMES}
 
 
-def test_the_examples(fleet: Fleet, tmp_path: Path) -> None:
+def test_the_example_programs_work(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, plain_plan(6, start=120))
     upload = [sys.executable, str(EXAMPLES / "zenoh_upload.py")]
     uploaded = subprocess.run(
@@ -186,7 +186,7 @@ def test_the_examples(fleet: Fleet, tmp_path: Path) -> None:
         positions.wait()
 
 
-def test_the_shell_one_liner(fleet: Fleet, tmp_path: Path) -> None:
+def test_the_one_liner_in_the_docs_works(fleet: Fleet, tmp_path: Path) -> None:
     page = (EXAMPLES.parent / "docs" / "fleet.md").read_text()
     (line,) = [line.strip() for line in page.splitlines() if line.startswith("    python -u -c")]
     program, flag, option, code = shlex.split(line)
@@ -202,7 +202,7 @@ def test_the_shell_one_liner(fleet: Fleet, tmp_path: Path) -> None:
         reader.wait()
 
 
-def test_two_bridges_with_one_name(fleet: Fleet, tmp_path: Path) -> None:
+def test_two_bridges_with_one_name_get_no_mission(fleet: Fleet, tmp_path: Path) -> None:
     other = fleet.start("other", name="owl")
     try:
         until(lambda: fleet.listed()["owl"]["bridges"] == 2, "the second owl")
@@ -217,7 +217,7 @@ def test_two_bridges_with_one_name(fleet: Fleet, tmp_path: Path) -> None:
     until(lambda: fleet.listed()["owl"]["bridges"] == 1, "the second owl's disappearance")
 
 
-def test_commands_are_off(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_vehicle_without_commands_is_reported(fleet: Fleet, tmp_path: Path) -> None:
     deaf = fleet.start("deaf", commands="")
     try:
         fleet.wait("deaf")

@@ -25,7 +25,7 @@ OWL = FleetVehicle("owl", "2", answers=False)
         ("bridges=1", [KITE, OWL]),
     ],
 )
-def test_conditions(text: str, found: list[FleetVehicle]) -> None:
+def test_a_condition_selects_vehicles(text: str, found: list[FleetVehicle]) -> None:
     assert matching([KITE, OWL], [parse_condition(text)]) == found
 
 
@@ -41,6 +41,6 @@ def test_conditions(text: str, found: list[FleetVehicle]) -> None:
         ("session_id=1", "no 'session_id'"),
     ],
 )
-def test_invalid_conditions(text: str, said: str) -> None:
+def test_an_invalid_condition_is_refused(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         parse_condition(text)

@@ -99,7 +99,7 @@ def outcomes(ended: tuple[int, str, str]) -> dict[str, Any]:
     return {vehicle["vehicle"]: vehicle for vehicle in json.loads(output)["vehicles"]}
 
 
-def test_the_router_stops_during_a_push(fleet: Fleet) -> None:
+def test_a_push_continues_on_the_vehicle_when_the_router_stops(fleet: Fleet) -> None:
     """The result is reported as unknown, the vehicle finishes the push, and the fleet is visible again later."""
     command = long_push(fleet, "--json")
     fleet.router.stop()
@@ -119,7 +119,7 @@ def test_the_router_stops_during_a_push(fleet: Fleet) -> None:
     fleet.boards["snail"].assert_was_treated_well()
 
 
-def test_a_vehicle_disappears_during_a_push(fleet: Fleet) -> None:
+def test_a_vehicle_that_disappears_during_a_push_has_failed(fleet: Fleet) -> None:
     command = long_push(fleet, "--json")
     fleet.daemons["snail"].end(signal.SIGKILL)
     found = outcomes(command.end())
@@ -128,7 +128,7 @@ def test_a_vehicle_disappears_during_a_push(fleet: Fleet) -> None:
     assert list(fleet.listed()) == ["kite"]
 
 
-def test_ctrl_c_during_a_push(fleet: Fleet) -> None:
+def test_ctrl_c_during_a_push_shows_which_vehicles_are_done(fleet: Fleet) -> None:
     def ends() -> int:
         return sum(event["event"] == "mission.push_ended" for event in fleet.daemons["kite"].events())
 

@@ -29,7 +29,7 @@ def wanted() -> set[str]:
     return set(_NAME.findall(" ".join([*expressions, alerts])))
 
 
-async def test_the_metrics_exist(tmp_path: Path) -> None:
+async def test_every_metric_of_the_examples_exists(tmp_path: Path) -> None:
     daemon = Daemon(Settings(parse_fc("sim:"), [], tmp_path, zenoh=ZenohSettings(vehicle="kite")))
     metrics = Metrics(daemon)
     running = asyncio.create_task(daemon.run())

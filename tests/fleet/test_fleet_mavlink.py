@@ -91,7 +91,7 @@ def test_a_vehicle_that_accepts_no_mavlink_is_reported(fleet: Fleet, tmp_path: P
         until(lambda: "kite accepts MAVLink again" in program.printed, "its return")
 
 
-def test_an_unknown_vehicle(fleet: Fleet) -> None:
+def test_an_unknown_vehicle_is_one_sentence(fleet: Fleet) -> None:
     ended = fleet.ask("mavlink", "--vehicle", "owl")
     assert (ended.returncode, ended.stderr) == (1, "naze-bridge: no vehicle 'owl' is alive; there is kite\n")
     assert fleet.ask("mavlink", "--vehicle", "kite", "--gcs", "smoke:1").returncode == 2

@@ -37,7 +37,7 @@ def test_a_vehicle_that_disappears_after_its_success_has_not_failed() -> None:
     assert fleet.failed == []
 
 
-def test_silence_has_three_reasons() -> None:
+def test_a_missing_result_has_one_of_three_reasons() -> None:
     fleet = push_to(*NAMES)
     fleet.ended("a", is_alive=True)
     fleet.ended("b", is_alive=False)
@@ -89,7 +89,7 @@ _EVENTS = st.tuples(st.sampled_from(["replied", "refused", "ended"]), st.sampled
 
 
 @given(st.lists(_EVENTS, max_size=20))
-def test_events_in_any_order(events: list[tuple[str, str, dict[str, object] | None]]) -> None:
+def test_each_vehicle_ends_exactly_once_in_any_order(events: list[tuple[str, str, dict[str, object] | None]]) -> None:
     fleet = push_to(*NAMES)
     ends: dict[str, tuple[object, object]] = {}
     for kind, name, answer in events:

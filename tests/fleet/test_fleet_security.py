@@ -135,7 +135,7 @@ def refused(listed: subprocess.CompletedProcess[str]) -> str:
     return sentence
 
 
-def test_a_wrong_password(passwords: Fleet) -> None:
+def test_a_wrong_password_is_one_sentence(passwords: Fleet) -> None:
     config = passwords.config("pilot", "pilot")
     config.write_text(config.read_text().replace("change-me", "guessed"))
     assert "does not accept this user and password" in refused(passwords.fleet_list(config))
@@ -157,13 +157,13 @@ def write(folder: Path, name: str, issued: trustme.LeafCert) -> None:
         ("old", lambda own, _: own.issue_cert("pilot", common_name="pilot", **_PAST), "certificate expired"),
     ],
 )
-def test_an_invalid_pilots_certificate(tls: Fleet, name: str, issue: Issue, said: str) -> None:
+def test_an_invalid_certificate_of_a_pilot_is_explained(tls: Fleet, name: str, issue: Issue, said: str) -> None:
     own = trustme.CA.from_pem((tls.folder / "ca.pem").read_bytes(), (tls.folder / "ca.key").read_bytes())
     write(tls.folder, name, issue(own, trustme.CA()))
     assert said in refused(tls.fleet_list(tls.config("pilot", name)))
 
 
-def test_a_missing_certificate(tls: Fleet) -> None:
+def test_a_missing_certificate_is_named(tls: Fleet) -> None:
     config = tls.config("pilot", "nobody")
     assert f"there is no file {tls.folder / 'nobody.pem'}" in refused(tls.fleet_list(config))
 
@@ -177,7 +177,7 @@ def test_a_missing_certificate(tls: Fleet) -> None:
     ],
     ids=["expired", "another name", "not ours"],
 )
-def test_an_invalid_routers_certificate(tls: Fleet, tmp_path: Path, issue: Issue, said: str) -> None:
+def test_an_invalid_certificate_of_the_router_is_explained(tls: Fleet, tmp_path: Path, issue: Issue, said: str) -> None:
     endpoint = f"tls/localhost:{free_port(socket.SOCK_STREAM)}"
     shutil.copytree(tls.folder, tmp_path, dirs_exist_ok=True)
     own = trustme.CA.from_pem((tmp_path / "ca.pem").read_bytes(), (tmp_path / "ca.key").read_bytes())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""With a storage on `fleet/**`, stored samples of a vehicle are never taken for the vehicle."""
+"""With a storage on `fleet/**`, stored samples never stand in for a live vehicle."""
 
 import json
 import signal

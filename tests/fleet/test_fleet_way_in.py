@@ -26,7 +26,7 @@ def sentence_of(*arguments: str | Path, code: int = 1) -> str:
     return ended.stderr.splitlines()[-1]
 
 
-def test_an_empty_fleet(router: Router) -> None:
+def test_an_empty_fleet_is_reported(router: Router) -> None:
     listed = run_naze_bridge("fleet", "list", "--connect", router.endpoint)
     assert (listed.returncode, listed.stdout) == (0, "No vehicle is alive under 'fleet'.\n")
     pushed = sentence_of("push", EXAMPLES / "naze-field.waypoints", "--all", "--connect", router.endpoint)
@@ -48,13 +48,13 @@ def test_the_endpoint_comes_from_the_daemons_configuration(router: Router, tmp_p
     assert "has no [zenoh] table" in sentence_of("list", "--config", config, code=2)
 
 
-def test_no_router() -> None:
+def test_a_missing_router_is_one_sentence() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     reason = f"{endpoint}: no router is running there (connection refused)"
     assert sentence_of("list", "--connect", endpoint) == f"naze-bridge: cannot join the fleet: {reason}"
 
 
-def test_another_program_on_the_routers_port() -> None:
+def test_another_program_on_the_routers_port_is_reported() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
         assert "is a zenoh router" in sentence_of("list", "--connect", endpoint)
@@ -71,16 +71,16 @@ def test_another_program_on_the_routers_port() -> None:
         ("", "--connect"),
     ],
 )
-def test_invalid_endpoints(endpoint: str, said: str) -> None:
+def test_an_invalid_endpoint_is_one_sentence(endpoint: str, said: str) -> None:
     assert said in sentence_of("list", "--connect", endpoint)
 
 
 @pytest.mark.parametrize("prefix", ["fleet/*", "a/b", "@fleet", "fl eet", "fleet?x"])
-def test_an_invalid_prefix(prefix: str) -> None:
+def test_an_invalid_prefix_is_one_sentence(prefix: str) -> None:
     assert "zenoh.prefix" in sentence_of("list", "--prefix", prefix, code=2)
 
 
-def test_unusable_zenoh_files(tmp_path: Path) -> None:
+def test_an_unusable_zenoh_file_is_one_sentence(tmp_path: Path) -> None:
     missing = tmp_path / "none.json5"
     assert f"{missing} cannot be read: no such file" in sentence_of("list", "--zenoh-config", missing)
     broken = tmp_path / "broken.json5"

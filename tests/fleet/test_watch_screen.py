@@ -41,7 +41,7 @@ def test_a_large_fleet_fits_a_small_terminal() -> None:
     assert lines(rows, 981)[-1].startswith("982 to 1000 of 1000;")
 
 
-def test_problems_are_named() -> None:
+def test_vehicles_with_problems_are_marked() -> None:
     rows = [
         ScreenRow(vehicle(1, bridges=2), 0.1),
         ScreenRow(vehicle(2, answers=False), None),

@@ -141,7 +141,7 @@ async def test_a_port_that_falls_silent_during_batched_reads_is_not_lost(line: L
     await line.stop()
 
 
-async def test_a_port_that_hangs_up_during_batched_reads_is_reopened(line: Line, tmp_path: Path) -> None:
+async def test_a_port_that_disconnects_during_batched_reads_is_reopened(line: Line, tmp_path: Path) -> None:
     port = line.start()
     await until_async(lambda: line.opened, "the port")
     port.may_gather = True

@@ -34,7 +34,7 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
         board, _ = await asyncio.wait_for(loop.sock_accept(listener), PATIENCE)
         with board:
             left = []
-            # Linux delays acknowledgements only on connections with traffic both ways.
+            # Linux delays acknowledgements only on connections that carry traffic both ways.
             for _ in range(30):
                 board.send(b"$")
                 left.append(await asyncio.wait_for(heard.get(), PATIENCE))

@@ -148,7 +148,7 @@ async def test_a_host_name_is_used_once_it_resolves(links: Links, monkeypatch: p
     assert await received(second) == FRAME
 
 
-async def test_a_real_name_is_resolved(links: Links) -> None:
+async def test_localhost_is_resolved(links: Links) -> None:
     client = links.udp()
     port = client.getsockname()[1]
     link = links.open(f"udpout:localhost:{port}")
@@ -179,7 +179,7 @@ async def test_datagrams_to_a_closed_port_block_nothing(links: Links) -> None:
     assert await received(client) == FRAME
 
 
-async def test_an_extra_client_displaces_another(links: Links) -> None:
+async def test_a_client_above_the_limit_displaces_another(links: Links) -> None:
     port = free_port(socket.SOCK_STREAM)
     links.open(f"tcpin:127.0.0.1:{port}")
     clients = [links.tcp(port) for _ in range(tcp_link._MAX_CLIENTS)]
@@ -284,11 +284,11 @@ def test_ambiguous_connections_are_explained(text: str, words: str) -> None:
         ("tcp://127.0.0.1:5760", "tcp:127.0.0.1:5760"),
     ],
 )
-def test_other_programs_notations_of_flight_controllers(text: str, meant: str) -> None:
+def test_other_programs_notations_of_flight_controllers_are_accepted(text: str, meant: str) -> None:
     assert str(parse_fc(text)) == meant
 
 
-def test_several_links_in_one_value() -> None:
+def test_one_value_may_have_several_links() -> None:
     assert split_gcs("udpin:14550,tcpin:5760 udpout:pc,14551") == ["udpin:14550", "tcpin:5760", "udpout:pc,14551"]
 
 
@@ -298,7 +298,7 @@ def test_ipv6_without_brackets_is_explained() -> None:
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost"])
-async def test_a_flight_controller_behind_tcp(host: str) -> None:
+async def test_a_flight_controller_may_be_behind_tcp(host: str) -> None:
     with socket.create_server((host, 0), family=socket.AF_INET6 if ":" in host else socket.AF_INET) as server:
         address = parse_fc(f"tcp:{f'[{host}]' if ':' in host else host}:{server.getsockname()[1]}")
         assert isinstance(address, TcpFc)

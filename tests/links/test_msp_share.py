@@ -184,6 +184,6 @@ async def test_noise_is_not_passed_on() -> None:
         ({"address": "tcpin:5761", "write": "yes"}, "must be true or false"),
     ],
 )
-def test_invalid_shares(entry: object, words: str) -> None:
+def test_an_invalid_share_is_one_sentence(entry: object, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         parse_share(entry, Path())

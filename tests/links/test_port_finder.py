@@ -153,7 +153,7 @@ async def test_a_port_used_by_another_program_is_not_opened(pi: Pi, tmp_path: Pa
         ("Raspberry Pi Zero 2 W Rev 1.0", "ttyAMA0", "/dev/ttyAMA0"),
     ],
 )
-def test_the_uart_on_the_header_by_model(pi: Pi, model: str, serial0: str, header: str) -> None:
+def test_the_headers_uart_depends_on_the_model(pi: Pi, model: str, serial0: str, header: str) -> None:
     pi.write("/proc/device-tree/model", f"{model}\0")
     for name in ("ttyS0", "ttyAMA0", "ttyAMA10"):
         pi.write(f"/dev/{name}")
@@ -172,7 +172,7 @@ def test_the_uart_on_the_header_by_model(pi: Pi, model: str, serial0: str, heade
         (("2341", "0043", "Arduino", "Uno"), False),
     ],
 )
-def test_usb_chips(pi: Pi, chip: tuple[str, str, str, str], is_candidate: bool) -> None:
+def test_only_known_usb_chips_are_searched(pi: Pi, chip: tuple[str, str, str, str], is_candidate: bool) -> None:
     pi.path("/dev/serial0").unlink()
     pi.usb("ttyUSB0", "1-1", chip)
     pi.write("/dev/ttyUSB0")

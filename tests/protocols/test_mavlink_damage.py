@@ -152,8 +152,8 @@ def test_silence_releases_a_frame_hidden_by_a_truncated_one() -> None:
     assert splitter.reset() == []
 
 
-def test_a_signature_with_missing_bytes() -> None:
-    """It cannot be detected without the key, but the following frame must not be lost."""
+def test_a_signature_with_missing_bytes_loses_no_later_frame() -> None:
+    """The loss cannot be detected without the key."""
     before, cut, after = telemetry(SIGNED, 3, 4)
     for missing in range(1, SIGNATURE_SIZE + 1):
         found = split([before, cut[:-missing], after], Random(missing))
@@ -163,7 +163,7 @@ def test_a_signature_with_missing_bytes() -> None:
 
 
 def test_each_byte_of_a_hostile_stream_is_tried_once() -> None:
-    """Each possible frame start is checked once, also at a silence."""
+    """Each possible frame start is checked once, also when the line falls silent."""
     header = bytes((0xFD, 255, 0, 0, 1, 1, 1, 0, 0, 0))
     splitter = MavlinkSplitter()
     stream = header * 28 * 10

@@ -82,7 +82,7 @@ def test_we_accept_pymavlinks_signatures() -> None:
     assert {signing.check(frame) for frame in frames} == {Check.REPLAYED}
 
 
-def test_unsigned_frames_of_both_versions() -> None:
+def test_unsigned_frames_of_both_versions_are_recognised() -> None:
     side = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
     for mavlink_1 in (False, True):
         assert our_side().check(MavlinkFrame(bytes(HEARTBEAT.pack(side, force_mavlink1=mavlink_1)))) is Check.UNSIGNED

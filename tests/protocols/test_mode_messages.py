@@ -21,7 +21,7 @@ from protocols.mavlink.mode_messages import available_mode, current_mode
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("version", [1, 2])
-def test_a_published_dialect_reads_it(packed: Packed, fields: dict[str, int | str], version: int) -> None:
+def test_a_published_dialect_reads_both(packed: Packed, fields: dict[str, int | str], version: int) -> None:
     frame = FrameWriter(1, 1).frame(packed, version)
     message = development.MAVLink(None).decode(bytearray(frame))
     assert {name: getattr(message, name) for name in message.fieldnames} == fields

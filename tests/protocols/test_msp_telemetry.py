@@ -37,7 +37,7 @@ def test_any_payload_is_read_or_unknown(payload: bytes) -> None:
         decode(payload)
 
 
-def test_status_and_its_sensors() -> None:
+def test_status_has_its_sensors() -> None:
     status = t.decode_status(LEAST[0][1])
     sensors = t.Sensor.ACCELEROMETER | t.Sensor.BAROMETER | t.Sensor.GPS
     assert status == t.StatusReport(3000, 7, sensors, 0x21)
@@ -47,24 +47,24 @@ def test_status_and_its_sensors() -> None:
     ("more", "course_ddeg", "hdop_e2"),
     [(b"", None, None), (struct.pack("<H", 2755), 2755, None), (struct.pack("<HH", 2755, 140), 2755, 140)],
 )
-def test_the_three_lengths_of_raw_gps(more: bytes, course_ddeg: int | None, hdop_e2: int | None) -> None:
+def test_raw_gps_of_each_length_is_read(more: bytes, course_ddeg: int | None, hdop_e2: int | None) -> None:
     gps = t.decode_raw_gps(LEAST[3][1] + more)
     assert gps == t.RawGps(1, 9, 453838000, -84733000, 131, 250, course_ddeg, hdop_e2)
 
 
-def test_below_sea_level() -> None:
+def test_an_altitude_below_sea_level_is_negative() -> None:
     """Harakiri stores a signed altitude in metres in an unsigned field."""
     gps = t.decode_raw_gps(struct.pack("<BBiiHH", 1, 9, 0, 0, 0xFFFF - 3, 0))
     assert gps is not None
     assert gps.altitude_m == -4
 
 
-def test_the_current_if_reported() -> None:
+def test_the_current_is_read_if_present() -> None:
     assert t.decode_analog(struct.pack("<BHH", 124, 0, 920)) == t.Analog(124, 920)
     assert t.decode_analog(struct.pack("<BHHh", 124, 350, 920, 1234)) == t.Analog(124, 920, 350, 1234)
     assert t.decode_analog(struct.pack("<BHHhH", 124, 350, 920, -5, 1240)) == t.Analog(124, 920, 350, -5)
 
 
 @pytest.mark.parametrize(("sent", "kept"), [(4, 4), (8, 8), (10, 10), (18, 18), (34, 18)])
-def test_as_many_channels_as_mavlink_has(sent: int, kept: int) -> None:
+def test_no_more_channels_are_read_than_mavlink_has(sent: int, kept: int) -> None:
     assert t.decode_channels(struct.pack(f"<{sent}H", *range(1000, 1000 + sent))) == tuple(range(1000, 1000 + kept))

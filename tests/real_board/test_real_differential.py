@@ -32,7 +32,7 @@ _SETTINGS = frozenset((Msp.RC_TUNING, Msp.PID, Msp.BOX, Msp.SERVO, Msp.MISC))
 _READS = tuple(command for command in Msp if command < Msp.WP)
 
 
-def test_a_hundred_exchanges(image: Image, flash: bytes, figure: Figure) -> None:
+def test_image_and_model_reply_alike_in_a_hundred_exchanges(image: Image, flash: bytes, figure: Figure) -> None:
     real = RealBench(image, flash)
     boxes = real.payload(request(Msp.BOXNAMES))
     model = Bench(SimOptions(tree=Tree.TESTCODE3 if b"PASSTHRU" in boxes else Tree.WEBSTORE1))

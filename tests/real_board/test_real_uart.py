@@ -41,7 +41,9 @@ def test_requests_during_boot_are_answered_in_one_burst(bench: RealBench, figure
 
 
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
-def test_arming_by_stick(image: Image, flash: bytes, figure: Figure, protocol: TelemetryProtocol) -> None:
+def test_arming_by_stick_selects_protocol_and_speed(
+    image: Image, flash: bytes, figure: Figure, protocol: TelemetryProtocol
+) -> None:
     bench = RealBench(image, flash)
     bench.set_tele_prot(protocol.value)
     bench.arm()
@@ -70,7 +72,7 @@ def kind(answers: bool, mavlink: list[int], heard: bytes) -> str:
     return f"{'MSP' * answers}{', FrSky' * has_frsky(heard)}"
 
 
-def test_the_cli(bench: RealBench, figure: Figure) -> None:
+def test_the_cli_works_and_saves(bench: RealBench, figure: Figure) -> None:
     bench.push(mission(5))
     assert b"#" in bench.enter_cli()
     assert "5 Datasets of 146 possible" in bench.type_line("status")
@@ -100,7 +102,7 @@ def test_a_truncated_frame_is_dropped(bench: RealBench, figure: Figure) -> None:
     figure("a truncated frame", "is dropped within 100 ms")
 
 
-def test_info_after_a_push(bench: RealBench) -> None:
+def test_info_reports_a_pushed_list(bench: RealBench) -> None:
     records = mission(146)
     bench.push(records)
     assert bench.pull() == records

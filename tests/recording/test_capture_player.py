@@ -113,8 +113,8 @@ def test_a_request_never_recorded_gets_an_error_frame() -> None:
     assert MspParser().feed(data) == [MspFrame(Direction.ERROR, Msp.ANALOG)]
 
 
-def test_a_conversation_may_take_place_earlier() -> None:
-    """BEGIN was refused once, then accepted; the replay does the same although BEGIN is sent much earlier."""
+def test_replies_follow_the_conversation_not_only_the_time() -> None:
+    """A recorded BEGIN was refused once, then accepted: so is one that is sent much earlier."""
     begin = request(190, b"begin")
     events = [opened(0.0), wrote(0.1, STATUS), read(0.11, reply(Msp.STATUS))]
     events += [wrote(300.0, begin), read(300.05, reply(190, 1)), wrote(301.0, begin), read(301.05, reply(190, 0))]

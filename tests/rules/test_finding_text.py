@@ -55,7 +55,7 @@ from tests.support.rule_items import (
         ),
     ],
 )
-def test_text(finding: Finding, text: str) -> None:
+def test_each_finding_has_its_text(finding: Finding, text: str) -> None:
     assert finding.text() == text
 
 
@@ -114,7 +114,7 @@ def test_a_filled_in_default_is_not_reported() -> None:
     assert finding_lines(verdict.findings) == []
 
 
-def test_at_most_ten_lines() -> None:
+def test_at_most_ten_lines_are_sent() -> None:
     verdict = check_list(mission(*(item(WAYPOINT, p1=number) for number in range(2, 40))), HarakiriRules())
     lines = finding_lines(verdict.findings)
     assert len(lines) == 11

@@ -266,7 +266,7 @@ def test_set_wp_has_the_bytes_of_the_specification() -> None:
         ((WP,) * 300, MissionResult.NO_SPACE),
     ],
 )
-def test_rejected_lists(items: tuple[MissionItem, ...], ack: MissionResult) -> None:
+def test_a_list_that_cannot_be_flown_is_rejected(items: tuple[MissionItem, ...], ack: MissionResult) -> None:
     verdict = verdict_on(*items)
     assert (verdict.result, verdict.ack, verdict.records) == (Result.REJECTED, ack, ())
 

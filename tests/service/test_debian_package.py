@@ -67,7 +67,7 @@ def _archive(package: Path) -> tarfile.TarFile:
     return tarfile.open(fileobj=BytesIO(data))
 
 
-def test_its_contents(package: Path) -> None:
+def test_the_package_has_the_expected_files(package: Path) -> None:
     files = files_of(package)
     for expected in (
         *(f"/usr/lib/naze-bridge/lib/python{python}/site-packages/{_SCHEMA}" for python in _PYTHONS),
@@ -123,7 +123,7 @@ def test_its_pages_have_no_broken_links(package: Path) -> None:
                 assert target in files or f"{target}/" in files, f"{member.name}: {link}"
 
 
-def test_no_trace_of_the_machine_that_built_it(package: Path) -> None:
+def test_the_package_has_no_paths_of_the_build_machine(package: Path) -> None:
     with _archive(package) as archive:
         for member in archive:
             content = archive.extractfile(member) if member.isfile() else None

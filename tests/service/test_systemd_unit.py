@@ -42,7 +42,7 @@ def settings() -> list[str]:
     return [line for line in _UNIT.read_text().splitlines() if "=" in line and not line.startswith("#")]
 
 
-def test_its_exposure() -> None:
+def test_the_units_exposure_is_low() -> None:
     if shutil.which("systemd-analyze"):
         command = ("systemd-analyze", "security", "--offline=true", f"--threshold={_BAR}", "--no-pager", str(_UNIT))
         judged = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -78,7 +78,7 @@ def test_garbage_is_a_value_error(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "nothing", "../keys", "/etc/passwd", "state/../state"])
-def test_a_missing_schema(name: str) -> None:
+def test_a_missing_schema_is_a_value_error(name: str) -> None:
     with pytest.raises(ValueError, match="no schema"):
         compact.read_schema(name)
     assert Path(SCHEMAS).is_dir()

@@ -57,7 +57,7 @@ def test_texts_and_arming_in_order(tmp_path: Path) -> None:
     assert (past.from_s, past.positions) == (NOON_S, [])
 
 
-def test_only_the_requested_range(tmp_path: Path) -> None:
+def test_only_the_requested_range_is_returned(tmp_path: Path) -> None:
     for hour in range(4):
         at_s = NOON_S + 3600 * hour
         write(tmp_path, at_s, *((at_s + n, text(f"{hour}.{n}")) for n in range(3)))
@@ -66,7 +66,7 @@ def test_only_the_requested_range(tmp_path: Path) -> None:
     assert past.from_s == NOON_S + 3600
 
 
-def test_a_part_of_a_long_log(tmp_path: Path) -> None:
+def test_part_of_a_long_log_is_read(tmp_path: Path) -> None:
     """It is not read from its beginning, but the armed state at the start of the range is known."""
     flight = [(NOON_S + second, heartbeat(armed=1000 <= second < 2000)) for second in range(3600)]
     path = write(tmp_path, NOON_S, *flight)
@@ -101,7 +101,7 @@ def test_positions_are_thinned_evenly(tmp_path: Path, most: int) -> None:
     assert max(gaps, default=0) <= 2 * max(180 / most, 1) + 0.5
 
 
-def test_other_senders_other_files_and_damage(tmp_path: Path) -> None:
+def test_other_senders_other_files_and_damage_are_skipped(tmp_path: Path) -> None:
     assert read_logged_past(tmp_path / "none", EVER, 9).from_s is None
     write(tmp_path, NOON_S, (NOON_S, text("of a station")), (NOON_S, heartbeat(armed=True)), compid=190)
     path = write(tmp_path, NOON_S + 60, (NOON_S + 60, text("whole")), (NOON_S + 61, text("cut off")))

@@ -115,6 +115,6 @@ def test_a_request_raises_a_rate_for_a_while() -> None:
 
 
 @pytest.mark.parametrize("rates", [{"altitude": 1}, {"rc": -1}, {"rc": True}, {"rc": "fast"}, {"rc": 1e9}])
-def test_invalid_rates(rates: dict[str, object]) -> None:
+def test_an_invalid_rate_is_one_sentence(rates: dict[str, object]) -> None:
     with pytest.raises(ZenohSettingsError, match=r"zenoh\.rates"):
         check_rates(rates)

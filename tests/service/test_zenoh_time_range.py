@@ -19,7 +19,7 @@ NOW_S = 1_800_000_000.0
         ("[2027-01-15T08:00Z..2027-01-15T09:00:00.5+01:00]", 0, 0.5),
     ],
 )
-def test_ranges(text: str, start_s: float, end_s: float) -> None:
+def test_a_range_has_its_start_and_end(text: str, start_s: float, end_s: float) -> None:
     found = parse_time_range(text, NOW_S)
     assert (found.start_s - NOW_S, found.end_s - NOW_S) == (start_s, end_s)
     assert max(found.start_s, NOW_S - 1e6) in found

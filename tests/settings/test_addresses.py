@@ -19,15 +19,15 @@ from service.settings.web import parse_listen
         "tcp:[fe80::7]:5760",
     ],
 )
-def test_flight_controllers(text: str) -> None:
+def test_a_flight_controllers_address_reads_back(text: str) -> None:
     assert str(parse_fc(text)) == text
 
 
 @pytest.mark.parametrize("text", ["udpin:0.0.0.0:14550", "udpout:laptop.lan:14550", "tcpin:[::]:5760"])
-def test_ground_stations(text: str) -> None:
+def test_a_ground_stations_address_reads_back(text: str) -> None:
     assert str(parse_gcs(text)) == text
 
 
 @pytest.mark.parametrize("text", ["0.0.0.0:8080", "[::1]:8080"])
-def test_the_page(text: str) -> None:
+def test_the_pages_address_reads_back(text: str) -> None:
     assert str(parse_listen(text)) == text

@@ -106,7 +106,7 @@ encodings = "json"
     assert [line[: len(words)] for line, words in zip(told, wanted, strict=True)] == wanted
 
 
-def test_a_value_in_place_of_a_table(folder: Path) -> None:
+def test_a_value_in_place_of_a_table_is_an_error(folder: Path) -> None:
     assert problems(folder, "zenoh = true") == ["naze.toml:1: zenoh must be a table: begin it with [zenoh]"]
 
 
@@ -120,7 +120,7 @@ def test_a_value_in_place_of_a_table(folder: Path) -> None:
         ('gcs = ["udpout:10.0.0.1:9", "tcpin:[::]:5", "udpout:10.0.0.1:9"]', "is listed 2 times: remove the others"),
     ],
 )
-def test_one_port_used_twice(folder: Path, text: str, words: str) -> None:
+def test_one_port_used_twice_is_an_error(folder: Path, text: str, words: str) -> None:
     (found,) = problems(folder, text)
     assert found.startswith("naze.toml:1: ")
     assert words in found
@@ -135,7 +135,7 @@ def test_one_port_used_twice(folder: Path, text: str, words: str) -> None:
         'gcs = ["udpout:127.0.0.1:14550", "udpin:0.0.0.0:14550"]',
     ],
 )
-def test_ports_that_do_not_conflict(folder: Path, text: str) -> None:
+def test_ports_that_do_not_conflict_are_accepted(folder: Path, text: str) -> None:
     assert len(load(folder, text).gcs) == 2
 
 
@@ -148,7 +148,7 @@ def test_ports_that_do_not_conflict(folder: Path, text: str) -> None:
         ("/dev/ttyUSB0,57600", 'record_uart = "/dev/ttyUSB0"', "is the flight controller's port: name a file"),
     ],
 )
-def test_a_flight_controller_port_that_is_used_otherwise(folder: Path, fc: str, more: str, words: str) -> None:
+def test_a_flight_controller_port_with_another_use_is_an_error(folder: Path, fc: str, more: str, words: str) -> None:
     config = folder / "naze.toml"
     config.write_text(f'fc = "{fc}"\n{more}')
     with pytest.raises(SettingsError) as caught:
@@ -157,7 +157,7 @@ def test_a_flight_controller_port_that_is_used_otherwise(folder: Path, fc: str, 
     assert words in str(problem)
 
 
-def test_the_same_port_number_on_another_host(folder: Path) -> None:
+def test_the_same_port_number_on_another_host_is_accepted(folder: Path) -> None:
     config = folder / "naze.toml"
     config.write_text('fc = "tcp:192.168.4.9:5760"\ngcs = ["tcpin:0.0.0.0:5760"]')
     assert str(load_settings(config, None, (), folder).fc) == "tcp:192.168.4.9:5760"
@@ -187,13 +187,13 @@ def test_odd_values_give_one_short_sentence(folder: Path, text: str, words: str)
         (b"#" * (2 << 20), "this cannot be read: it is larger than 1 MB"),
     ],
 )
-def test_a_file_that_is_not_a_configuration(folder: Path, content: bytes, words: str) -> None:
+def test_a_file_that_is_not_a_configuration_is_an_error(folder: Path, content: bytes, words: str) -> None:
     (folder / "conf.d" / "x.toml").write_bytes(content)
     (found,) = problems(folder, "")
     assert found.startswith(f"conf.d/x.toml: {words}")
 
 
-def test_pipes_folders_and_broken_links_in_place_of_files(folder: Path) -> None:
+def test_pipes_folders_and_broken_links_are_errors(folder: Path) -> None:
     os.mkfifo(folder / "conf.d" / "a.toml")
     (folder / "conf.d" / "b.toml").mkdir()
     (folder / "conf.d" / "c.toml").symlink_to("/dev/null")
@@ -212,7 +212,7 @@ def test_unlistable_drop_ins_are_an_error(folder: Path) -> None:
     assert problems(folder, "") == ["conf.d: this cannot be read: Not a directory"]
 
 
-def test_the_file_of_another_program(folder: Path) -> None:
+def test_a_file_of_unknown_settings_gives_21_errors_at_most(folder: Path) -> None:
     told = problems(folder, "\n".join(f"option{number} = 1" for number in range(5000)))
     assert len(told) == 21
     assert told[19].startswith("naze.toml:20: 'option19' is not a setting")

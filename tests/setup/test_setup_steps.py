@@ -69,7 +69,7 @@ def model(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-def test_a_fresh_card(tmp_path: Path, model: str) -> None:
+def test_a_fresh_card_is_set_up_in_one_run(tmp_path: Path, model: str) -> None:
     pi = FreshPi(tmp_path, model)
     answers = SetupChoices(hotspot=("naze field", "long-enough"), country="DE", name="naze", key="secret words")
     steps = missing_steps(pi, answers)
@@ -191,7 +191,7 @@ def test_the_command_shows_the_planned_changes(tmp_path: Path, model: str) -> No
         (["--fc", "naze"], "is not a flight controller connection"),
     ],
 )
-def test_invalid_answers(tmp_path: Path, options: list[str], words: str) -> None:
+def test_an_invalid_answer_is_one_sentence(tmp_path: Path, options: list[str], words: str) -> None:
     file = tmp_path / "password"
     file.write_text("long-enough\n")
     ended = run_naze_bridge("setup", "--yes", "--root", tmp_path, *(option.format(file) for option in options))

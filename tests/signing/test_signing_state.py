@@ -67,7 +67,7 @@ async def until_written(pi: Pi, least: int) -> None:
     await until_async(lambda: pi.path.exists() and pi.stored()["timestamp"] >= least, "the timestamp in the file")
 
 
-async def test_a_stop_and_a_start_without_a_clock(tmp_path: Path) -> None:
+async def test_timestamps_continue_after_a_restart_without_a_clock(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     state = pi.boot()
     heard = frame(ticks(NOON) + 5)
@@ -83,7 +83,7 @@ async def test_a_stop_and_a_start_without_a_clock(tmp_path: Path) -> None:
     state.close()
 
 
-async def test_a_power_cut(tmp_path: Path) -> None:
+async def test_no_timestamp_repeats_after_a_power_cut(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     pi.boot()
     await until_written(pi, ticks(NOON) + AHEAD)

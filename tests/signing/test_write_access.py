@@ -78,12 +78,12 @@ def test_a_table_with_only_an_address_is_open(tmp_path: Path) -> None:
         ("::1", False),
     ],
 )
-def test_which_addresses_may_write(tmp_path: Path, host: str, may: bool) -> None:
+def test_only_listed_addresses_may_write(tmp_path: Path, host: str, may: bool) -> None:
     found = access(tmp_path, f'{{address = "{LINK}", writers = ["192.168.4.0/24", "fe80::/64"]}}')
     assert found[LINK].has_address(Peer(LINK, (host, 14550))) is may
 
 
-def test_no_writers_at_all(tmp_path: Path) -> None:
+def test_with_an_empty_list_no_address_may_write(tmp_path: Path) -> None:
     found = access(tmp_path, f'{{address = "{LINK}", writers = []}}')
     assert not found[LINK].has_address(Peer(LINK, ("127.0.0.1", 1)))
 
@@ -105,7 +105,7 @@ def test_no_writers_at_all(tmp_path: Path) -> None:
         (f'{{address = "{LINK}", writers = ["laptop"]}}', "write 192.168.4.0/24"),
     ],
 )
-def test_invalid_tables(tmp_path: Path, entry: str, said: str) -> None:
+def test_an_invalid_table_is_one_sentence(tmp_path: Path, entry: str, said: str) -> None:
     assert said in complaint(tmp_path, entry)
 
 
@@ -126,13 +126,13 @@ def test_the_passphrase_is_the_line_without_its_end(key_file: Path, content: byt
 
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"x" * 5000])
-def test_invalid_passphrases(key_file: Path, content: bytes) -> None:
+def test_a_passphrase_is_one_line_of_text(key_file: Path, content: bytes) -> None:
     key_file.write_bytes(content)
     with pytest.raises(AddressError, match="must hold the passphrase on one line"):
         read_key(key_file)
 
 
-def test_binary_key_files(key_file: Path) -> None:
+def test_a_binary_key_file_is_refused(key_file: Path) -> None:
     key_file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(AddressError, match="holds no text") as caught:
         read_key(key_file)

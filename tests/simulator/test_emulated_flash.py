@@ -57,7 +57,7 @@ def test_a_given_number_of_operations_fail() -> None:
 
 
 @pytest.mark.parametrize("operation", [1, 2, 3])
-def test_a_power_cut_during_an_operation(operation: int) -> None:
+def test_a_power_cut_leaves_an_operation_half_done(operation: int) -> None:
     flash = memoryview(bytearray(b"\xff" * 0x2_0000))
     steps = erase(unlock()).store(CR, PG).store_half(PLACE, 0).store_half(PLACE + 2, 0).store_half(PLACE + 4, 0)
     rig = Rig(steps, flash=flash)

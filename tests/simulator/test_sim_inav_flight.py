@@ -77,7 +77,7 @@ def test_a_craft_stays_at_the_end_of_a_circuit() -> None:
 
 
 @pytest.mark.parametrize(("speed", "seconds"), [(0, 33), (500, 20), (20, 33), (2000, 10)])
-def test_the_speed_of_a_leg(speed: int, seconds: int) -> None:
+def test_a_leg_is_flown_at_its_own_speed(speed: int, seconds: int) -> None:
     flight = Flight(waypoint(100, lat_e7=453838000 + 8983, lon_e7=84733000, p1=speed))  # 100 m to the north
     flight.until(is_finished)
     assert flight.bench.now == pytest.approx(seconds, abs=1.5)

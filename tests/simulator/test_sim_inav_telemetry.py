@@ -31,13 +31,13 @@ BOXES = {"6.1.1": (29, 300), "7.1.2": (35, 387), "8.0.1": (37, 426), "9.0.1": (3
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_lengths(version: str) -> None:
+def test_replies_have_the_lengths_of_each_version(version: str) -> None:
     bench = MspBench("inav", MspOptions(version=version))
     assert {command: len(bench.payload(command)) for command in LENGTHS} == LENGTHS
     assert (len(bench.payload(119)), len(bench.payload(116))) == BOXES[version]
 
 
-def test_identity() -> None:
+def test_the_identity_names_inav_and_its_version() -> None:
     bench = MspBench("inav", MspOptions(version="7.1.2"))
     assert (bench.payload(1), bench.payload(2), bench.payload(3)) == (b"\x00\x02\x05", b"INAV", b"\x07\x01\x02")
 
@@ -60,12 +60,12 @@ def test_the_mode_names_need_a_jumbo_frame(version: str) -> None:
 @pytest.mark.parametrize(
     ("version", "receiver", "channels"), [("7.1.2", True, 18), ("8.0.1", True, 34), ("9.1.0", False, 0)]
 )
-def test_channels(version: str, receiver: bool, channels: int) -> None:
+def test_the_number_of_channels_depends_on_the_version(version: str, receiver: bool, channels: int) -> None:
     bench = MspBench("inav", MspOptions(version=version, receiver=receiver))
     assert len(bench.payload(105)) == 2 * channels
 
 
-def test_msp_v2_alongside_v1() -> None:
+def test_msp_v2_works_alongside_v1() -> None:
     """Lengths as observed on INAV 9.1.0's own simulator."""
     bench = MspBench("inav", MspOptions(platform=1, pitot=True), Faults(arming_blockers=1 << 18))
     lengths = {command: len(bench.payload_v2(command)) for command in (0x2000, 0x2002, 0x2009, 0x2010)}

@@ -31,7 +31,7 @@ DISARMED = 10
 
 
 @pytest.mark.parametrize(("command", "length"), LENGTHS.items())
-def test_lengths(command: int, length: int) -> None:
+def test_replies_have_multiwiis_lengths(command: int, length: int) -> None:
     assert len(MspBench("multiwii").payload(command)) == length
 
 

@@ -89,7 +89,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
         simulator.process.communicate()
 
 
-def test_an_inav_on_a_socket(start: Callable[..., Simulator]) -> None:
+def test_an_inav_runs_on_a_socket(start: Callable[..., Simulator]) -> None:
     simulator = start("--kind", "inav", "--inav-version", "8.0.1")
     assert simulator.greeting == f"Simulated INAV 8.0.1 at 127.0.0.1:{simulator.port}. Ctrl-C ends it.\n"
     with simulator.client() as client:
@@ -97,7 +97,7 @@ def test_an_inav_on_a_socket(start: Callable[..., Simulator]) -> None:
     assert simulator.end() == 0
 
 
-def test_a_multiwii_on_a_pseudo_terminal(start: Callable[..., Simulator], tmp_path: Path) -> None:
+def test_a_multiwii_runs_on_a_pseudo_terminal(start: Callable[..., Simulator], tmp_path: Path) -> None:
     simulator = start("--kind", "multiwii", "--baud", "57600", link=tmp_path / "tty")
     assert simulator.greeting == f"Simulated MultiWii at {tmp_path / 'tty'}, 57600 baud. Ctrl-C ends it.\n"
     with serial.Serial(str(tmp_path / "tty"), 57600, timeout=PATIENCE) as port:
@@ -105,7 +105,7 @@ def test_a_multiwii_on_a_pseudo_terminal(start: Callable[..., Simulator], tmp_pa
         assert port.read(13)[:6] == bytes((*b"$M>", 7, 100, 241))
 
 
-def test_a_naze_on_a_socket(start: Callable[..., Simulator]) -> None:
+def test_a_naze_runs_on_a_socket(start: Callable[..., Simulator]) -> None:
     with start().client() as client:
         assert client.payload(100)[0] == 211
 
@@ -149,7 +149,7 @@ def test_the_eeprom_is_kept_in_a_file(start: Callable[..., Simulator], tmp_path:
         assert client.payload(20) == bytes((0, 120, 1, 1))
 
 
-def test_the_truth_of_a_flight(start: Callable[..., Simulator]) -> None:
+def test_truth_reports_the_flight(start: Callable[..., Simulator]) -> None:
     simulator = start("--kind", "inav")
     assert simulator.line("armed 1") == "ok"
     until(lambda: json.loads(simulator.line("truth"))["flight"]["height_m"] > 0.1, "the take-off")
@@ -166,7 +166,7 @@ def test_the_truth_of_a_flight(start: Callable[..., Simulator]) -> None:
         (("--kind", "inav", "--tcp", "127.0.0.1:5760", "--state", "pyproject.toml"), "name another file"),
     ],
 )
-def test_bad_options_are_one_sentence(options: tuple[str, ...], says: str) -> None:
+def test_an_invalid_option_is_one_sentence(options: tuple[str, ...], says: str) -> None:
     ended = run_naze_bridge("sim", *options)
     assert ended.returncode != 0
     assert says in ended.stderr

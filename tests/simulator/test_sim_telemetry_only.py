@@ -16,7 +16,7 @@ KINDS = tuple(LENGTHS)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_lengths(kind: str) -> None:
+def test_replies_have_the_firmwares_lengths(kind: str) -> None:
     bench = MspBench(kind)
     assert {command: len(bench.payload(command)) for command in LENGTHS[kind]} == LENGTHS[kind]
 

@@ -127,7 +127,7 @@ def test_only_verified_missions_are_found_by_checksum(store: MissionStore) -> No
     assert store.latest_verified(sent.record_count, sent.checksum ^ 1) is None
 
 
-def test_a_number_that_does_not_exist(store: MissionStore) -> None:
+def test_a_missing_number_is_reported(store: MissionStore) -> None:
     assert store.get(5) is None
     with pytest.raises(StoreError, match=r"there is no mission 5 in .*missions\.db"):
         store.conclude(5, "VERIFIED", "", 1.0)

@@ -79,7 +79,7 @@ def test_the_lock_can_be_released_and_taken_again(tmp_path: Path) -> None:
             pass
 
 
-def test_a_file_in_place_of_the_directory(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_directory_is_reported(tmp_path: Path) -> None:
     (tmp_path / "state").touch()
     unusable = pytest.raises(
         StoreError, match=r"cannot use the state directory .*/state: .*use another with --state-dir"

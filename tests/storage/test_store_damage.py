@@ -71,14 +71,14 @@ def assert_kept_aside(path: Path, damaged: bytes, *, salvaged: Mapping[int, Rece
 
 
 @pytest.mark.parametrize("size", [2, 15, 16, 100, 511, 512, 513, 4096, 5000, 100_000])
-def test_random_bytes(path: Path, size: int) -> None:
+def test_random_bytes_are_set_aside(path: Path, size: int) -> None:
     damaged = random.Random(size).randbytes(size)
     path.write_bytes(damaged)
     assert_kept_aside(path, damaged)
 
 
 @pytest.mark.parametrize("size", [16, 99, 100, 512, 2048, 4095, 4096, 4097, 8192, 12_288, 20_480, 50_000])
-def test_a_truncated_file(path: Path, sound: Path, size: int) -> None:
+def test_a_truncated_file_is_set_aside(path: Path, sound: Path, size: int) -> None:
     path.write_bytes(sound.read_bytes()[:size])
     assert_kept_aside(path, sound.read_bytes()[:size])
 
@@ -93,7 +93,7 @@ def test_an_empty_file_becomes_a_new_store(path: Path, content: bytes) -> None:
         assert_works(store)
 
 
-def test_pages_overwritten_with_other_pages(path: Path, sound: Path) -> None:
+def test_pages_overwritten_with_other_pages_are_noticed(path: Path, sound: Path) -> None:
     """As a card with a damaged address table does."""
     content = sound.read_bytes()
     pages = [content[at : at + 4096] for at in range(0, len(content), 4096)]
@@ -188,7 +188,7 @@ def test_an_intact_log_is_applied(path: Path, killed: bytes) -> None:
 
 @pytest.mark.parametrize("bit", range(0, 32 * 8, 5))
 def test_a_log_with_a_damaged_header_is_kept(path: Path, killed: bytes, bit: int) -> None:
-    """SQLite takes such a log for an old one and silently overwrites its commits."""
+    """SQLite would treat it as an old log and silently overwrite its commits."""
     log = bytearray(killed)
     log[bit // 8] ^= 1 << bit % 8
     path.with_name("missions.db-wal").write_bytes(log)
@@ -196,7 +196,7 @@ def test_a_log_with_a_damaged_header_is_kept(path: Path, killed: bytes, bit: int
     assert path.with_name(f"{ASIDE}-wal").read_bytes() == log
 
 
-def test_random_bytes_for_a_log(path: Path, killed: bytes) -> None:
+def test_a_log_of_random_bytes_is_kept_aside(path: Path, killed: bytes) -> None:
     log = random.Random(1).randbytes(30_000)
     path.with_name("missions.db-wal").write_bytes(log)
     assert_kept_aside(path, path.read_bytes(), salvaged=ALL)
@@ -248,7 +248,7 @@ def test_a_damaged_file_set_aside_can_be_opened(path: Path, killed: bytes) -> No
     connection.close()
 
 
-def test_a_file_of_another_program(path: Path) -> None:
+def test_a_file_of_another_program_is_set_aside(path: Path) -> None:
     """An intact database with a table named like ours, but without a schema number, is not ours."""
     connection = sqlite3.connect(path)
     connection.execute("CREATE TABLE missions (something TEXT)")
@@ -262,7 +262,7 @@ def test_a_file_of_another_program(path: Path) -> None:
     connection.close()
 
 
-def test_a_damaged_column_name(path: Path, sound: Path) -> None:
+def test_a_damaged_column_name_is_noticed(path: Path, sound: Path) -> None:
     """SQLite's own check does not find it."""
     content = sound.read_bytes()
     assert content.count(b"received_at   REAL") == 1
@@ -271,7 +271,7 @@ def test_a_damaged_column_name(path: Path, sound: Path) -> None:
     assert_kept_aside(path, damaged)
 
 
-def test_a_schema_that_is_not_utf8(path: Path, sound: Path) -> None:
+def test_a_schema_that_is_not_utf8_is_noticed(path: Path, sound: Path) -> None:
     damaged = sound.read_bytes().replace(b"CREATE TABLE missions", b"CREATE TABLE \xffissions")
     path.write_bytes(damaged)
     assert_kept_aside(path, damaged)

@@ -97,7 +97,7 @@ except StoreError as error:
 
 
 @pytest.mark.parametrize("with_store", [False, True])
-def test_a_directory_without_write_permission(with_store: bool) -> None:
+def test_a_directory_without_write_permission_is_reported(with_store: bool) -> None:
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         if with_store:
@@ -114,12 +114,12 @@ def test_a_directory_without_write_permission(with_store: bool) -> None:
 
 
 @pytest.mark.parametrize("path", ["/proc/naze-bridge/missions.db", "/dev/null/missions.db"])
-def test_a_directory_that_cannot_be_created(path: str) -> None:
+def test_a_directory_that_cannot_be_created_is_reported(path: str) -> None:
     with pytest.raises(StoreError, match=f"cannot open the mission store {path}: its directory cannot be created"):
         open_store(Path(path), now=0.0)
 
 
-def test_a_directory_in_place_of_the_file(tmp_path: Path) -> None:
+def test_a_directory_in_place_of_the_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"cannot open the mission store .*: it cannot be opened"):
         open_store(tmp_path, now=0.0)
 
@@ -137,7 +137,7 @@ def test_a_store_of_a_newer_release_is_not_changed(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_another_program_holds_the_file(tmp_path: Path) -> None:
+def test_a_file_locked_by_another_program_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "missions.db"
     with open_store(path, now=0.0).store as store:
         other = sqlite3.connect(path, isolation_level=None)

@@ -2,7 +2,7 @@
 """Mission Planner as a scripted client: its messages, waits and timeouts (docs/ground-stations.md).
 
 Only its behaviour on the link. Its timers may be scaled down (`pace`); everything else is as in the original,
-quirks included: it takes any ack to MISSION_COUNT for "continue", understands only MISSION_REQUEST (40) while
+quirks included: any ack to MISSION_COUNT means "continue" to it, it understands only MISSION_REQUEST (40) while
 sending MISSION_ITEM_INT, and its loops take each other's packets (`appetite`).
 """
 

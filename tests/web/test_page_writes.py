@@ -88,7 +88,7 @@ def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench
         assert page.complaints() == []
 
 
-def test_a_file_is_dropped(browsers: Browsers, bench: WebBench) -> None:
+def test_a_file_can_be_dropped_on_the_page(browsers: Browsers, bench: WebBench) -> None:
     drop = """
         const files = new DataTransfer();
         files.items.add(new File([arguments[0]], 'dropped.waypoints'));

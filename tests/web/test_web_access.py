@@ -116,7 +116,7 @@ def test_a_host_name_from_the_settings_is_accepted(start: Starter) -> None:
         "/api/missions/1/difference/x",
     ],
 )
-def test_missing_pages(lasting_web: WebBench, path: str) -> None:
+def test_a_missing_page_is_404_with_a_sentence(lasting_web: WebBench, path: str) -> None:
     answer = lasting_web.ask(path)
     assert answer.status == 404
     assert 0 < len(answer.data["error"]) < 200

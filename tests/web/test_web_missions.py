@@ -10,14 +10,14 @@ from tests.support.web_bench import WebBench, web_daemon
 pytest_plugins = ("tests.support.web_fixtures",)
 
 
-def test_the_list_on_the_flight_controller(lasting_web: WebBench) -> None:
+def test_the_list_on_the_flight_controller_is_shown(lasting_web: WebBench) -> None:
     held = lasting_web.ask("/api/held").data
     assert held["count"] == len(held["items"]) == 13
     assert held["checksum"] == lasting_web.state()["mission"]["checksum"] == lasting_web.daemon.held()["checksum"]
     assert [item["name"] for item in held["items"][:4]] == ["WAYPOINT", "TAKEOFF", "WAYPOINT", "DO_SET_ROI"]
 
 
-def test_the_state(lasting_web: WebBench) -> None:
+def test_the_state_has_link_vehicle_and_traffic(lasting_web: WebBench) -> None:
     state = until(lambda: (now := lasting_web.state())["gps"]["satellites"] and now, "telemetry")
     assert (state["link"]["state"], state["link"]["speed_baud"]) == ("MSP", 115200)
     assert (state["status"]["armed"], state["status"]["mode"]) == (False, "STABILIZE")
@@ -26,8 +26,8 @@ def test_the_state(lasting_web: WebBench) -> None:
     until(lambda: lasting_web.state()["traffic"]["fc"]["bytes_received"] > received, "more telemetry")
 
 
-def test_metrics(lasting_web: WebBench) -> None:
-    """Their contents are tested in tests/e2e/test_metrics.py."""
+def test_metrics_are_served(lasting_web: WebBench) -> None:
+    """Their contents are tested in tests/e2e/test_metrics_are_served.py."""
     answer = lasting_web.ask("/metrics")
     assert answer.status == 200
     assert answer.headers["Content-Type"].startswith("text/plain; version=0.0.4")
@@ -79,8 +79,7 @@ def test_nothing_is_restored_while_armed(web: WebBench) -> None:
     assert web.board.records() == held
 
 
-def test_a_craft_that_is_armed_and_speaks_mavlink(start: Starter) -> None:
-    """It stays the same vehicle."""
+def test_nothing_is_restored_while_armed_in_mavlink_mode(start: Starter) -> None:
     board = start.board("--tele-prot", "2")
     web = web_daemon(start, str(board.link))
     web.daemon.push(plain_plan(9))
@@ -110,7 +109,7 @@ def test_one_restore_at_a_time(web: WebBench) -> None:
     until(lambda: web.state()["write"]["done"], "the end of the first restore")
 
 
-def test_restoring_a_missing_mission(lasting_web: WebBench) -> None:
+def test_restoring_a_missing_mission_fails_with_a_sentence(lasting_web: WebBench) -> None:
     ended = lasting_web.restore(77)
     assert not ended["ok"]
     assert ended["text"].startswith("there is no mission 77")

@@ -56,7 +56,7 @@ def test_an_immediate_reload_loads_every_file(page: Browser) -> None:
     page.open()
 
 
-def test_the_overview(page: Browser) -> None:
+def test_the_overview_has_the_vehicles_values(page: Browser) -> None:
     assert page.text("#badges") == "DISARMED"
     assert page.text("#headline") == "Harakiri with the mission extension, STABILIZE, 12.6 V"
     assert (page.value("State"), page.value("Mode")) == ("disarmed", "STABILIZE")
@@ -68,7 +68,7 @@ def test_the_overview(page: Browser) -> None:
     assert page.value("Mission").startswith("13 records, ")
 
 
-def test_the_map(page: Browser) -> None:
+def test_the_map_shows_track_waypoints_roi_home_and_craft(page: Browser) -> None:
     assert len(page.all("#map .track")) == 2  # out, and home
     # Each in a single script, because the map is redrawn and elements found earlier disappear.
     numbers = page.run("return [...document.querySelectorAll('#map .number')].map((mark) => mark.textContent)")
@@ -96,7 +96,7 @@ def test_the_scale_is_true(page: Browser) -> None:
     assert ((x1 - x2) ** 2 + (y1 - y2) ** 2) ** 0.5 * metres / bar == pytest.approx(37.1, abs=0.4)
 
 
-def test_the_last_upload_as_sent_and_as_stored(page: Browser) -> None:
+def test_the_last_upload_is_shown_as_sent_and_as_stored(page: Browser) -> None:
     assert page.text("#upload b") == "VERIFIED"
     assert len(page.all("#upload tr.changed")) == 6
     dropped = page.text("#upload tr.dropped")
@@ -111,7 +111,7 @@ def test_the_last_upload_as_sent_and_as_stored(page: Browser) -> None:
     assert len(set(colours)) == 3
 
 
-def test_two_missions_compared(page: Browser) -> None:
+def test_two_missions_are_compared(page: Browser) -> None:
     page.find("#first").send_keys("1")
     page.find("#second").send_keys("2")
     page.press("#compare-form button")
@@ -166,7 +166,7 @@ def test_the_page_fits_a_phone(browsers: Browsers, bench: WebBench) -> None:
         assert phone.run(f"return [...document.querySelectorAll('button, input')].filter({small}).length") == 0
 
 
-def test_without_a_mission_and_without_a_position(browsers: Browsers, tmp_path: Path) -> None:
+def test_a_page_without_a_mission_and_a_position_says_so(browsers: Browsers, tmp_path: Path) -> None:
     with web_bench(tmp_path) as bench, browsers.tab(bench.port) as page:
         page.open()
         page.wait_text("#missions", "No mission has been received yet.")
@@ -179,8 +179,7 @@ def test_without_a_mission_and_without_a_position(browsers: Browsers, tmp_path: 
         assert page.complaints() == []
 
 
-def test_the_pictures_in_the_docs(tmp_path: Path) -> None:
-    """The pictures in the docs are taken here."""
+def test_every_picture_in_the_docs_is_taken(tmp_path: Path) -> None:
     take_pictures(tmp_path)
     taken = sorted(path.name for path in tmp_path.iterdir())
     assert taken == sorted(path.name for path in PICTURES.glob("*.png"))

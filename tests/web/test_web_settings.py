@@ -16,7 +16,7 @@ def load(tmp_path: Path, text: str) -> WebSettings | None:
     return load_settings(config, "sim:", (), tmp_path).web
 
 
-def test_the_table(tmp_path: Path) -> None:
+def test_the_table_has_defaults_and_is_read(tmp_path: Path) -> None:
     assert load(tmp_path, "") is None
     assert load(tmp_path, "[web]\n") == WebSettings(ListenAddress("127.0.0.1", 8080), (), None)
     given = load(tmp_path, '[web]\nlisten = "[::]:80"\nhosts = ["Naze.example"]\ntoken_file = "mine"\n')
@@ -68,13 +68,13 @@ def test_a_token_is_created_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "shown", [None, "", "Bearer", "Bearer ", "Bearer x", "Basic {}", "{}", "Bearer {}x", "Bearer \udcff"]
 )
-def test_wrong_tokens(tmp_path: Path, shown: str | None) -> None:
+def test_a_wrong_token_is_refused(tmp_path: Path, shown: str | None) -> None:
     token = Token(tmp_path / "token")
     text = token.path.read_text().strip()
     assert not token.is_shown_by(None if shown is None else shown.format(text))
 
 
-def test_invalid_token_files(tmp_path: Path) -> None:
+def test_an_invalid_token_file_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "open").write_text("a token readable by all")
     (tmp_path / "open").chmod(0o644)
     (tmp_path / "empty").touch(0o600)
