@@ -103,7 +103,6 @@ class Bridge:
     # The flight controller's side.
 
     def fc_received(self, data: bytes, now: float) -> None:
-        """Handle bytes from the port."""
         self.session.received(data, now)
         self._pass_on_news(now)
 
@@ -118,7 +117,6 @@ class Bridge:
         return self._incoming.received(peer, data, now, datagram=datagram)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
-        """A ground station's connection is closed."""
         self._forget(peer, now)
         self.ground.gone(peer)
 
@@ -151,7 +149,6 @@ class Bridge:
         self.session.restart(why, now)
 
     def tick(self, now: float) -> None:
-        """Run the timers of all parts."""
         self.session.tick(now)
         self._pass_on_news(now)
         self.runner.tick(now)
@@ -166,7 +163,6 @@ class Bridge:
             self._vehicle.tick(now)
 
     def next_deadline(self) -> float:
-        """The time of the next `tick`."""
         return min(
             self.session.next_deadline(),
             self.runner.next_deadline(),

@@ -10,7 +10,6 @@ _LARGEST = 3e38
 
 
 def single(value: float) -> float:
-    """Return the nearest single-precision number."""
     (rounded,) = _FLOAT.unpack(_FLOAT.pack(value))
     return float(rounded)
 

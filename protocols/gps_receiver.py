@@ -24,7 +24,6 @@ class GpsWatch:
         self._data = b""
 
     def feed(self, data: bytes) -> None:
-        """Take received bytes."""
         if self.heard:
             return
         self._data = (self._data + data)[-_KEPT:]

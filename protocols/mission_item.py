@@ -83,7 +83,6 @@ class MissionItem:
 
 
 def is_on_earth(lat_e7: int, lon_e7: int) -> bool:
-    """True if the coordinates are those of a place."""
     return abs(lat_e7) <= MAX_LAT_E7 and abs(lon_e7) <= MAX_LON_E7
 
 

@@ -26,7 +26,6 @@ class ListIdentity:
 
 
 def pack_records(records: Iterable[MissionRecord]) -> bytes:
-    """Concatenate the records' bytes."""
     return b"".join(record.pack() for record in records)
 
 

@@ -61,7 +61,6 @@ def capture_header(started: str) -> bytes:
 
 
 def capture_line(event: UartEvent) -> bytes:
-    """Return an event's line."""
     speed = "null" if event.speed is None else event.speed
     # Hex needs no escapes, and there are many such lines.
     content = f'"{event.data.hex()}"' if event.action in _WITH_DATA else json.dumps(event.text)

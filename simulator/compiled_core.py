@@ -65,18 +65,15 @@ class CompiledCore:
         return None if length < 0 else bytes(buffer[:length])
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer after its timeout."""
         self._board.now = now
         self._library.nm_poll(self._core)
 
     @property
     def stored(self) -> bytes:
-        """The stored list's records."""
         records = self._library.nm_records(self._core)
         return ctypes.string_at(records, self._core.stored.count * RECORD_SIZE) if records else b""
 
     def store(self, records: bytes) -> None:
-        """Make records the stored list; see Missions."""
         status = self._library.nm_store(self._core, records, len(records) // RECORD_SIZE)
         if self._board.power_is_cut:
             raise PowerCutError

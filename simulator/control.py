@@ -49,13 +49,11 @@ class Control:
         self._path = path
 
     def close(self) -> None:
-        """Stop listening and remove the socket."""
         if self._server:
             self._server.close()
             self._path.unlink(missing_ok=True)
 
     def execute(self, line: str) -> str:
-        """Execute a line; returns the answer."""
         now = self._loop.time()
         match line.split():
             case ["stats"]:

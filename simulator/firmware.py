@@ -99,7 +99,6 @@ class Firmware:
 
     @property
     def armed(self) -> bool:
-        """True if the craft is armed."""
         return self._board.armed
 
     def craft_at(self, now: float) -> Craft:
@@ -146,7 +145,6 @@ class Firmware:
         self._next_loop = max(at + self._looptime, self._clock)
 
     def hold(self, now: float) -> None:
-        """Do nothing until `now`."""
         if now > self._next_loop:
             self._next_loop = now
             self._schedule.resume(now)

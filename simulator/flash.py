@@ -27,11 +27,9 @@ class NorFlash:
 
     @property
     def memory(self) -> memoryview:
-        """The chip as the CPU sees it."""
         return self._memory
 
     def read(self, offset: int, size: int) -> bytes:
-        """Read `size` bytes."""
         return bytes(self._memory[offset : offset + size])
 
     def erase(self, page: int, seconds: float) -> None:

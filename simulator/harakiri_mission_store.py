@@ -60,20 +60,16 @@ class Floppy:
 
     @property
     def stored(self) -> bytes:
-        """The records in flash."""
         return self._missions.stored if self._missions else self._slots.read(0, self._slots.stored.count)
 
     @property
     def count(self) -> int:
-        """The number of records in RAM."""
         return len(self._list)
 
     def load(self) -> None:
-        """Load the list from flash."""
         self._list = list(unpack_records(self.stored))
 
     def clear(self) -> None:
-        """Empty the list in RAM."""
         self._list.clear()
 
     def save(self) -> None:
@@ -90,7 +86,6 @@ class Floppy:
             self.load()
 
     def take(self, frame: MavlinkFrame, now: float) -> None:
-        """Handle a MAVLink frame."""
         message = self._decoder.decode(frame)
         if message is None:
             return

@@ -82,7 +82,6 @@ class InavFirmware(MspFirmware):
 
     @property
     def stored(self) -> list[bytes]:
-        """The waypoints in the EEPROM."""
         stored = self._mission.stored
         return [stored[at : at + WAYPOINT_SIZE] for at in range(0, len(stored), WAYPOINT_SIZE)]
 

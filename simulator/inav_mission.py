@@ -146,7 +146,6 @@ class InavMission:
                 self.set_jump(index, 0)
 
     def set_jump(self, index: int, repeats: int) -> None:
-        """Set the counter of one JUMP."""
         self._list[self._start + index] = replace(self[index], p3=repeats)
 
     def _saved(self, number: int) -> NavWaypoint:

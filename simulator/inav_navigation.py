@@ -58,7 +58,6 @@ class InavNavigation:
 
     @property
     def is_returning(self) -> bool:
-        """True if the flight mode is NAV RTH."""
         return self.phase in _RETURNING
 
     def arm(self) -> None:

@@ -61,7 +61,6 @@ class MavlinkSchedule:
         return self._time + SLOT_SECONDS * min(divisor - self._slot % divisor for divisor in divisors)
 
     def take_due(self, now: float, only_heartbeat: bool) -> list[Stream]:
-        """The messages due by `now`."""
         due = []
         while self._time + SLOT_SECONDS <= now + 1e-9:
             self._time += SLOT_SECONDS
@@ -90,7 +89,6 @@ class MavlinkSender:
         return self.frame(Packed(msgid, payload, payload))
 
     def frame(self, packed: Packed) -> bytes:
-        """Encode any message."""
         return self._writer.frame(packed, 1)
 
 

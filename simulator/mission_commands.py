@@ -84,11 +84,9 @@ class MissionCommands:
 
     @property
     def stored(self) -> bytes:
-        """The stored list's records."""
         return self._slots.read(0, self._slots.stored.count)
 
     def store(self, records: bytes) -> None:
-        """Make records the stored list; see Missions."""
         if not self._board.armed and records != self.stored:
             self._transfer = None
             self._slots.store(records)

@@ -60,7 +60,6 @@ class MspBoard(SimulatedBoard):
 
     @property
     def armed(self) -> bool:
-        """True if the craft is armed."""
         return self._firmware is not None and self._firmware.armed
 
     @property
@@ -74,7 +73,6 @@ class MspBoard(SimulatedBoard):
         return self._boot_firmware(self._boot_at(self._next_task)).stored
 
     def truth(self, now: float) -> Craft | None:
-        """The craft's true state."""
         self._run_until(now)
         try:
             return self._firmware.craft_at(now) if self._firmware else None

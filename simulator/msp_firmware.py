@@ -116,7 +116,6 @@ def reply(command: int, payload: bytes = b"") -> bytes:
 
 
 def error(command: int) -> bytes:
-    """Encode an error frame."""
     if command > _HIGHEST_V1_COMMAND:
         return frame_v2("!", command)
     return MspFrame(Direction.ERROR, command).encode()

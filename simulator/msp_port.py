@@ -100,7 +100,6 @@ class MspReceiver:
 
     @property
     def in_frame(self) -> bool:
-        """True if a frame has begun."""
         return self._state != 0
 
     @property
@@ -238,5 +237,4 @@ class MspAnswers:
 
 
 def reply(command: int, payload: bytes = b"") -> bytes:
-    """Encode a reply frame."""
     return MspFrame(Direction.REPLY, command, payload).encode()

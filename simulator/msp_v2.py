@@ -20,7 +20,6 @@ class MspReceiverV2(MspReceiver):
 
     @property
     def in_frame(self) -> bool:
-        """True if a frame has begun."""
         return bool(self._frame) or super().in_frame
 
     def push(self, byte: int) -> tuple[int, bytes] | None:

@@ -44,11 +44,9 @@ class MultiWiiFirmware(MspFirmware):
 
     @property
     def stored(self) -> list[bytes]:
-        """The waypoints in the EEPROM."""
         return self._mission.stored
 
     def follow_pilot(self, now: float) -> None:
-        """Fly until `now`, arm and disarm."""
         self._fly_until(now)
         if self._faults.armed == self.armed:
             return

@@ -49,7 +49,6 @@ class MultiWiiNavigation:
         self._poi = None
 
     def status(self) -> NavStatus:
-        """The content of MSP_NAV_STATUS."""
         return NavStatus(self.mode, self.state, self.step.action, self.number, self._error, round(self._craft.heading))
 
     def fly(self, seconds: float, mode: Mode) -> None:

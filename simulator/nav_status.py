@@ -60,5 +60,4 @@ class NavStatus:
     heading: int = 0
 
     def pack(self) -> bytes:
-        """The payload."""
         return struct.pack("<5Bh", self.mode, self.state, self.action, self.number & 0xFF, self.error, self.heading)

@@ -52,17 +52,14 @@ class SimulatedNaze(SimulatedBoard):
 
     @property
     def baud(self) -> int:
-        """The current speed of the UART."""
         return self._uart.baud
 
     @property
     def protocol(self) -> Protocol | None:
-        """The firmware's current protocol."""
         return self._firmware.protocol if self._firmware else None
 
     @property
     def armed(self) -> bool:
-        """True if the craft is armed."""
         return self._firmware is not None and self._firmware.armed
 
     def truth(self, now: float) -> Craft | None:
@@ -77,7 +74,6 @@ class SimulatedNaze(SimulatedBoard):
 
     @property
     def stored_records(self) -> list[bytes]:
-        """The same, record by record."""
         stored = self.stored
         return [stored[at : at + RECORD_SIZE] for at in range(0, len(stored), RECORD_SIZE)]
 

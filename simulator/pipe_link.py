@@ -39,6 +39,5 @@ class SimLink:
             self._pump = self._near = None
 
     def poke(self) -> None:
-        """Apply a changed fault at once."""
         if self._pump:
             self._pump.poke()

@@ -38,7 +38,6 @@ class _Story:
         self._ahead = -1  # the last reply given before its time
 
     def add(self, exchange: Exchange) -> None:
-        """Add the next exchange."""
         self._exchanges.append(exchange)
         self._times.append(exchange.asked_at)
 
@@ -97,19 +96,16 @@ class CapturePlayer:
         return [(closed / self._tempo, opened / self._tempo) for closed, opened in self._outages]
 
     def power_on_booted(self, now: float) -> None:
-        """Start the replay."""
         if self._began_at is None:
             self._began_at = now
 
     def receive(self, data: bytes, now: float) -> None:
-        """Handle bytes from the line."""
         time = self._set_time(now)
         for frame in self._parser.feed(data):
             if frame.direction is Direction.REQUEST and not self._is_closed(time):
                 self._answer(frame, time)
 
     def advance(self, now: float) -> bytes:
-        """The bytes sent until `now` since the last call."""
         time = self._set_time(now)
         found: list[tuple[tuple[float, int], int, bytes]] = []
         while self._unasked_done < len(self._unasked) and self._unasked[self._unasked_done][0] <= time:

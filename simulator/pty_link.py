@@ -76,7 +76,6 @@ class PtyLink:
             self._close()
 
     def poke(self) -> None:
-        """Apply a changed fault at once."""
         if self._pump:
             self._pump.poke()
 

@@ -38,7 +38,6 @@ class Pump:
         self._timer: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
-        """Start moving bytes."""
         self._loop.add_reader(self._fd, self._on_readable)
         self.poke()
 

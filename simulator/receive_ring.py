@@ -28,7 +28,6 @@ class ReceiveRing:
         self._byte_time = _BITS_PER_BYTE / baud if baud else 0.0
 
     def power_off(self) -> None:
-        """Drop all bytes in transit."""
         self._wire.clear()
         self._wire_free_at = 0.0
         self._unread.clear()

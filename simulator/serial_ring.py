@@ -19,13 +19,11 @@ class SerialRing(ReceiveRing):
         self._tx_free_at = 0.0
 
     def power_off(self) -> None:
-        """Drop all bytes in transit."""
         super().power_off()
         self._leaving.clear()
         self._tx_free_at = 0.0
 
     def write(self, data: bytes, now: float) -> None:
-        """Send."""
         self._tx_free_at = max(now, self._tx_free_at) + len(data) * self._byte_time
         self._leaving.append((self._tx_free_at, data))
         unsent = sum(len(each) for _, each in self._leaving)

@@ -46,7 +46,6 @@ class SimTcpLink:
         self._close()
 
     def poke(self) -> None:
-        """Apply a changed fault at once."""
         if self._pump:
             self._pump.poke()
         else:

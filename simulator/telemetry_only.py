@@ -80,7 +80,6 @@ class TelemetryFirmware(MspFirmware):
         self._flown = 0.0
 
     def follow_pilot(self, now: float) -> None:
-        """Arm and disarm."""
         self._fly_until(now)
         if self.armed != self._faults.armed:
             flight = self._state()

@@ -26,7 +26,6 @@ class TrapCounters:
         self._returns = self._number_signs = self._letters_r = 0
 
     def count(self, byte: int, autosense: bool, armed: bool) -> Trap | None:
-        """Count an input byte."""
         if autosense:
             self._number_signs = self._number_signs + 1 if byte == _NUMBER_SIGN else 0
             if self._number_signs >= RUN_LENGTH:

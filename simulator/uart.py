@@ -36,7 +36,6 @@ class Uart(ReceiveRing):
         self._drop_unsent()
 
     def power_off(self) -> None:
-        """Drop all bytes in transit."""
         super().power_off()
         self._drop_unsent()
         self._sent.clear()

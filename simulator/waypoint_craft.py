@@ -36,7 +36,6 @@ class WaypointCraft:
         return lat, FIELD_LON_E7 + round(self._east / METRES_PER_DEGREE_EAST * 1e7)
 
     def rest(self) -> None:
-        """Stay on the ground."""
         self.height_m = self._speed = self._climb = 0.0
 
     def hover(self, height_m: float, seconds: float) -> None:
@@ -61,7 +60,6 @@ class WaypointCraft:
         return share >= 1.0
 
     def state(self) -> FlightState:
-        """The sensor values."""
         lat_e7, lon_e7 = self.position
         is_moving = self._speed > 0
         return FlightState(

@@ -111,12 +111,10 @@ class Autosense:
         self._visit = self._new_visit(now)
 
     def take_output(self) -> list[bytes]:
-        """The bytes to be written, in order."""
         output, self._output = self._output, []
         return output
 
     def next_deadline(self) -> float:
-        """The time of the next `tick`."""
         return min(self._visit.phase_ends, self._visit.ends)
 
     def receive(self, data: bytes, now: float) -> None:

@@ -35,7 +35,6 @@ class FrskyTelemetry:
         self._place: tuple[float, Home] | None = None
 
     def take(self, report: FrskyReport, now: float) -> None:
-        """Take one group of values."""
         if report.heading_deg is not None:
             health = self._vehicle.last(Health)
             has_compass = health is not None and Sensor.COMPASS in health.sensors

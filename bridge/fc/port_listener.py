@@ -31,7 +31,6 @@ class OtherDeviceWatch:
         self._mavlink = MavlinkSplitter()
 
     def feed(self, data: bytes) -> None:
-        """Take bytes as they come."""
         self._gps.feed(data)
         if self._gps.heard:
             self.what = f"a GPS receiver ({self._gps.heard})"
@@ -63,7 +62,6 @@ class PortListener:
         self.ends = now + _LISTEN_S
 
     def receive(self, data: bytes) -> None:
-        """Take bytes that were read at the current `speed`."""
         self._watch.feed(data)
         self._size += len(data)
         self.what = self._watch.what

@@ -69,7 +69,6 @@ class FcSession:
         self.state: State = Closed(self._port, PortClosed(None), 0.0)
 
     def opened(self, now: float) -> None:
-        """The port is open."""
         self._handle(PortOpened(), now)
 
     def closed(self, now: float, why: str | None) -> None:
@@ -86,19 +85,16 @@ class FcSession:
             self._handle(Lost(why, pending=self.state.unanswered()), now)
 
     def received(self, data: bytes, now: float) -> None:
-        """Take bytes from the port."""
         event = self.state.receive(data, now)
         if event is not None:
             self._handle(event, now)
 
     def tick(self, now: float) -> None:
-        """Run the timers of the current state."""
         event = self.state.tick(now)
         if event is not None:
             self._handle(event, now)
 
     def next_deadline(self) -> float:
-        """The time of the next `tick`."""
         return self.state.deadline()
 
     def take_output(self) -> list[bytes]:
@@ -117,7 +113,6 @@ class FcSession:
             self._port.output.append(frame)
 
     def _handle(self, event: Event, now: float) -> None:
-        """Change the state by the table."""
         before = self.state
         after = TRANSITIONS[type(before)][event.spoken if isinstance(event, Found) else type(event)]
         if not isinstance(event, Identified):

@@ -60,7 +60,6 @@ class FlashBudget:
             bucket.spend(-1.0)
 
     def used(self, peer: Peer) -> float:
-        """The recent writes of a peer's account."""
         return self._shares.used(self._account(peer))
 
     def _account(self, peer: Peer) -> Hashable:

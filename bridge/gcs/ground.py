@@ -77,7 +77,6 @@ class Ground:
         self._everyone = None
 
     def remove_default_peer(self, peer: Peer) -> None:
-        """Stop sending to a default peer."""
         self._default_peers.pop(peer, None)
         self._everyone = None
         self._writers.pop(peer, None)
@@ -109,7 +108,6 @@ class Ground:
         return [peer for peer in self._default_peers if self.stations.is_unknown(peer)]
 
     def gone(self, peer: Peer) -> None:
-        """A ground station's connection is closed."""
         self.stations.gone(peer)
         self._forget(peer)
 
@@ -169,7 +167,6 @@ class Ground:
                 self.say(Severity.WARNING, self.notice, station)
 
     def record(self, peer: Peer, frame: MavlinkFrame, now: float) -> None:
-        """Pass an accepted frame to the frame listener."""
         if not self.stations.is_listener(peer) and self.budgets.allows(Cost.RECORDED, peer, now):
             self.on_frames([frame.raw])
 
@@ -226,7 +223,6 @@ class Ground:
             self.on_frames([frame])
 
     def broadcast(self, message: Message) -> None:
-        """Send a message to everyone."""
         self.multicast(pack(message), self.everyone())
 
     def multicast(self, packed: Packed, peers: Iterable[Peer]) -> None:

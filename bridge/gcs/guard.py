@@ -158,7 +158,6 @@ class Guard:
         self.refused: Counter[tuple[str, str]] = Counter()
 
     def standing(self, peer: Peer) -> Standing:
-        """The rights that a peer has proven so far."""
         access = self._links.get(peer.link, _OPEN)
         if access.signing is None and access.may_write is None:
             return Standing.OPEN
@@ -205,7 +204,6 @@ class Guard:
         return self._refuse(peer, frame, _NOT_OVER_OPEN_LINK)
 
     def forget(self, peer: Peer) -> None:
-        """A ground station is gone."""
         self._signed.discard(peer)
         self._told.pop(peer, None)
 

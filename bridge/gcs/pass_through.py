@@ -84,7 +84,6 @@ class PassThrough:
         return self.is_aboard(system) or not others
 
     def forget(self, peer: Peer) -> None:
-        """A ground station is gone."""
         self._heard.pop(peer, None)
 
     def _copy(self, frame: MavlinkFrame, station: Station, peers: Iterable[Peer]) -> None:

@@ -147,7 +147,6 @@ class Stations:
         return self._orders.get((link, is_listener), [])
 
     def is_unknown(self, peer: Peer) -> bool:
-        """True if nothing was heard from `peer`."""
         return peer not in self._known
 
     def version(self, peer: Peer) -> int:
@@ -156,7 +155,6 @@ class Stations:
         return 2 if known is None else known.version
 
     def gone(self, peer: Peer) -> None:
-        """The peer's connection is closed."""
         self._known.pop(peer, None)
         self._orders = None
 
@@ -178,7 +176,6 @@ class Stations:
         return 0.0 if self._displaced else self._expiry_due
 
     def peers(self) -> list[Peer]:
-        """All connected peers."""
         return list(self._known)
 
     def is_listener(self, peer: Peer) -> bool:

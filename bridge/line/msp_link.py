@@ -135,7 +135,6 @@ class MspLink:
 
     @property
     def bad_checksums(self) -> int:
-        """Frames that arrived damaged."""
         return self._parser.bad_checksums
 
     def awaits(self, commands: frozenset[int]) -> bool:
@@ -311,6 +310,5 @@ class RoundTrips:
         self.sum_s = 0.0
 
     def add(self, elapsed_s: float) -> None:
-        """Count one."""
         self.counts[bisect_left(BOUNDS_S, elapsed_s)] += 1
         self.sum_s += elapsed_s

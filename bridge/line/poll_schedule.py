@@ -99,7 +99,6 @@ class _Slot:
         return max(len(self.poll.frame) + self.size, self.least_cost)
 
     def set_interval(self, interval_s: float) -> None:
-        """Change the interval."""
         self.interval_s = interval_s
         self.due = inf if interval_s == inf else self.asked_at + interval_s
 

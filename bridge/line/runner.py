@@ -66,7 +66,6 @@ class Runner:
 
     @property
     def is_busy(self) -> bool:
-        """True while a conversation is running."""
         return self._current is not None
 
     @property
@@ -94,7 +93,6 @@ class Runner:
             self._advance(LinkLost("internal error"), now)
 
     def link_up(self, link: MspLink) -> None:
-        """Use this link from now on."""
         self._link = link
 
     def mavlink_up(self, transmit: Callable[[Packed], bool]) -> None:
@@ -173,7 +171,6 @@ class Runner:
         self._begin_next(now)
 
     def _run(self, answer: object, now: float) -> None:
-        """Run the current conversation until it waits again."""
         assert self._current is not None
         task = self._current
         conversation = task.conversation

@@ -199,7 +199,6 @@ def refuse_frame(item: MissionItem, *, needs_position: bool) -> RejectingFinding
 
 
 def refuse_position(item: MissionItem) -> RejectingFinding | None:
-    """Reject coordinates out of range."""
     if abs(item.lat_e7 or 0) > MAX_LAT_E7:
         return reject(MissionResult.INVALID_PARAM5_X, item, "lat_e7", "latitude beyond 90 deg")
     if abs(item.lon_e7 or 0) > MAX_LON_E7:

@@ -41,7 +41,6 @@ def names_of_active(box_flags: int, boxes: Sequence[str]) -> set[str]:
 
 
 def flight_mode(active: Set[str]) -> FlightMode:
-    """The mode that follows from the active boxes."""
     return next((mode for mode, names in _BOXES if active & names), FlightMode.ACRO)
 
 

@@ -60,7 +60,6 @@ def bearing_deg(start: Place, end: Place) -> float:
 
 
 def north_east_m(start: Place, end: Place) -> tuple[float, float]:
-    """Metres to the north and to the east."""
     metres_per_unit = _METRES_PER_DEGREE / 1e7
     # Take the short way across the date line.
     east_units = (end.lon_e7 - start.lon_e7 + 1_800_000_000) % 3_600_000_000 - 1_800_000_000

@@ -43,5 +43,4 @@ CLEARED_LIST: Verdict[Any] = Verdict(Result.CLEARED, MissionResult.ACCEPTED)
 
 
 def rejected(findings: tuple[Finding, ...], rejection: RejectingFinding) -> Verdict[Any]:
-    """The verdict on a rejected list."""
     return Verdict(Result.REJECTED, rejection.ack, findings=(*findings, rejection.finding))

@@ -28,13 +28,11 @@ class LinkAnnouncer:
         self.is_lost = False
 
     def lost(self, silent_since: float) -> None:
-        """The flight controller is no longer on the line."""
         if self._silent_since is None:
             self._silent_since = silent_since
             self.due = silent_since + _LOST_S
 
     def found(self, controller: FlightController, now: float) -> tuple[Severity, str] | None:
-        """A flight controller is on the line."""
         silent_since, self._silent_since, self.due = self._silent_since, None, inf
         was_lost, self.is_lost = self.is_lost, False
         profile, before = controller.profile, self._known

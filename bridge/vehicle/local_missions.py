@@ -77,7 +77,6 @@ class LocalMissions:
             done(refusal, now)
 
     def pull(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
-        """Read the flight controller's list."""
         self._context.run(self._missions.read_back(), lambda held, _at: on_done(held), now)
 
     def check(

@@ -102,7 +102,6 @@ class MessageRouter:
         }
 
     def understands(self, msgid: int) -> bool:
-        """True if the message has a handler."""
         return msgid in self._handlers
 
     def take(self, station: Station, message: Message, now: float) -> None:
@@ -203,7 +202,6 @@ class Incoming:
         return True
 
     def forget(self, peer: Peer) -> None:
-        """A ground station is gone."""
         self._guard.forget(peer)
         if self.routes is not None:
             self.routes.forget(peer)

@@ -43,7 +43,6 @@ class MissionContext:
         self.runner.start(conversation, done, now)
 
     def ack(self, station: Station, result: MissionResult) -> None:
-        """Send a MISSION_ACK."""
         self.ground.to(station, messages.MAVLink_mission_ack_message(station.sysid, station.compid, result))
 
     def refuse(self, station: Station, refusal: Refusal) -> None:

@@ -207,7 +207,6 @@ class MissionUploads:
         self._ask(now)
 
     def next_deadline(self) -> float:
-        """The time of the next `tick`."""
         if not (self._uploads or self._reminders):
             return inf
         # Asked after each datagram of a flood.
@@ -276,7 +275,6 @@ class MissionUploads:
         return now < self._arriving_since + _ALONE_S and len(self._uploads) <= _MOST_IN_TURN
 
     def _handle(self, upload: _Upload, event: Event, now: float) -> None:
-        """Change the state by the table."""
         before = upload.state
         after = TRANSITIONS[type(before)][type(event)]
         if after is None:

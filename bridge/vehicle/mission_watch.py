@@ -26,7 +26,6 @@ class MissionWatch:
             self._context.runner.start(self._context.missions.is_outdated(), self._looked, now, in_background=True)
 
     def tick(self, now: float) -> None:
-        """Check, if no transfer runs."""
         if self._context.missions.fc_store is None or self._context.runner.is_busy:
             self.due = now + self._context.missions.watch_s
         else:

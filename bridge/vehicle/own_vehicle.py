@@ -92,7 +92,6 @@ class OwnVehicle:
         self._follow_requests()
 
     def tick(self, now: float) -> None:
-        """Send the messages that are due."""
         self._now = now
         if now >= self._newcomers_due:
             self._greet(now)

@@ -25,7 +25,6 @@ class Answer:
 
     @property
     def is_refusal(self) -> bool:
-        """True if the list was not accepted."""
         return self.ack is not MissionResult.ACCEPTED
 
 

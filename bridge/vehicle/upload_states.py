@@ -88,7 +88,6 @@ class UploadState(ABC):
         """The answer to the ground station at the deadline."""
 
     def next_tick(self) -> float:
-        """The time of the next `tick`."""
         return self.deadline
 
     def close(self, _now: float) -> None:
@@ -123,14 +122,12 @@ class ItemRequest:
     _round_trip_s: float | None = None
 
     def asked(self, seq: int, now: float) -> None:
-        """A request was sent now."""
         self.is_repeated = seq == self._seq
         self._seq = seq
         self._asked_at = now
         self.due = now + self._timeout_s
 
     def lost(self) -> None:
-        """The request timed out."""
         self._timeout_s = min(self._timeout_s * 2, _MAX_TIMEOUT_S)
 
     def is_copy(self, now: float) -> bool:
@@ -170,7 +167,6 @@ class Receiving(UploadState):
 
     @property
     def timeout(self) -> Refusal:
-        """The refusal for missing items."""
         text = f"Upload silent for {self.seconds:.0f} s, old mission kept"
         if self.is_closed:
             missing = self._count - len(self.items)
@@ -179,7 +175,6 @@ class Receiving(UploadState):
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
-        """The items so far."""
         return tuple(self.items[seq] for seq in sorted(self.items))
 
     @property
@@ -237,7 +232,6 @@ class Complete(UploadState):
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
-        """The list."""
         return self._items
 
 

@@ -173,7 +173,6 @@ def heartbeat(vehicle: Vehicle, *, is_lost: bool) -> Message:
 
 
 def current_mode(at: Moment) -> Message:
-    """CURRENT_MODE."""
     mode = at.need(FlightState).mode
     if not isinstance(mode, FlightMode):
         raise Unknown
@@ -217,7 +216,6 @@ def autopilot_version(vehicle: Vehicle) -> Message:
 
 
 def mission_current(at: Moment) -> Message:
-    """MISSION_CURRENT."""
     mission = at.mission()
     if not mission.items:
         return messages.MAVLink_mission_current_message(0, _NO_TOTAL, _NO_MISSION, 0)
@@ -225,7 +223,6 @@ def mission_current(at: Moment) -> Message:
 
 
 def mission_item_reached(seq: int) -> Message:
-    """MISSION_ITEM_REACHED."""
     return messages.MAVLink_mission_item_reached_message(seq)
 
 

@@ -99,7 +99,6 @@ class VehicleReporter:
         return self._makers[group]()
 
     def whole(self) -> VehicleReport:
-        """All groups."""
         held = self._missions.held
         mission = None if held is None else MissionIdentity(held.identity.count, f"{held.identity.checksum:08x}")
         return VehicleReport(**{group.value: self.group(group) for group in Group}, mission=mission)

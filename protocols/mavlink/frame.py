@@ -51,25 +51,21 @@ class MavlinkFrame:
 
     @property
     def sysid(self) -> int:
-        """The sending system."""
         raw = self.raw
         return raw[5] if raw[0] == MAGIC_V2 else raw[3]
 
     @property
     def compid(self) -> int:
-        """The sending component."""
         raw = self.raw
         return raw[6] if raw[0] == MAGIC_V2 else raw[4]
 
     @property
     def sender(self) -> tuple[int, int]:
-        """The sending system and component."""
         raw = self.raw
         return (raw[5], raw[6]) if raw[0] == MAGIC_V2 else (raw[3], raw[4])
 
     @property
     def msgid(self) -> int:
-        """The message id."""
         raw = self.raw
         return raw[7] | raw[8] << 8 | raw[9] << 16 if raw[0] == MAGIC_V2 else raw[5]
 

@@ -18,7 +18,6 @@ _PLACES = {
 
 
 def has_target_field(msgid: int) -> bool:
-    """True if a message can name a target."""
     return msgid.to_bytes(3, "little") in _PLACES
 
 

@@ -49,7 +49,6 @@ class MspFrame:
     is_v2: bool = field(default=False, compare=False)
 
     def encode(self) -> bytes:
-        """The frame's bytes, checksum included."""
         direction = bytes((self.direction.value,))
         if self.is_v2 or self.command > _HIGHEST_V1_COMMAND:
             body = _V2_HEADER.pack(0, self.command, len(self.payload)) + self.payload
@@ -63,12 +62,10 @@ class MspFrame:
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
-    """Encode a request to the flight controller."""
     return MspFrame(Direction.REQUEST, command, payload).encode()
 
 
 def frame_size(command: int, payload_size: int) -> int:
-    """The size of a frame, bytes."""
     return payload_size + (_V2_OVERHEAD if command > _HIGHEST_V1_COMMAND else _V1_OVERHEAD)
 
 
@@ -87,7 +84,6 @@ class MspParser:
         self.skipped_bytes = 0
 
     def feed(self, data: bytes) -> list[MspFrame]:
-        """Take received bytes; return the completed frames."""
         buffer = self._buffer
         buffer += data
         frames: list[MspFrame] = []

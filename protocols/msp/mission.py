@@ -85,7 +85,6 @@ class Info:
     flash_writes: int
 
     def encode(self) -> bytes:
-        """Return the reply's payload."""
         return _INFO.pack(
             ReplyStatus.OK,
             self.version,
@@ -112,7 +111,6 @@ class Staged:
     checksum: int
 
     def encode(self) -> bytes:
-        """Return the reply's payload."""
         return _PROGRESS.pack(self.status, self.next, self.checksum)
 
 
@@ -124,7 +122,6 @@ class Stored:
     stored: ListIdentity
 
     def encode(self) -> bytes:
-        """Return the reply's payload."""
         return _STORED.pack(self.status, self.stored.count, self.stored.checksum)
 
 
@@ -137,7 +134,6 @@ class Records:
     records: Sequence[WpRecord]
 
     def encode(self) -> bytes:
-        """Return the reply's payload."""
         return _SHORT.pack(self.status, self.first) + pack_records(self.records)
 
 
@@ -149,7 +145,6 @@ class Radius:
     wp_radius_cm: int
 
     def encode(self) -> bytes:
-        """Return the reply's payload."""
         return _SHORT.pack(self.status, self.wp_radius_cm)
 
 
@@ -171,19 +166,16 @@ def decode_progress(payload: bytes) -> Staged | None:
 
 
 def decode_stored(payload: bytes) -> Stored | None:
-    """Read the reply to COMMIT."""
     reply = _reply(_STORED, payload)
     return None if reply is None else Stored(reply[0], ListIdentity(*reply[1:]))
 
 
 def decode_records(payload: bytes) -> Records | None:
-    """Read the reply to READ."""
     reply = _reply(_SHORT, payload)
     return None if reply is None else Records(reply[0], reply[1], unpack_records(payload[_SHORT.size :]))
 
 
 def decode_radius(payload: bytes) -> Radius | None:
-    """Read the reply to RADIUS."""
     reply = _reply(_SHORT, payload)
     return None if reply is None else Radius(*reply)
 
@@ -219,12 +211,10 @@ def encode_begin(identity: ListIdentity) -> bytes:
 
 
 def encode_commit(identity: ListIdentity) -> bytes:
-    """Encode COMMIT."""
     return _short_request(MissionCommand.COMMIT, _LIST.pack(identity.count, identity.checksum))
 
 
 def encode_read(first: int, count: int) -> bytes:
-    """Encode READ."""
     return _short_request(MissionCommand.READ, struct.pack("<HBB", first, count, 0))
 
 

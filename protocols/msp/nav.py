@@ -139,7 +139,6 @@ def encode_set_wp(number: int, record: NavRecord) -> bytes:
 
 
 def encode_read_wp(number: int) -> bytes:
-    """Return the request for record `number`."""
     return request(Nav.WP, bytes((number,)))
 
 
@@ -182,5 +181,4 @@ def decode_nav_limits(payload: bytes) -> tuple[int, int, int] | None:
 
 
 def decode_nav_status(payload: bytes) -> NavStatus | None:
-    """Read MSP_NAV_STATUS."""
     return NavStatus(*_STATUS.unpack_from(payload)) if len(payload) >= _STATUS.size else None

@@ -119,12 +119,10 @@ class HomePoint(NamedTuple):
 
 
 def decode_ident(payload: bytes) -> Ident | None:
-    """Read MSP_IDENT."""
     return Ident(*_IDENT.unpack_from(payload)) if len(payload) >= _IDENT.size else None
 
 
 def decode_status(payload: bytes) -> StatusReport | None:
-    """Read MSP_STATUS."""
     if len(payload) < _STATUS.size:
         return None
     cycle_time, i2c_errors, sensors, box_flags, _ = _STATUS.unpack_from(payload)
@@ -132,7 +130,6 @@ def decode_status(payload: bytes) -> StatusReport | None:
 
 
 def decode_raw_imu(payload: bytes) -> RawImu | None:
-    """Read MSP_RAW_IMU."""
     if len(payload) < _RAW_IMU.size:
         return None
     values = _RAW_IMU.unpack_from(payload)
@@ -153,7 +150,6 @@ def decode_motors(payload: bytes) -> tuple[int, ...] | None:
 
 
 def decode_raw_gps(payload: bytes) -> RawGps | None:
-    """Read MSP_RAW_GPS."""
     if len(payload) < _RAW_GPS.size:
         return None
     fix, satellites, lat, lon, altitude, speed = _RAW_GPS.unpack_from(payload)
@@ -163,12 +159,10 @@ def decode_raw_gps(payload: bytes) -> RawGps | None:
 
 
 def decode_attitude(payload: bytes) -> AttitudeReply | None:
-    """Read MSP_ATTITUDE."""
     return AttitudeReply(*_ATTITUDE.unpack_from(payload)) if len(payload) >= _ATTITUDE.size else None
 
 
 def decode_altitude(payload: bytes) -> AltitudeReply | None:
-    """Read MSP_ALTITUDE."""
     return AltitudeReply(*_ALTITUDE.unpack_from(payload)) if len(payload) >= _ALTITUDE.size else None
 
 

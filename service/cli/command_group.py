@@ -40,11 +40,9 @@ class LazyGroup(CommandGroup):
         self._table = commands
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """The names, in the table's order."""
         return list(self._table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the command."""
         if cmd_name not in self._table:
             return None
         module, _, name = self._table[cmd_name].source.partition(":")
@@ -52,12 +50,10 @@ class LazyGroup(CommandGroup):
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of commands."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.summary) for name, command in self._table.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Complete a command's name, or an option."""
         named = [
             CompletionItem(name, help=command.summary)
             for name, command in self._table.items()

@@ -28,7 +28,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def daemon_options(command: F) -> F:
-    """Add the options that select a daemon."""
     state_dir = click.option(
         "--state-dir",
         type=click.Path(path_type=Path),

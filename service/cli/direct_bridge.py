@@ -61,7 +61,6 @@ async def ask_directly(fc: FcAddress, request: Json, progress: Callable[[int], N
 
 
 async def _wait(condition: Callable[[], bool], seconds: float) -> None:
-    """Wait until a condition holds, with a timeout."""
     for _ in range(int(seconds / _INTERVAL_S)):
         if condition():
             return

@@ -68,7 +68,6 @@ class _Main(LazyGroup):
 
 
 def _import_without(library: str, dependency: str) -> None:
-    """Import a library without its optional dependency."""
     if library in sys.modules or dependency in sys.modules:
         return
     sys.modules[dependency] = None  # type: ignore[assignment]

@@ -37,7 +37,6 @@ class MissionClient:
         return MissionResult(answer.type)
 
     def read(self) -> list[MissionItem]:
-        """Download the mission of the flight controller."""
         request_list = messages.MAVLink_mission_request_list_message(self._sysid, self._compid, 0)
         count = self._ask(request_list, "MISSION_COUNT").count
         items: list[MissionItem] = []

@@ -25,5 +25,4 @@ def print_table(table: "RenderableType") -> None:
 
 
 def print_json(value: object) -> None:
-    """Print one line of JSON."""
     click.echo(to_json(value))

@@ -74,7 +74,6 @@ class DaemonApi:
         return verdict_data(await self._answer(lambda answered, now: local.check(items, answered, now)))
 
     async def pull(self) -> Json:
-        """Read the mission of the flight controller."""
         held = await self._answer(self._daemon.bridge.local.pull)
         return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.missions.others]}
 
@@ -89,7 +88,6 @@ class DaemonApi:
         return result
 
     def status(self) -> Json:
-        """The status of the bridge."""
         daemon = self._daemon
         bridge, web = daemon.bridge, daemon.settings.web
         report = bridge.report.whole()
@@ -136,7 +134,6 @@ class DaemonApi:
         return await self._daemon.store.ask(lambda store: _listed(store.received_between(start_s, end_s, limit)))
 
     async def show_mission(self, number: int) -> Json:
-        """One mission with everything known about it."""
         return await self._daemon.store.ask(lambda store: shown(store, number))
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:

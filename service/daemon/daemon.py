@@ -145,11 +145,9 @@ class Daemon:
                 await self.is_at_rest(_STORE_TIMEOUT_S)
 
     def add_follower(self, follower: Follower) -> None:
-        """Subscribe a follower."""
         self._followers.append(follower)
 
     def followers_status(self) -> Json:
-        """The followers' parts of the status."""
         return {key: value for follower in self._followers for key, value in follower.status().items()}
 
     def change_links(self, gcs: Sequence[GcsAddress]) -> None:
@@ -188,7 +186,6 @@ class Daemon:
             await self.abort()
 
     async def abort(self) -> None:
-        """Abort the current transfer cleanly."""
         self.bridge.runner.stop(self._loop.time())
         self.flush()
         await self.is_at_rest(_ABORT_S)

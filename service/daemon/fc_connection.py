@@ -91,7 +91,6 @@ class FcConnection:
             self.capture.close()
 
     def carry_out(self) -> None:
-        """Write the bridge's output for the flight controller."""
         bridge = self._bridge
         self._speed = bridge.session.state.speed
         self._port.set_speed(self._speed)
@@ -105,7 +104,6 @@ class FcConnection:
             self._traffic.bytes_sent += len(data)
 
     def event(self, event: str) -> None:
-        """The bridge logged an event."""
         if self._finder is not None:
             self._finder.event(event)
         if event == "fc.found":

@@ -43,7 +43,6 @@ class GcsConnections:
         _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
 
     def add(self, link: GcsLink) -> None:
-        """Serve ground stations over another link."""
         self._links[link.name] = link
 
     def change(self, old: Sequence[GcsAddress], new: Sequence[GcsAddress]) -> None:
@@ -65,7 +64,6 @@ class GcsConnections:
                     self.warn(address)
 
     def send(self) -> None:
-        """Send the bridge's datagrams."""
         for peer, data in self._bridge.ground.take_datagrams():
             self._links[peer.link].send(peer, data)
             traffic = self._traffic[peer.link]
@@ -73,12 +71,10 @@ class GcsConnections:
             traffic.bytes_sent += len(data)
 
     def close(self) -> None:
-        """Close all links."""
         for link in self._links.values():
             link.close()
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        """Take bytes from a ground station."""
         traffic = self._traffic[peer.link]
         traffic.pieces_received += 1
         traffic.bytes_received += len(data)
@@ -91,6 +87,5 @@ class GcsConnections:
         self._flush()
 
     def gcs_gone(self, peer: Peer) -> None:
-        """Remove a ground station."""
         self._bridge.gcs_gone(peer, self._loop.time())
         self._flush()

@@ -71,7 +71,6 @@ class _Reporting:
         self._timer: asyncio.Handle = asyncio.get_running_loop().call_soon(self._report)
 
     def end(self) -> None:
-        """Stop the timers."""
         self._timer.cancel()
 
     def _report(self) -> None:

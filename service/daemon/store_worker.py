@@ -130,5 +130,4 @@ def _received(mission: ArrivedMission) -> ReceivedMission:
 
 
 def as_dicts(things: tuple[Any, ...]) -> list[dict[str, Any]]:
-    """Turn dataclasses into plain data."""
     return [asdict(thing) for thing in things]

@@ -85,7 +85,6 @@ class PortFinder:
                 self.move_on()
 
     def close(self) -> None:
-        """Stop all timers."""
         self._leave()
         self._memory.close()
 

@@ -22,14 +22,12 @@ class PortMemory:
             self._file.load(self._read)
 
     def found_flight_controller(self, key: str) -> None:
-        """Remember the flight controller's port."""
         if key != self.flight_controller:
             self.flight_controller = key
             self.others.pop(key, None)
             self._save()
 
     def found_other(self, key: str, what: str) -> None:
-        """Remember a port with another device."""
         if self.others.get(key) != what:
             self.others[key] = what
             if self.flight_controller == key:

@@ -59,11 +59,9 @@ class SendQueue:
         return self._size <= self._limit
 
     def first(self) -> memoryview:
-        """The next unsent bytes."""
         return memoryview(self._chunks[0][0])[self._sent :]
 
     def sent(self, size: int) -> None:
-        """Remove the first `size` bytes, which were sent."""
         chunk, kept = self._chunks[0]
         self._sent += size
         if self._sent == len(chunk):

@@ -46,13 +46,11 @@ class TcpLink:
         self._loop.add_reader(self._socket.fileno(), self._acceptable)
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send to one client."""
         client = self._clients.get(peer)
         if client is not None:
             client.send(data)
 
     def close(self) -> None:
-        """Close the server and its clients."""
         if self._resting is not None:
             self._resting.cancel()
         self._loop.remove_reader(self._socket.fileno())

@@ -55,7 +55,6 @@ class UdpLink:
             self._complained = True
 
     def close(self) -> None:
-        """Close the socket."""
         if self._lookup is not None:
             self._lookup.cancel()
         self._loop.remove_reader(self._socket.fileno())

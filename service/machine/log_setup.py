@@ -107,7 +107,6 @@ def set_log_level(level: str) -> None:
 
 
 def set_up_logging(level: str) -> None:
-    """Configure structlog for this process."""
     set_log_level(level)
     output = _StandardError()
     logging.basicConfig(handlers=[_FromLibraries()], level=logging.WARNING, force=True)

@@ -32,7 +32,6 @@ class Notifier:
         self._say(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
 
     def stopping(self) -> None:
-        """The daemon is stopping."""
         self._say("STOPPING=1")
 
     def alive(self) -> None:
@@ -46,7 +45,6 @@ class Notifier:
             self._say(f"STATUS={text}")
 
     def close(self) -> None:
-        """Close the socket."""
         if self._socket is not None:
             self._socket.close()
 

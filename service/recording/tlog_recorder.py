@@ -50,7 +50,6 @@ class TlogRecorder:
         return f"telemetry log: {self._folder.describe()}{dropped}"
 
     def close(self) -> None:
-        """Write the unsaved frames."""
         self._writer.close()
 
     def _write(self, taken: list[_Taken]) -> None:

@@ -43,7 +43,6 @@ class UartRecorder:
         return f"UART capture: {self._path}, {self._size / 1e6:.1f} of {self._max_size / 1e6:.0f} MB{dropped}{ended}"
 
     def close(self) -> None:
-        """Write the unsaved events."""
         self._writer.close()
 
     def _put(self, line: bytes) -> None:

@@ -36,11 +36,9 @@ class WriteAccess:
 
     @property
     def is_open(self) -> bool:
-        """True if every station may write."""
         return self.key is None and self.writers is None
 
     def has_address(self, peer: Peer) -> bool:
-        """True if a peer's address is among the writers'."""
         assert self.writers is not None
         assert isinstance(peer.key, tuple)
         address = ip_address(peer.key[0])

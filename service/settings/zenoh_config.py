@@ -69,12 +69,10 @@ def make_config(settings: ZenohSettings) -> zenoh.Config:
 
 
 def connect_endpoints(config: zenoh.Config) -> list[str]:
-    """The endpoints that the session connects to."""
     return _endpoints(json.loads(config.get_json("connect/endpoints")))
 
 
 def tls_files(config: zenoh.Config) -> TlsFiles:
-    """The certificates for connecting."""
     tls = json.loads(config.get_json("transport/link/tls"))
     return TlsFiles(*(Path(tls[field.name]) if tls[field.name] else None for field in fields(TlsFiles)))
 

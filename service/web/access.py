@@ -59,7 +59,6 @@ def is_own_name(host: str, known: Container[str]) -> bool:
 
 
 def check_token(request: Request, token: Token | TokenError) -> None:
-    """Refuse a request without the token."""
     if isinstance(token, TokenError):
         raise HTTPException(HTTPStatus.FORBIDDEN, f"This page is read-only: {token}.")
     if not token.is_shown_by(request.headers.get("authorization")):
@@ -89,7 +88,6 @@ def _check_body(request: Request, max_body: int) -> None:
 
 
 async def refused(_request: Request, error: Exception) -> Response:
-    """The response to a refused request: one sentence."""
     assert isinstance(error, HTTPException)
     return Response(to_json({"error": error.detail}), error.status_code, error.headers, "application/json")
 
@@ -107,8 +105,6 @@ class SafeHeaders:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request (ASGI)."""
-
         async def send_safely(message: Message) -> None:
             if message["type"] == "http.response.start":
                 given = {name for name, _ in message["headers"]}

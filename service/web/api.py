@@ -72,11 +72,9 @@ class Api:
         self._host = Host()
 
     def start(self) -> None:
-        """Start the history of the serial line."""
         self._history.start()
 
     async def close(self) -> None:
-        """Stop the background tasks."""
         self._history.close()
         await self._writer.close()
 

@@ -30,7 +30,6 @@ class ItemRow:
     changes: Mapping[str, str]
 
     def to_json(self) -> Json:
-        """The row for the page."""
         left, right = (None if item is None else shown(item) for item in (self.left, self.right))
         return {"kind": self.kind, "left": left, "right": right, "changes": self.changes}
 

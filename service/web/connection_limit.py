@@ -52,13 +52,11 @@ class ConnectionLimit:
         return True
 
     def leave(self, address: str) -> None:
-        """Count an admitted connection as closed."""
         self._inside[address] -= 1
         if not self._inside[address]:
             del self._inside[address]
 
     def close(self) -> None:
-        """Close all connections."""
         for transport in list(self.transports):
             transport.abort()
 
@@ -97,7 +95,6 @@ class BoundedConnection(H11Protocol):
         transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Free its place."""
         for timer in self._end, self._turn:
             if timer is not None:
                 timer.cancel()

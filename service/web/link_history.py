@@ -49,10 +49,8 @@ class LinkHistory:
         self._timer = self._loop.call_later(INTERVAL_S, self.start)
 
     def close(self) -> None:
-        """Stop sampling."""
         if self._timer is not None:
             self._timer.cancel()
 
     def to_json(self) -> Json:
-        """The samples, oldest first."""
         return {"interval_s": INTERVAL_S, "samples": [asdict(sample) for sample in self._samples]}

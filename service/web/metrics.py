@@ -57,11 +57,9 @@ class Metrics(Follower):
         daemon.add_follower(self)
 
     def render(self) -> bytes:
-        """The metrics as text."""
         return generate_latest(self._labelled)
 
     def event(self, level: Level, event: str, facts: Mapping[str, object]) -> None:
-        """Count an event."""
         self._events.labels(event, level).inc()
         incident = facts.get("incident")
         if event in _BEGINS:
@@ -71,7 +69,6 @@ class Metrics(Follower):
             self._durations.labels(facts["ack"]).observe(elapsed_s)
 
     def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
-        """Count a mission."""
         self._missions.labels(delivery.ack.name).inc()
         for finding in mission.verdict.findings:
             self._findings.labels(finding.field).inc()
@@ -92,7 +89,6 @@ class _OfVehicle(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Read all metrics."""
         for family in self._registry.collect():
             family.samples = [
                 sample._replace(labels={**sample.labels, "vehicle": self._vehicle}) for sample in family.samples
@@ -111,7 +107,6 @@ class _State(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Read all metrics."""
         yield _gauge("build_info", "The version that runs.", {"version": version()}, 1)
         yield from self._links()
         yield from self._flight_controller()

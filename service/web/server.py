@@ -43,12 +43,10 @@ class WebServer:
         self._server: asyncio.Server | None = None
 
     def start(self) -> None:
-        """Start to listen."""
         self._api.start()
         self._listening = asyncio.get_running_loop().create_task(self._listen())
 
     async def close(self) -> None:
-        """Stop listening, and close all connections."""
         if self._listening is not None:
             self._listening.cancel()
             with suppress(asyncio.CancelledError):

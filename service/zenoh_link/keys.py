@@ -42,7 +42,6 @@ class ZenohKey:
 
     @property
     def is_published(self) -> bool:
-        """True if the vehicle puts samples at this key."""
         return self.delivery is not SampleDelivery.REPLY and self is not MAVLINK_IN
 
 
@@ -92,10 +91,8 @@ ALIVE = f"{_V}/alive"
 
 
 def full(prefix: str, vehicle: str, suffix: str) -> str:
-    """The full key."""
     return f"{prefix}/{vehicle}/{suffix}"
 
 
 def vehicle_in(key: object) -> str:
-    """The vehicle's name in a full key."""
     return str(key).split("/")[1]

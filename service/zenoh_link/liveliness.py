@@ -58,7 +58,6 @@ class Liveliness:
         return not self._neighbours
 
     def status(self) -> Json:
-        """The connections, for `naze-bridge status`."""
         return {
             "zenoh": "open" if self._own else "not open",
             "zenoh_neighbours": len(self._neighbours),

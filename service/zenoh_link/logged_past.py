@@ -81,7 +81,6 @@ class _Log:
 
 
 def _logs(folder: Path) -> list[_Log]:
-    """All logs, oldest first."""
     if not folder.is_dir():
         return []
     found = []

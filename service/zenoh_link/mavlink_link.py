@@ -42,7 +42,6 @@ class MavlinkLink:
             self._events.remove_default_peer(_READERS)
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Publish a datagram."""
         if self._publisher.has_readers(MAVLINK_OUT):
             self._publisher.put_raw(MAVLINK_OUT, data)
 

@@ -98,7 +98,6 @@ class Node(Follower):
     # The methods of service.daemon.daemon.Follower.
 
     def telemetry(self, groups: frozenset[Group]) -> None:
-        """Publish these groups."""
         for group in groups:
             self._publish(group)
 
@@ -111,12 +110,10 @@ class Node(Follower):
             self._publish_soon()
 
     def mission_ended(self, mission: ArrivedMission, delivery: DeliveryResult) -> None:
-        """Publish the mission report."""
         self._send_reliably(keys.MISSION_REPORT, lambda: vehicle_data.mission_report(mission, delivery))
         self._publish_soon()
 
     def status(self) -> Json:
-        """The node's part of `naze-bridge status`."""
         return self._presence.status() | {"zenoh_dropped": self._thread.dropped + self._publisher.failed}
 
     # On the session's thread.

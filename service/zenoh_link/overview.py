@@ -32,7 +32,6 @@ class Overview:
 
 
 def overview_of(state: Json) -> Overview:
-    """Shorten a state."""
     status, battery, position = (_fresh(state[group]) for group in ("status", "battery", "position"))
     mission = state["mission"] or {}
     checksum = mission.get("checksum")

@@ -48,7 +48,6 @@ class Payloads:
         self._next: dict[str, int] = {}
 
     def encoding(self, key: ZenohKey) -> zenoh.Encoding:
-        """The encoding of a key's samples."""
         return encoding_of(key, key.encoding or self._encoding)
 
     def encode(self, key: ZenohKey, body: Json) -> bytes:

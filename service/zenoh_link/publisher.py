@@ -77,15 +77,12 @@ class Publisher:
         return STATE.suffix in self._publishers
 
     def has_readers(self, key: ZenohKey) -> bool:
-        """True if a key has subscribers."""
         return key.suffix in self._read
 
     def put(self, key: ZenohKey, body: Json) -> None:
-        """Publish plain data."""
         self.put_raw(key, self._payloads.encode(key, self._payloads.head(key) | body))
 
     def put_raw(self, key: ZenohKey, data: bytes) -> None:
-        """Publish bytes."""
         try:
             self._publishers[key.suffix].put(data)
         except zenoh.ZError:

@@ -44,12 +44,10 @@ class Question:
 
     @property
     def size(self) -> int:
-        """The size of the payload, bytes."""
         payload = self._query.payload
         return 0 if payload is None else len(payload)
 
     def payload(self) -> bytes:
-        """The payload; empty if there is none."""
         payload = self._query.payload
         return b"" if payload is None else payload.to_bytes()
 
@@ -76,7 +74,6 @@ class Question:
         self._thread.submit(reply, is_reply=True)
 
     def refuse(self, error: QueryRefused) -> None:
-        """Send the error."""
         body = {"error": str(error)} | ({} if error.result is None else {"result": error.result})
         answer = partial(self._query.reply_err, to_json(body).encode(), encoding=self._payloads.encoding(UPLOAD))
         self._thread.submit(answer, is_reply=True)

@@ -40,7 +40,6 @@ class SessionThread:
         self._thread = threading.Thread(target=self._run, name="zenoh session", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def submit(self, job: Job, *, is_reply: bool = False) -> None:

@@ -24,7 +24,6 @@ class VehicleData:
         self._clock = clock
 
     def state(self) -> Json:
-        """The whole state."""
         return {
             "vehicle": self._vehicle,
             "others_of_this_name": len(self._others),
@@ -34,7 +33,6 @@ class VehicleData:
 
 
 def mission_current(held: HeldMission | None) -> Json:
-    """The mission held by the flight controller."""
     if held is None:
         return {"count": None, "checksum": None, "items": None}
     return {
@@ -45,12 +43,10 @@ def mission_current(held: HeldMission | None) -> Json:
 
 
 def event(level: Level, name: str, facts: Mapping[str, object]) -> Json:
-    """The payload of one event."""
     return {"level": level, "event": name, "facts": {key: _fact(value) for key, value in facts.items()}}
 
 
 def mission_report(mission: ArrivedMission, delivery: DeliveryResult) -> Json:
-    """The result of a received mission."""
     body: Json = strict(delivery_data(delivery, mission) | {"source": mission.source})
     return body
 

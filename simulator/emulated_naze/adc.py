@@ -24,12 +24,10 @@ class Adc(Registers):
         self._scan_end = Alarm(clock, self._scan)
 
     def reset(self) -> None:
-        """Switch off."""
         super().reset()
         self._scan_end.cancel()
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         if offset == _CR2:
             if value & _ON and value & _START and not self._scan_end.is_set:
                 self._scan_end.set_in(_SCAN_NS)

@@ -62,27 +62,22 @@ class EmulatedNaze(SimulatedBoard):
 
     @property
     def baud(self) -> int:
-        """The current speed of the UART."""
         return self._chip.usart1.baud
 
     @property
     def armed(self) -> bool:
-        """True if the craft is armed."""
         return self.power is Power.RUNNING and self._memory.armed
 
     @property
     def protocol(self) -> SpokenProtocol | None:
-        """The firmware's current protocol."""
         return self._memory.protocol if self.power is Power.RUNNING else None
 
     @property
     def stored_records(self) -> list[bytes]:
-        """The mission in flash."""
         return self._memory.stored_records
 
     @property
     def flash_operations(self) -> int:
-        """The number of erases and programs so far."""
         return self.counters.flash_erases + self.counters.flash_programs
 
     def peek(self, address: int, size: int) -> bytes:

@@ -33,15 +33,12 @@ class Registers:
         self.words: dict[int, int] = {}
 
     def reset(self) -> None:
-        """Set all registers to zero."""
         self.words.clear()
 
     def read(self, offset: int) -> int:
-        """Read the last written word."""
         return self.words.get(offset, 0)
 
     def write(self, offset: int, value: int) -> None:
-        """Store the word."""
         self.words[offset] = value
 
 
@@ -58,12 +55,10 @@ class Bus:
         self._blocks[(address - BASE) >> _BLOCK_BITS] = peripheral
 
     def reset(self) -> None:
-        """Reset every block."""
         for peripheral in dict.fromkeys(self._blocks.values()):
             peripheral.reset()
 
     def read(self, offset: int, size: int) -> int:
-        """Handle a load of `size` bytes."""
         self._pace.charge_access()
         block = self._blocks.get(offset >> _BLOCK_BITS)
         if block is None:

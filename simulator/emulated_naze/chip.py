@@ -135,7 +135,6 @@ class Chip:
         self.reset()
 
     def power_off(self) -> None:
-        """Stop everything."""
         self._bus.reset()
         self.system.reset()
         self.usart1.power_off()

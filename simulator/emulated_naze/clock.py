@@ -44,7 +44,6 @@ class Alarm:
 
     @property
     def is_set(self) -> bool:
-        """True if it will go off."""
         return self.at_ns != NEVER_NS
 
     def set_in(self, delay_ns: int) -> None:
@@ -57,7 +56,6 @@ class Alarm:
         self._clock.enqueue(self)
 
     def cancel(self) -> None:
-        """Cancel it."""
         self.at_ns = NEVER_NS
 
     def go_off(self) -> None:

@@ -35,7 +35,6 @@ class DmaChannel:
         self.reset()
 
     def reset(self) -> None:
-        """Disabled."""
         self._config = self._left = self._size = self._peripheral = self._address = 0
 
     @property
@@ -108,7 +107,6 @@ class Dma:
         return self._channels[number - 1]
 
     def reset(self) -> None:
-        """Disable all channels."""
         self._flags = self._interrupting = 0
         for channel in self._channels:
             channel.reset()
@@ -121,14 +119,12 @@ class Dma:
             self._nvic.set_line(Irq.dma1(number), True)
 
     def read(self, offset: int) -> int:
-        """Read a word."""
         if offset < _FIRST_CHANNEL:
             return self._flags if offset == _ISR else 0
         index, register = divmod(offset - _FIRST_CHANNEL, _CHANNEL_SIZE)
         return self._channels[index].read(register // 4) if index < _CHANNELS and register < 16 else 0
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         if offset == _IFCR:
             self._clear(value)
         elif offset >= _FIRST_CHANNEL:

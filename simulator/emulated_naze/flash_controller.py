@@ -42,12 +42,10 @@ class FlashController:
         self.reset()
 
     def reset(self) -> None:
-        """Locked."""
         self._control = _LOCK
         self._status = self._address = self._keys = 0
 
     def read(self, offset: int) -> int:
-        """Read a word."""
         match offset:
             case 0x0C:
                 return self._status
@@ -60,7 +58,6 @@ class FlashController:
         return 0
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         match offset:
             case 0x04:
                 self._take_key(value)

@@ -28,7 +28,6 @@ class Gpio(Registers):
         return self.words.get(_ODR, 0) & outputs | self._outside & ~outputs
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         output = self.words.get(_ODR, 0)
         match offset:
             case 0x10:

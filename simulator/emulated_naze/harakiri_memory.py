@@ -36,12 +36,10 @@ class HarakiriMemory:
 
     @property
     def armed(self) -> bool:
-        """True if the firmware's armed flag is set."""
         return self._flags is not None and self._ram.load(self._flags + _ARMED, 1) == b"\1"
 
     @property
     def protocol(self) -> SpokenProtocol | None:
-        """The firmware's current protocol."""
         if self._protocol is None:
             return None
         (value,) = self._ram.load(self._protocol, 1)

@@ -41,6 +41,5 @@ class Hmc5883l(RegisterChip):
         return self._registers[number]
 
     def set(self, number: int, byte: int) -> None:
-        """Configure it."""
         if number < _MEASUREMENTS:
             self._registers[number] = byte

@@ -89,7 +89,6 @@ class I2c:
         return self._rest.get(offset, 0)
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         match offset:
             case 0x00:
                 self._write_cr1(value)

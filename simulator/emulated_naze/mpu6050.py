@@ -36,7 +36,6 @@ class Mpu6050(RegisterChip):
             self._measured = self._measure()
 
     def get(self, number: int) -> int:
-        """Read a measurement or a written value."""
         index = number - _MEASUREMENTS
         if 0 <= index < 2 * len(self._measured):
             return word_byte(self._measured, index)

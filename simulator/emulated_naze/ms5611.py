@@ -42,7 +42,6 @@ class Ms5611:
                 self._converted = _TEMPERATURE
 
     def read(self) -> int:
-        """Return the next byte of the result."""
         byte, self._answer = self._answer[:1], self._answer[1:]
         return byte[0] if byte else 0
 

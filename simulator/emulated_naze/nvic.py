@@ -35,7 +35,6 @@ class Nvic:
         self.reset()
 
     def reset(self) -> None:
-        """Reset: nothing enabled, pending or active."""
         self._enabled = 0
         self._pending = 0
         self._lines = 0

@@ -22,12 +22,10 @@ class PpmReceiver:
         self._next = 0
 
     def power_on(self) -> None:
-        """Begin to send frames."""
         self._next = 0
         self._edge.set_in(_FRAME_US * 1000)
 
     def power_off(self) -> None:
-        """Stop sending."""
         self._edge.cancel()
 
     def _on_edge(self) -> None:

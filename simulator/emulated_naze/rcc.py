@@ -21,7 +21,6 @@ class Rcc(Registers):
         self.has_lost_power = True
 
     def reset(self) -> None:
-        """Run from the internal oscillator."""
         self.words = {_CR: 0x83, _CSR: _POWER_ON_RESET if self.has_lost_power else _SOFTWARE_RESET}
         self.has_lost_power = False
         self._set_clocks()
@@ -36,7 +35,6 @@ class Rcc(Registers):
         return value
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         if offset == _CSR and value & _CLEAR_FLAGS:
             value = 0
         super().write(offset, value)

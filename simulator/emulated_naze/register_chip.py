@@ -16,7 +16,6 @@ class RegisterChip:
         self._awaits_number = not is_read
 
     def read(self) -> int:
-        """Return the byte in the current register."""
         number = self._number
         self._number = (number + 1) & 0xFF
         return self.get(number)

@@ -27,18 +27,15 @@ class SystemControl:
         self.reset()
 
     def reset(self) -> None:
-        """Reset to the state after a chip reset."""
         self._nvic.reset()
         self._systick.reset()
         self._rest: dict[int, int] = {}
 
     @property
     def vector_table(self) -> int:
-        """The address of the exception vectors."""
         return self._rest.get(_VTOR, 0)
 
     def read(self, offset: int, size: int) -> int:
-        """Handle a load."""
         return self._word(offset & ~3) >> 8 * (offset & 3) & (1 << 8 * size) - 1
 
     def _word(self, offset: int) -> int:
@@ -59,7 +56,6 @@ class SystemControl:
         return self._rest.get(offset, 0)
 
     def write(self, offset: int, size: int, value: int) -> None:
-        """Handle a store."""
         if 0x10 <= offset < 0x20:
             self._systick.write(offset, value)
         elif 0x100 <= offset < 0x500:

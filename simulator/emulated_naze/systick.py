@@ -23,13 +23,11 @@ class SysTick:
         self.reset()
 
     def reset(self) -> None:
-        """Stop."""
         self._control = self._reload = 0
         self._has_fired = False
         self._alarm.cancel()
 
     def read(self, offset: int) -> int:
-        """Read a word."""
         match offset:
             case 0x10:
                 control = self._control | (_HAS_FIRED if self._has_fired else 0)
@@ -46,7 +44,6 @@ class SysTick:
         return 0
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         match offset:
             case 0x10:
                 self._control = value & (_ENABLE | _INTERRUPT | _CORE_CLOCK)

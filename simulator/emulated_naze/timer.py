@@ -24,7 +24,6 @@ class Timer(Registers):
         self._started_ns = 0
 
     def reset(self) -> None:
-        """Stop."""
         self.words = {_ARR: 0xFFFF}
         self._started_ns = self._clock.now_ns
         self._interrupt()
@@ -36,7 +35,6 @@ class Timer(Registers):
         self._interrupt()
 
     def read(self, offset: int) -> int:
-        """Read a word."""
         return self._count() if offset == _CNT else super().read(offset)
 
     def write(self, offset: int, value: int) -> None:

@@ -72,7 +72,6 @@ class Usart:
     # -- registers -------------------------------------------------------------------------------------------
 
     def read(self, offset: int) -> int:
-        """Read a word."""
         match offset:
             case 0x00:
                 return self._status
@@ -89,7 +88,6 @@ class Usart:
         return 0
 
     def write(self, offset: int, value: int) -> None:
-        """Write a word."""
         match offset:
             case 0x00:
                 self._status &= value | ~(_RECEIVED | _TRANSMITTED)

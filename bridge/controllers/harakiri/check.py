@@ -54,7 +54,6 @@ class HarakiriRules:
         return self.capacity
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "HarakiriCheck":
-        """Begin the check of a list."""
         return HarakiriCheck(self, count, fallback_home)
 
 

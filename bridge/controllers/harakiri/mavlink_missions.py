@@ -63,7 +63,6 @@ class HarakiriMavlinkMissions(HarakiriStore):
         return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules, None)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
-        """Write the list and read it back."""
         if self._vehicle.armed is not False:
             # The firmware does not check this: it would accept a list, or lose its own, in flight.
             return PushResult(PushFailure.ARMED)

@@ -71,11 +71,9 @@ class HarakiriStore(FcMissionStore[WpRecord], ABC):
     """The mission store of a Harakiri, over either protocol: each record is an item, home too."""
 
     def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """A list as a ground station reads it."""
         return tuple(items_from_records(records, sent_as))
 
     def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
-        """The same number."""
         return number if number < len(records) else 0
 
 
@@ -89,7 +87,6 @@ class HarakiriMissions(HarakiriStore):
 
     @property
     def wp_radius_cm(self) -> int:
-        """gps_wp_radius as last heard, cm."""
         return self.info.wp_radius_cm
 
     def report(self) -> Conversation[StoreReport | None]:
@@ -325,7 +322,6 @@ class HarakiriMissions(HarakiriStore):
 
 
 def _decode_answer(reply: MspFrame) -> Staged | Stored | None:
-    """Read the reply to a CHUNK or COMMIT."""
     decode = ext.decode_stored if reply.command == MissionCommand.COMMIT else ext.decode_progress
     return decode(reply.payload)
 

@@ -40,7 +40,6 @@ class MultiwiiMissions(NavMissions):
         return (yield from super().report())
 
     def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
-        """Write the list and verify it."""
         result = yield from super().push(records, progress)
         yield from self._clear_step()
         return result

@@ -57,11 +57,9 @@ class NavRules:
 
     @property
     def max_items(self) -> int:
-        """The longest list that may fit, home included."""
         return self.profile.max_items
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> "NavCheck":
-        """Begin the check of a list."""
         return NavCheck(self, count, fallback_home)
 
 
@@ -297,7 +295,6 @@ class NavCheck(ListCheck):
     def _drop(
         self, item: MissionItem, name: str, was: float | None, why: str, news: News = News.NOTICE
     ) -> RejectingFinding | None:
-        """Drop one item without rejecting the list."""
         self._jumps.dropped.add(item.seq)
         self._note(item, name, was, DROPPED, why, news)
         return None

@@ -51,7 +51,6 @@ def items_from_records(
 
 
 def item_seqs(records: Sequence[NavRecord]) -> list[int]:
-    """The seq of each record's item."""
     speeds = _shown_speeds(records)
     return list(accumulate(2 if place in speeds else 1 for place in range(len(records))))
 

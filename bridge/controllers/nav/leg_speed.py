@@ -33,7 +33,6 @@ class LegSpeed:
         return not math.isfinite(item.p2) or (item.p2 <= 0 and item.p2 != AS_SET)
 
     def change(self, item: MissionItem, note: Note) -> None:
-        """Apply a valid change of speed."""
         self.waiting = item
         self.changed_at.append(item.seq)
         if item.p1 != GROUND_SPEED:

@@ -77,7 +77,6 @@ def inav_profile(capacity: int = INAV_CAPACITY) -> NavProfile:
 
 
 def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
-    """MultiWii 2.4 NAV."""
     return NavProfile(
         "MultiWii",
         capacity,

@@ -31,13 +31,11 @@ class Cli(State):
         port.output.append(RUB_OUT_LINE)
 
     def receive(self, data: bytes, now: float) -> Event | None:
-        """Watch for anything but echoes."""
         self._heard_at = now
         answers = [frame for frame in self._msp.feed(data) if frame.direction is not Direction.REQUEST]
         return Lost("it has left its command line") if answers or self._mavlink.feed(data) else None
 
     def tick(self, now: float) -> Event | None:
-        """Ask now and then whether it is back."""
         if now >= self._heard_at + _SILENCE_S:
             return Lost("its command line no longer echoes")
         if now >= self._ask_at:
@@ -47,7 +45,6 @@ class Cli(State):
         return None
 
     def deadline(self) -> float:
-        """The next request, or the end of the silence."""
         return min(self._ask_at, self._heard_at + _SILENCE_S)
 
     @property

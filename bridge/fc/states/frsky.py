@@ -33,7 +33,6 @@ class Frsky(State):
         self._note_armed(now)
 
     def receive(self, data: bytes, now: float) -> Event | None:
-        """Read the values."""
         for report in self._parser.feed(data):
             self._telemetry.take(report, now)
         if self._parser.values_in_a_row:
@@ -46,7 +45,6 @@ class Frsky(State):
         self.port.hear_armed(Source.FRSKY, now)
 
     def tick(self, now: float) -> Event | None:
-        """Ask for MSP now and then; notice silence."""
         if now >= self._probe_due:
             self._probe_due = now + _PROBE_INTERVAL_S
             self.port.output.append(PROBE)

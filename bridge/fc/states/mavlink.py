@@ -60,11 +60,9 @@ class Mavlink(State):
 
     @property
     def bad_checksums(self) -> int | None:
-        """Frames with a wrong checksum."""
         return self._splitter.bad_frames
 
     def receive(self, data: bytes, now: float) -> Event | None:
-        """Take frames."""
         if self._is_harakiri and self._msp.feed(data):
             return Lost("it answers MSP again", (self.speed,))
         self._last_byte_at = now
@@ -87,7 +85,6 @@ class Mavlink(State):
         return None
 
     def deadline(self) -> float:
-        """The next probe, or the end of the silence."""
         deadline = min(self._heard_at + self._timeout_s, self._probe_due)
         return min(deadline, self._look_at) if self._splitter.is_waiting else deadline
 

@@ -52,11 +52,9 @@ class MspLine(State):
 
     @property
     def bad_checksums(self) -> int | None:
-        """As the link counts them."""
         return self.link.bad_checksums
 
     def receive(self, data: bytes, now: float) -> Event | None:
-        """Take replies."""
         frames = self.link.receive(data, now)
         for frame in frames:
             self.take_frame(frame, now)
@@ -83,18 +81,15 @@ class MspLine(State):
         return min(self.link.next_deadline(), self._silent_since() + self._silence_s)
 
     def take_output(self) -> list[bytes]:
-        """The link's requests."""
         requests = self.link.take_output()
         for frame in requests:
             self._echo.sent(frame)
         return requests
 
     def unanswered(self) -> PendingReplies:
-        """The link's pending replies."""
         return self.link.unanswered()
 
     def take_frame(self, frame: MspFrame, now: float) -> None:
-        """Take one reply."""
         self.port.runner.received(frame, now)
 
     def _silent_since(self) -> float:
@@ -144,14 +139,12 @@ class Identifying(MspLine):
             self._end = Lost("fell silent while it was being identified", pending=self.unanswered())
 
     def tick(self, now: float) -> Event | None:
-        """As on any MSP line, up to a deadline."""
         event = super().tick(now)
         if event is None and now >= self._give_up_at:
             return Lost(f"not identified within {_IDENTIFY_TIMEOUT_S:.0f} s", pending=self.unanswered())
         return event
 
     def deadline(self) -> float:
-        """As on any MSP line, up to a deadline."""
         return min(super().deadline(), self._give_up_at)
 
     def _silent_since(self) -> float:
@@ -186,7 +179,6 @@ class Polling(MspLine):
             hear_msp(self.port.vehicle, frame, self.controller, now)
 
     def tick(self, now: float) -> Event | None:
-        """Poll; check an identity that is in doubt."""
         event = super().tick(now)
         if event is None:
             self.port.polls.ask(self.link, now, beside_missions=self.port.runner.needs_line)
@@ -219,11 +211,9 @@ class _ForeignBytes:
 
     @property
     def size(self) -> int:
-        """Their number."""
         return self._link.skipped_bytes - self._skipped_before
 
     def note(self, data: bytes) -> None:
-        """Examine received bytes."""
         for frame in self._splitter.feed(data) if self.size else ():
             # A disarmed Harakiri that hears no request sends heartbeats, and still answers MSP.
             if not is_disarmed_heartbeat(frame):

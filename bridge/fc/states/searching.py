@@ -19,12 +19,10 @@ class Searching(State):
         self.speed = self._search.speed
 
     def receive(self, data: bytes, now: float) -> Event | None:
-        """Feed the search."""
         self._search.receive(data, now)
         return self._event()
 
     def tick(self, now: float) -> Event | None:
-        """Move the search on."""
         self._search.tick(now)
         return self._event()
 
@@ -33,7 +31,6 @@ class Searching(State):
         return self._search.next_deadline()
 
     def take_output(self) -> list[bytes]:
-        """The search's probes."""
         return self._search.take_output()
 
     def _event(self) -> Event | None:

@@ -20,7 +20,6 @@ _RULE = "60-naze-bridge.rules"
 
 
 def check_port(host: Host, fc: FcAddress) -> Checked:
-    """Check that the port exists."""
     if not isinstance(fc, SerialFc):
         return ok("port", f"{fc}, no serial port")
     device = host.resolve(fc.path)

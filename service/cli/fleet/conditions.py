@@ -51,7 +51,6 @@ def parse_condition(text: str) -> Condition:
 
 
 def matching(fleet: Iterable[FleetVehicle], conditions: Sequence[Condition]) -> list[FleetVehicle]:
-    """The vehicles that fulfil all conditions."""
     return [vehicle for vehicle in fleet if all(condition(vehicle) for condition in conditions)]
 
 

@@ -49,7 +49,6 @@ class FleetFolder:
 
     @property
     def is_tls(self) -> bool:
-        """True if the router is reached over TLS."""
         return self.router.startswith(("tls/", "quic/"))
 
     def members(self) -> dict[str, Role]:

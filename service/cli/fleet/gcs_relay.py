@@ -53,30 +53,24 @@ class GcsRelay:
         self._output = session.declare_subscriber(full(prefix, vehicle, MAVLINK_OUT.suffix), self._heard)
 
     def close(self) -> None:
-        """Undeclare the keys and close the links."""
         self._output.undeclare()  # type: ignore[no-untyped-call]
         for link in self._links.values():
             link.close()
 
     def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
-        """Pass a ground station's frames on to the vehicle."""
         self._peers[peer] = None
         self._input.put(data)
 
     def gcs_gone(self, peer: Peer) -> None:
-        """Forget a station."""
         self._peers.pop(peer, None)
 
     def displaced(self, peers: Mapping[Peer, float]) -> Peer:
-        """The connection of a full link to close."""
         return displaced(peers)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        """Send to a station before it is heard."""
         self._peers[peer] = None
 
     def remove_default_peer(self, peer: Peer) -> None:
-        """Stop sending to it."""
         self._peers.pop(peer, None)
 
     def _input_is(self, accepted: bool) -> None:

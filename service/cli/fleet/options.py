@@ -22,7 +22,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def address_options(command: F) -> F:
-    """Add the options for the fleet's address."""
     for option in (
         click.option(
             "--config", type=PATH, help="The daemon's configuration file; its [zenoh] table has the defaults."

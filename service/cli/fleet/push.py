@@ -40,7 +40,6 @@ class PushState:
 
     @property
     def is_done(self) -> bool:
-        """True if this is final."""
         return self.result is not None or self.error is not None
 
 
@@ -53,7 +52,6 @@ class FleetPush:
 
     @property
     def waiting(self) -> list[str]:
-        """The vehicles that are not done."""
         return [name for name, progress in self.vehicles.items() if not progress.is_done]
 
     @property

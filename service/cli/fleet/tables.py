@@ -50,7 +50,6 @@ def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table
 
 
 def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
-    """Make one row per bridge."""
     caption = Text("".join(f"\n{line}" for line in complaints(fleet)), style="yellow")
     table = _table(caption)
     table.add_column("Vehicle", overflow="fold")
@@ -123,7 +122,6 @@ def progress_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
 
 
 def push_table(fleet: FleetPush) -> Table:
-    """One row per vehicle: its result, and the reason."""
     table = _table()
     table.add_column("Vehicle", overflow="fold")
     table.add_column("Push", no_wrap=True)
@@ -181,7 +179,6 @@ def _trial_table(
 
 
 def push_data(fleet: FleetPush) -> Json:
-    """The results as plain data."""
     return {
         "vehicles": [
             {"vehicle": each.vehicle, "ok": each.result is not None, "error": each.error, "result": each.result}
@@ -192,7 +189,6 @@ def push_data(fleet: FleetPush) -> Json:
 
 
 def push_summary(fleet: FleetPush) -> str:
-    """The summary, one line."""
     count, failed = len(fleet.vehicles), len(fleet.failed)
     held = sum(each.result is not None for each in fleet.vehicles.values())
     return f"{held} of {count} vehicles hold the mission, verified" + (f"; {failed} failed" if failed else "")

@@ -23,7 +23,6 @@ class WriteFile:
     secret: bool = False
 
     def describe(self) -> str:
-        """A description of the change."""
         return f"write {self.path}"
 
 
@@ -34,7 +33,6 @@ class Run:
     command: tuple[str, ...]
 
     def describe(self) -> str:
-        """A description of the change."""
         return f"run {' '.join(self.command)}"
 
 
@@ -57,7 +55,6 @@ class Machine:
         self._host = host
 
     def carry_out(self, change: Change) -> None:
-        """Make one change."""
         if isinstance(change, Run):
             self.run(change.command)
             return
@@ -70,7 +67,6 @@ class Machine:
             raise SetupError(f"{change.path} cannot be written: {error.strerror}; run setup with sudo") from error
 
     def run(self, command: Sequence[str]) -> None:
-        """Run a program on this machine."""
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)  # noqa: S603  # our own words
         except (OSError, subprocess.TimeoutExpired) as error:
@@ -82,5 +78,4 @@ class Machine:
 
 
 def is_root() -> bool:
-    """True if this user may change the machine."""
     return os.geteuid() == 0
