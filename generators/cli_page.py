@@ -12,8 +12,8 @@ _WIDTH = 100
 _HEAD = """\
 # The command line
 
-The `--help` text of every command. Common exit codes: 0 done, 1 refused or failed, 2 wrong usage or an unreadable
-file, 74 the output cannot be written, 130 interrupted.
+The `--help` text of every command. Common exit codes: 0 done, 1 refused or failed, 2 wrong usage or
+an unreadable file, 74 the output cannot be written, 130 interrupted.
 """
 
 

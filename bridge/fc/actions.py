@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands for the ground: calibrations, and writing the settings to flash.
+"""Commands that run only on the ground: calibrations, and writing the settings to flash.
 
 The firmware checks neither whether it is flying nor whether a command is repeated (serial.c): a calibration stalls it
 for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.

@@ -210,7 +210,7 @@ class Autosense:
             visit.heartbeat = frame
             if not visit.probes and visit.answer is None:
                 visit.phase_ends = now
-            # MSP keeps its chance, and a reply that is being confirmed its full time.
+            # MSP may still answer, and a reply that is being confirmed keeps its full time.
             visit.ends = max(now + self._two_probes_s(), visit.phase_ends)
 
     def _conclude(self, spoken: Spoken, why: str) -> None:

@@ -14,7 +14,7 @@ _MAX_REPLY_PAYLOAD = 200
 
 
 class NoAnswer(Exception):
-    """A question stayed unanswered, so the board cannot be identified: a guess could be wrong."""
+    """A request got no reply, so the board cannot be identified: a guess could be wrong."""
 
 
 class Interview:

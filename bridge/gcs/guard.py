@@ -219,7 +219,7 @@ class Guard:
 
 
 def only_reads(frame: MavlinkFrame) -> bool:
-    """True if a frame changes nothing, for its sender and for others."""
+    """True if a frame changes nothing."""
     msgid = frame.msgid
     if msgid in _COMMANDS:
         return _command(frame) in _QUESTIONS

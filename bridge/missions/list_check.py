@@ -117,7 +117,7 @@ class ListCheck(ABC):
                 self._note(item, name, value, 0, UNUSED.why, news)
 
     def _note_home(self, item: MissionItem) -> None:
-        """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint would be taken for home."""
+        """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint becomes home."""
         if item.frame in RELATIVE_FRAMES:
             why = "first item became home, not flown to"
             self._note(item, "frame", item.frame, int(Frame.GLOBAL), why, News.WARNING)

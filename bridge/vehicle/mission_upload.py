@@ -3,7 +3,7 @@
 
 Uploads run one at a time, in the order of their MISSION_COUNT, unless slow or numerous lists would lock out the
 others: then they are received in parallel, and only written one at a time. Mission Planner loses
-some packets and takes any ack to MISSION_COUNT as "continue"; most special cases below answer a behaviour listed
+some packets, and any ack to MISSION_COUNT means "continue" to it; most special cases below respond to a behaviour listed
 in docs/ground-stations.md.
 """
 
@@ -464,7 +464,7 @@ class MissionUploads:
 
     def _answer(self, upload: _Upload, ack: MissionResult, now: float) -> None:
         if upload.is_superseded:
-            # The station would take this ack for that of the list that it has announced since.
+            # The station would attribute this ack to the list that it has announced since.
             return
         for where in (upload.station, *self._elsewhere(upload, now)):
             self._answers.note(where, ack, upload.count, now, is_cancelled=upload.is_cancelled)

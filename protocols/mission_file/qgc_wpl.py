@@ -79,7 +79,7 @@ def _numbered(items: list[MissionItem], note: Note) -> list[MissionItem]:
         note("there is no item 0: home is missing")
         items = [replace(items[0], seq=0, command=0, lat_e7=None, lon_e7=None, alt_m=0.0), *items]
     elif items[0].command == 0:
-        note("home has command 0, taken for a WAYPOINT")
+        note("home has command 0, treated as a WAYPOINT")
     if items[0].command == 0:
         items[0] = replace(items[0], command=int(Command.NAV_WAYPOINT), frame=int(Frame.GLOBAL))
     odd = next((place for place, item in enumerate(items) if item.seq != place), None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bridge's connections to ground stations: the open links, and what each has carried."""
+"""The bridge's connections to ground stations: the open links, and the traffic of each."""
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence

@@ -29,7 +29,7 @@ _log = structlog.get_logger()
 
 
 class TcpLink:
-    """tcpin: any number of ground stations connect."""
+    """tcpin: ground stations connect."""
 
     def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
         self.name = str(address)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a port or link has carried."""
+"""Traffic counters of a port or link."""
 
 from dataclasses import dataclass
 

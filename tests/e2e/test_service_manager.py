@@ -79,7 +79,7 @@ def test_the_daemon_is_ready_without_a_flight_controller(start: Starter, systemd
 
 async def next_feed(systemd: Systemd, before: int) -> int:
     """Wait until the watchdog is fed again; return the total count."""
-    await until_async(lambda: systemd.listen().count("WATCHDOG=1") > before, "food")
+    await until_async(lambda: systemd.listen().count("WATCHDOG=1") > before, "a watchdog message")
     return systemd.listen().count("WATCHDOG=1")
 
 

@@ -80,7 +80,7 @@ async def agrees(values: AsyncIterator[Any], check: Callable[[Any], None], times
                 if agreed >= times:
                     return
     except TimeoutError:
-        raise failure or AssertionError(f"nothing came to {check.__name__}") from None
+        raise failure or AssertionError(f"no value for {check.__name__}") from None
 
 
 async def test_mavsdk_shows_the_flight_correctly(bench: Bench) -> None:

@@ -74,7 +74,7 @@ def noted(*lines: str) -> tuple[list[MissionItem], list[str]]:
     [
         ([HOME, "2" + POINT[1:]], "item 2 where item 1 must be: numbered by their order"),
         ([HOME, "0" + POINT[1:]], "item 0 where item 1 must be: numbered by their order"),
-        ([HOME.replace("\t0\t16\t", "\t3\t0\t"), POINT], "home has command 0, taken for a WAYPOINT"),
+        ([HOME.replace("\t0\t16\t", "\t3\t0\t"), POINT], "home has command 0, treated as a WAYPOINT"),
         ([HOME, POINT.removesuffix("\t1")], "line 3: autocontinue is missing"),
         ([HOME.replace("\t", ","), POINT.replace("\t", ", ")], None),
         ([HOME.replace("0\t1\t", "0\t2\t"), POINT], None),

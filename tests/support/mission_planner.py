@@ -37,7 +37,7 @@ class UploadFailed(Exception):
 
 
 class TimedOut(UploadFailed):
-    """It gave up waiting."""
+    """The client gave up."""
 
 
 class MissionPlanner:
@@ -164,7 +164,7 @@ class MissionPlanner:
 
     @property
     def _target(self) -> tuple[int, int]:
-        assert self.vehicle is not None, "it has met no vehicle"
+        assert self.vehicle is not None, "no vehicle has been found"
         return self.vehicle
 
     def look_around(self, seconds: float) -> None:
@@ -191,7 +191,7 @@ class MissionPlanner:
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
         deadline = time.monotonic() + PATIENCE
         while not condition():
-            assert self._receive(deadline), f"{what} did not come, but {self.texts}, {self.acks()}"
+            assert self._receive(deadline), f"timed out waiting for {what}; received {self.texts}, {self.acks()}"
 
     # -- connecting ------------------------------------------------------------------------------------------
 
@@ -207,7 +207,7 @@ class MissionPlanner:
         raise TimedOut("No Heartbeat Packets Received")
 
     def be_connected(self) -> None:
-        """Continue as if it had met the daemon's vehicle some time ago."""
+        """Continue as if the daemon's vehicle had been found earlier."""
         self.vehicle = (1, 1)
         self._sees_mavlink_2 = True
 
@@ -248,7 +248,7 @@ class MissionPlanner:
         return None
 
     def arm(self) -> int | None:
-        """The Arm button; texts received meanwhile are shown to the user."""
+        """The Arm button."""
         return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def request_version(self) -> None:
@@ -269,7 +269,7 @@ class MissionPlanner:
                 if len(self.parameters) == self._parameter_count:
                     break
         while len(self.parameters) < self._parameter_count:
-            assert time.monotonic() < deadline, "a parameter does not come"
+            assert time.monotonic() < deadline, "a parameter is missing"
             for index in range(self._parameter_count):
                 self.send(messages.MAVLink_param_request_read_message(*self._target, b"", index))
                 for message in self._packets(0.2):

@@ -64,7 +64,7 @@ class PlainStation:
         for message in self._messages(PATIENCE):
             if message.get_type() in kinds:
                 return message
-        raise AssertionError(f"no {kinds} came")
+        raise AssertionError(f"no {kinds} received")
 
     def upload(self, plan: Sequence[PlanRow]) -> MissionResult:
         """Upload a list, item by item as requested; return the final ack."""
@@ -78,7 +78,7 @@ class PlainStation:
                 if message.get_type() in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
                     is_asked = True
                     self.give(plan, message.seq)
-        raise AssertionError("no final MISSION_ACK came")
+        raise AssertionError("no final MISSION_ACK received")
 
     def announce(self, count: int) -> None:
         self.send(self._dialect.MAVLink_mission_count_message(1, 1, count))
@@ -111,7 +111,7 @@ class PlainStation:
                 data = self._socket.recv(4096)
             except TimeoutError:
                 return
-            assert data, "the daemon hung up"
+            assert data, "the daemon disconnected"
             for message in self._codec.parse_buffer(data) or []:
                 if message.get_type() != "BAD_DATA":
                     self.heard.append(message)

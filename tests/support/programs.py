@@ -28,7 +28,7 @@ T = TypeVar("T")
 def until(condition: Callable[[], T | None], what: str) -> T:
     """Wait for a true value and return it."""
     found = comes(condition)
-    assert found, f"{what} did not come"
+    assert found, f"timed out waiting for {what}"
     return found
 
 
@@ -46,7 +46,7 @@ async def until_async(condition: Callable[[], T | None], what: str) -> T:
     """`until` in a running event loop."""
     deadline = time.monotonic() + PATIENCE
     while not (found := condition()):
-        assert time.monotonic() < deadline, f"{what} did not come"
+        assert time.monotonic() < deadline, f"timed out waiting for {what}"
         await asyncio.sleep(0.01)
     return found
 
@@ -156,7 +156,7 @@ class Board(Program):
         return records
 
     def assert_was_treated_well(self) -> None:
-        """Assert that nothing was sent to the board that would have harmed a real one."""
+        """Assert that nothing sent to the board would have harmed a real one."""
         stats = self.stats()
         assert stats["hazard_runs"] == stats["rx_overflows"] == stats["tx_overflows"] == 0, stats
         assert stats["max_outstanding_reply_bytes"] <= 255, stats

@@ -110,7 +110,7 @@ def _shown(seq: int, record: NavRecord, sent_as: int | None) -> MissionItem:
         case NavAction.LAND:
             return _leg(seq, Command.NAV_LAND, record)
         case unknown:
-            # No ground station takes MAV_CMD 0 for a flight command, and the rules would drop it.
+            # No ground station treats MAV_CMD 0 as a flight command, and the rules would drop it.
             return _item(seq, _UNKNOWN_COMMAND, p1=unknown)
 
 

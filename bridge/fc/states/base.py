@@ -89,7 +89,7 @@ class Port:
         self.vehicle.version = controller.version or self.vehicle.version
 
     def hear_armed(self, source: Source, now: float) -> None:
-        """The craft must be armed, to send what it sends. Its mode is the last known one."""
+        """Only an armed craft sends this. Its mode is the last known one."""
         known = self.vehicle.last(FlightState)
         self.vehicle.hear(FlightState(now, source, True, None if known is None else known.mode))
 

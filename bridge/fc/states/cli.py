@@ -17,8 +17,8 @@ _SILENCE_S = 7.0
 class Cli(State):
     """The board was left in its command line, or a terminal program opened it.
 
-    Sends only complete requests without a line end, and DEL, which erases them from the line: neither is a command, and
-    neither ends up in front of the pilot's `exit`. A reply or a heartbeat shows that it is back.
+    Sends only complete requests without a line end, and DEL, which erases them: so nothing precedes the pilot's `exit`,
+    and nothing is executed. A reply or a heartbeat shows that it is back.
     """
 
     name = "command line"

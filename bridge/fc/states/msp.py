@@ -93,7 +93,7 @@ class MspLine(State):
         self.port.runner.received(frame, now)
 
     def _silent_since(self) -> float:
-        """The time of the last sign of life, or of the first question after it."""
+        """The time of the last sign of life, or of the first request after it."""
         return self.link.last_heard_at
 
     @property
